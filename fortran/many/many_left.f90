@@ -20,7 +20,6 @@ module many_left
 
   ! As in sensitivity.py, which decides what a prepared solver reports.
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
-  ! See sensitivity.py.
   real(dp), parameter :: CLOSED_FORM_ERROR = 16.0_dp*ROUNDING ! relative
   real(dp), parameter :: NEGLIGIBLE_TO = 2.0_dp**44
   real(dp), parameter :: UNSURE = 0.3_dp ! rounding times amplification, in tolerances

@@ -179,7 +179,7 @@ contains
         end do
         if (.not. change > 0.0_dp) status = COMPLETE
         if (change >= change_before .and. change <= ROUNDING*scale) status = COMPLETE
-        ! A torque that adds far more than omega, and removes it again, leaves its rounding error.
+        ! A torque may add far more than omega, and remove it; its rounding error then remains.
         if (iteration > PATIENT .and. change >= change_before &
             .and. change <= ROUNDING*(scale + abs(h)*push)) status = COMPLETE
         if (status == COMPLETE) exit
@@ -195,8 +195,8 @@ contains
           part = part + WEIGHTS_LOW(k, stages)*f(k, axis)
           increment = increment + WEIGHTS(k, stages)*f(k, axis)
         end do
-        ! The low parts are finer than the last place of the sum. What the sum cannot hold goes into
-        ! `carry` (compensated summation, after Hairer, McLachlan and Razakarivony 2008).
+        ! The low parts are finer than the last place of the sum. `carry` takes the rounding error
+        ! of the sum (compensated summation, after Hairer, McLachlan and Razakarivony 2008).
         increment = h*increment
         part = carry(axis) + h*part
         total = increment + part

@@ -139,8 +139,8 @@ contains
   end subroutine march_constant
 
   subroutine march_varying(motion, start, aside, t_end, fours, found)
-    !! Do the same under a torque that varies. The integral of the torque is exact, and the rest is
-    !! smooth.
+    !! Take the steps of march_constant under a torque that varies. The integral of the torque is
+    !! exact, and the rest is smooth.
     type(motion_t), intent(in) :: motion
     real(dp), intent(in) :: start(3)
     real(dp), intent(in) :: aside(3)     !! offset of the start of the longer steps

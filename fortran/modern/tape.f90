@@ -11,7 +11,7 @@ module tape
   integer, parameter, public :: N_INPUTS = 8 !! time, omega and attitude
 
   type, public :: tape_t
-    integer :: n_unknowns                            !! 3, or 7 with attitude, and own states
+    integer :: n_unknowns                            !! 3, or 7 with attitude; plus own states
     integer :: n_slots
     integer :: n_operations
     ! Kind, two operands and result. The operand of LINEAR is the number of its combination. Of a

@@ -76,7 +76,7 @@ contains
 
   subroutine find_growth(matrix, noise, sizes, transitions, growth, blur)
     !! Find the largest norm from the beginning of any block to any requested time, and the largest
-    !! rounding error at one.
+    !! rounding error at a requested time.
     real(dp), intent(in) :: matrix(:, :) !! of the open block
     real(dp), intent(in) :: noise(:)     !! squares of the rounding errors in it
     !! Of the unknowns, to which perturbations are relative; 0 of one that does not count.
@@ -105,9 +105,9 @@ contains
   contains
 
     subroutine grow(last, behind, noise_behind)
-      !! Find the same for the time after block `last` and what is behind it.
+      !! Update both for the end of block `last`, or for a later time.
       integer, intent(in) :: last
-      real(dp), intent(in) :: behind(MOST_UNKNOWNS, MOST_UNKNOWNS) !! from the end of that block
+      real(dp), intent(in) :: behind(MOST_UNKNOWNS, MOST_UNKNOWNS) !! from this end to the time
       real(dp), intent(in) :: noise_behind
       real(dp) :: product(MOST_UNKNOWNS, MOST_UNKNOWNS), noise_of_block(MOST_UNKNOWNS), squares
       integer :: m
@@ -143,7 +143,7 @@ contains
   end function norm
 
   pure real(dp) function sum_of_squares(n, a, perturbations, sizes)
-    !! Return the square of the relative perturbation that a matrix makes of independent ones.
+    !! Return the square of the relative perturbation to which a matrix changes independent ones.
     integer, intent(in) :: n
     real(dp), intent(in) :: a(MOST_UNKNOWNS, MOST_UNKNOWNS)
     real(dp), intent(in) :: perturbations(:)

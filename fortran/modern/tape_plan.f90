@@ -120,7 +120,7 @@ contains
 
   pure integer function order_for(local_tolerance, powers, of_steps)
     !! Return the order with the least work for the requested digits (Jorba and Zou 2005), or the
-    !! larger one that shows powers.
+    !! larger order that resolves powers.
     real(dp), intent(in) :: local_tolerance
     type(powers_t), intent(in) :: powers
     logical, intent(in) :: of_steps !! whether of single steps
@@ -133,9 +133,9 @@ contains
   end function order_for
 
   pure real(dp) function local_tolerance_of(tolerance, steps, with_attitude)
-    !! Return the largest last terms. An error of omega becomes an error of phase, which grows with
-    !! time; the weights are those of the special kernel for 0.4 radians in a step. It becomes an
-    !! error of the attitude too.
+    !! Return the largest last terms. An error of omega becomes an error of the attitude, and of the
+    !! phase, which grows with time. The weights are those of taylor_plan.f90 for 0.4 radians in a
+    !! step.
     real(dp), intent(in) :: tolerance
     real(dp), intent(in) :: steps !! expected number
     logical, intent(in) :: with_attitude

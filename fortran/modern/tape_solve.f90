@@ -16,7 +16,7 @@ module tape_solve
   real(dp), parameter :: MOST_STEPS = 4e6_dp    ! work limit with ten slots; some ten seconds
   real(dp), parameter :: CHEAP_SLOTS = 10.0_dp
   real(dp), parameter :: STEPS_BETWEEN_LOOKS = 5e4_dp ! between polls for an interrupt
-  real(dp), parameter :: ANOTHER = 2.2_dp ! cost of this and another integration over this one
+  real(dp), parameter :: ANOTHER = 2.2_dp ! cost of two integrations, relative to the first
   ! One integration suffices if its error is at most TRUSTED tolerances and its amplification at
   ! most PLANNED_GROWTH. Otherwise another one with an error smaller by SAFETY follows.
   real(dp), parameter :: TRUSTED = 0.25_dp

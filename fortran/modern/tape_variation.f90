@@ -245,7 +245,7 @@ contains
         end do
       end do
       state(:n) = state(:n) + ends(:n)
-      ! A step that was cut says nothing of the next one.
+      ! The length of a cut step is no guess for the next.
       trial = merge(max(trial, abs(step%h)), abs(step%h), arrives())
       t = merge(break_time, t + step%h, arrives())
       largest = max(largest, maxval(abs(state(:3))))

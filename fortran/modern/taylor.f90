@@ -19,7 +19,7 @@ module taylor
   real(dp), parameter :: A_WAVE = 0.5_dp
   real(dp), parameter :: STEPS_BETWEEN_LOOKS = 1e5_dp ! between polls for an interrupt
   real(dp), parameter :: FARTHEST_COUNT = 4e18_dp
-  real(dp), parameter :: ANOTHER = 2.2_dp ! cost of this and another integration over this one
+  real(dp), parameter :: ANOTHER = 2.2_dp ! cost of two integrations, relative to the first
   ! One integration suffices if its error is at most TRUSTED tolerances and its amplification at
   ! most PLANNED_GROWTH. Otherwise errors may cancel in the one that is propagated, and another
   ! integration is planned with an error smaller by SAFETY.
@@ -29,8 +29,8 @@ module taylor
   real(dp), parameter :: SAFETY = 10.0_dp
   real(dp), parameter :: CHOOSING = 1e15_dp ! amplification that makes rounding errors large
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
-  ! Steps whose rounding errors may amount to one more at the worst time; measured. In some scenes
-  ! they do not cancel as in a random walk.
+  ! Number of steps whose rounding errors may add up to one rounding error at the worst time
+  ! (measured). In some scenes they do not cancel as in a random walk.
   real(dp), parameter :: WALK = 5e3_dp
   real(dp), parameter :: UNSURE = 0.3_dp ! rounding times amplification, in tolerances
   integer, parameter :: FEW_WAVES = 16    ! waves that need no allocated array

@@ -99,7 +99,7 @@ contains
   end subroutine estimate_truncation
 
   pure subroutine estimate_truncation_from_rest(s, order, unit, left)
-    !! Do the same for a body that starts from rest.
+    !! Estimate the truncation error for a body that starts from rest.
     type(series_t), intent(inout) :: s
     integer, intent(in) :: order
     real(dp), intent(in) :: unit       !! s/rad

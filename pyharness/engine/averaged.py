@@ -190,7 +190,6 @@ class _Run:
         )
 
     def _pace(self, point: Array) -> float:
-        """Return the approximate frequency of the motion (rad/s)."""
         low = float(point[2])
         high = low + self.coordinates.bend * float(point[0] * point[0] + point[1] * point[1])
         # One step of the arithmetic-geometric mean of the least and the largest |w_a|.

@@ -211,8 +211,6 @@ def _without_attitude(given: Callable[..., Any]) -> Callable[[Any, Any, Any, Any
 def _with_own(
     given: Callable[..., Any], own: Sequence[str], n_attitude: int, needs_attitude: bool
 ) -> Callable[..., Any]:
-    """Return a user's function with the signature of `Event.function`."""
-
     def function(t: Any, omega: Any, rest: Any, rates: Any) -> Any:
         states = dict(zip(own, rest[n_attitude:], strict=True))
         attitude = (rest[:n_attitude],) if needs_attitude else ()

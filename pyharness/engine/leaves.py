@@ -307,7 +307,6 @@ def _slopes_of_combination(
 def _products(
     slopes: Iterable[tuple[int, str]], operation: _Listed, by: dict[int, dict[int, str]]
 ) -> dict[int, str]:
-    """Return the derivatives of an operation with respect to the unknowns, by the chain rule."""
     parts = [
         (unknown, f"({_written(slope, operation)})*{name}")
         for slot, slope in slopes

@@ -45,7 +45,7 @@ from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.trajectory import ROUNDING, Array
 from pyharness.model.values import Number, Numbers, boolean, checked_effort, finite
 
-_PLAIN, _TILTED = -2, -1  # kinds of scenes about principal axes, and with an inertia matrix
+_PLAIN, _TILTED = -2, -1  # kinds of scenes: about principal axes; with an inertia matrix
 _NO_DETAILS: dict[str, Any] = dict.fromkeys(("t_events", "y_events", "sensitivities", "refusals"))
 
 

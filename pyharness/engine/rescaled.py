@@ -168,7 +168,7 @@ def _tape(torque: StateTorque, factor: float) -> Tape | None:
 
 @lru_cache(maxsize=64)
 def scaled_tape(tape: Tape, exponent: int) -> Tape | None:
-    """Return the tape of a torque in the unit of time 2**exponent s, without rounding.
+    """Return the tape (recorded operations) of a torque in the unit of time 2**exponent s.
 
     Each slot (input or result) has its own power of two as factor, so that none overflows or
     underflows. The factor of the outputs is 2**(2 * exponent). Return None if a number would be
@@ -183,7 +183,6 @@ def scaled_tape(tape: Tape, exponent: int) -> Tape | None:
     combinations: dict[int, Linear] = {TIME: Linear(0.0, ((TIME, 1.0),))}
 
     def combine(linear: Linear, power: int) -> Linear:
-        """Return a combination of the new slots, times 2**power."""
         terms = tuple(
             (places[slot], float(_scaled(np.float64(factor), power - exponents[slot])))
             for slot, factor in linear.terms
@@ -195,7 +194,6 @@ def scaled_tape(tape: Tape, exponent: int) -> Tape | None:
         return N_INPUTS + len(operations) - 1
 
     def copy_slot(slot: int, power: int) -> int:
-        """Return a new slot that has the original value of `slot`, times 2**power."""
         if exponents[slot] == power:
             return places[slot]
         # The kernel recognises waves by linear combinations of time alone.

@@ -110,7 +110,6 @@ def scene_of(data: dict[str, Any], default_name: str) -> Scene:
 
 
 def _body(table: dict[str, Any]) -> dict[str, Any]:
-    """Return the table [body] with an inertia that changes in place of its description."""
     moments, inertia = table.get("moments"), table.get("inertia")
     for place, given in (("moments", moments), ("inertia", inertia)):
         if isinstance(given, dict):

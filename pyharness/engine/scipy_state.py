@@ -290,7 +290,6 @@ class _StateRun(Run):
             raise InputError(f"[torque]: {HAS_MEMORY}")
 
     def work_error(self, time: float) -> TimedError:
-        """Return the exception for an exceeded work limit at `time` (s)."""
         if self._jumps():
             return TimedError(
                 f"{self.label}: the torque jumps back and forth at t = {{time}} s; write a smooth "

@@ -101,8 +101,7 @@ def angles(attitude: Array, sequence: str) -> Array:
     """Return n attitudes, (n, 4), as angles (degrees) of three successive rotations, (n, 3).
 
     Where the axes of the first and last rotation are parallel, only the sum or difference of their
-    angles is determined; the last angle is then 0. Arc tangents of half angles are accurate even
-    near such an attitude.
+    angles is determined; the last angle is then 0.
     """
     q0, q1, q2, q3 = attitude.T
     if sequence == "3-1-3":

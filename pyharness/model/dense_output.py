@@ -180,7 +180,6 @@ class DenseOutput:
         return states
 
     def _at(self, t: Any, function: Callable[[Array, Array], Array]) -> Array:
-        """Return a function of times and states at checked times."""
         allowed = f"allowed: numbers from {self.t_min:.16g} to {self.t_max:.16g} s"
         try:
             times = np.asarray(t, dtype=np.float64)

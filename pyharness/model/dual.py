@@ -1,4 +1,4 @@
-"""Forward differentiation: dual numbers, and tapes that compute the derivatives of a tape."""
+"""Forward differentiation: dual numbers, and tapes (recorded operations) of derivatives."""
 
 import math
 from collections.abc import Callable, Sequence

@@ -80,7 +80,6 @@ def _bound(polynomial: Sequence[int]) -> int:
 
 
 def _bernstein(polynomial: Sequence[int]) -> list[int]:
-    """Return the coefficients in Bernstein's basis, times a common factor."""
     degree = len(polynomial) - 1
     factor = math.lcm(*(math.comb(degree, j) for j in range(degree + 1)))
     parts = [c * (factor // math.comb(degree, j)) for j, c in enumerate(polynomial)]

@@ -61,9 +61,9 @@ def parsed(
     """Return the torque of three expressions about the body axes, as a torque law if possible.
 
     They may contain t (s), w1, w2, w3 (rad/s), the quaternion q0, q1, q2, q3, pi, the names in
-    `constants`, and the scene's own states. `rates` has an expression for the time derivative of
-    each own state. Values are in N m, or in rad/s2 for a body with coefficients. Raise InputError
-    for an invalid expression.
+    `constants`, and own states (unknowns that `Scene.states` adds). `rates` has an expression for
+    the time derivative of each own state. Values are in N m, or in rad/s2 for a body with
+    coefficients. Raise InputError for an invalid expression.
     """
     values = _checked_constants(constants)
     texts = _three_texts(expressions)

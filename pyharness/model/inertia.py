@@ -174,7 +174,6 @@ def _rotate(a: list[list[int]], vectors: list[list[int]], p: int, q: int, bits: 
 
 
 def _last_bit(x: float) -> int:
-    """Return the exponent of a number's lowest nonzero bit."""
     numerator, denominator = x.as_integer_ratio()
     if denominator > 1:
         return 1 - denominator.bit_length()

@@ -117,7 +117,7 @@ def in_scene_axes(found: Trajectory, axes: Array) -> Trajectory:
 def states_in_scene_axes(states: Array, axes: Array, own: int) -> Array:
     """Return rows of states, transformed from principal `axes` (columns) to the body's own.
 
-    Columns from `own` on are own states, which remain unchanged.
+    Columns from `own` on, unknowns that `Scene.states` adds, remain unchanged.
     """
     turned, rest = states[:, 3:own], states[:, own:]
     if own > 3:

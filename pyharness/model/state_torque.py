@@ -388,7 +388,6 @@ def _with_parameters(torque: StateTorque, function: Function, called: Function) 
     }
 
     def recorded_with(names: Sequence[str]) -> Tape | None:
-        """Return the tape with these keywords as inputs, or None if it can't be recorded."""
         recorder = Recorder(n_inputs=N_INPUTS + len(names))
         # An exponent, which is a number of factors, is no parameter.
         recorder.has_powers = not names
@@ -412,7 +411,6 @@ def _with_parameters(torque: StateTorque, function: Function, called: Function) 
 
 
 def _list_summands(torque: StateTorque | TorqueLaw) -> "tuple[StateTorque | TorqueLaw, ...]":
-    """Return the summands of a torque; a zero law has none."""
     if isinstance(torque, TorqueLaw):
         return () if torque.is_zero else (torque,)
     return torque.parts or (torque,)

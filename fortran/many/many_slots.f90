@@ -20,7 +20,7 @@ module many_slots
   real(dp), parameter, public :: BLURRED = 0.1_dp
   real(dp), parameter, public :: SHORTEST = 1e-7_dp !! shortest step over the time
   real(dp), parameter, public :: FAR = 1e60_dp  !! products of rates from 1/FAR to FAR are finite
-  ! Factor by which the truncation error of a step may exceed that in an integration of one body,
+  ! Factor by which the truncation error of a step may be larger than in an integration of one body,
   ! because it is estimated and subtracted. This factor does not change the order.
   real(dp), parameter :: MORE = 3.0_dp
   real(dp), parameter :: MORE_WITH_WAVES = 2.0_dp ! with waves, whose terms do not come
@@ -131,7 +131,7 @@ contains
       r%scale(i) = max(abs(r%w(i, 1)), abs(r%w(i, 2)), abs(r%w(i, 3)))
       call steady_rates(coupling(i), r%scale(i), push, ramp, r%rest(i), gain(i), rate(i))
       ! Numbers that are not finite, or near the limits of the range, may have products that are
-      ! not.
+      ! not finite.
       r%fits(i) = 1.0_dp
       if (.not. (abs(r%w(i, 1)) + abs(r%w(i, 2)) + abs(r%w(i, 3)) <= FAR &
                  .and. r%scale(i) >= 1.0_dp/FAR)) r%fits(i) = -1.0_dp

@@ -24,27 +24,23 @@ module levels
     end subroutine taylor_solve
 
     subroutine tape_solve(tape, request, solution) bind(c, name="tape_solve")
-      !! Call solve_tape of tape_solve.f90 at the chosen level.
       implicit none(type, external)
       type(*), intent(in) :: tape, request
       type(*), intent(inout) :: solution
     end subroutine tape_solve
 
     subroutine tape_bodies(bodies) bind(c, name="tape_bodies")
-      !! Call solve_tape_bodies of tape_lanes.c at the chosen level.
       implicit none(type, external)
       type(*), intent(inout) :: bodies
     end subroutine tape_bodies
 
     subroutine tape_step(tape, request, step) bind(c, name="tape_step")
-      !! Call step_tape of tape_step.f90 at the chosen level.
       implicit none(type, external)
       type(*), intent(in) :: tape, request
       type(*), intent(inout) :: step
     end subroutine tape_step
 
     subroutine tape_variation(tape, request, variation) bind(c, name="tape_variation")
-      !! Call vary_solution of tape_variation.f90 at the chosen level.
       implicit none(type, external)
       type(*), intent(in) :: tape, request
       type(*), intent(inout) :: variation

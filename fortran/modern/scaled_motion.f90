@@ -169,7 +169,6 @@ contains
   end subroutine average
 
   pure subroutine swap(motion, n, k)
-    !! Exchange two waves.
     type(motion_t), intent(inout) :: motion
     integer, intent(in) :: n, k
 

@@ -65,9 +65,9 @@ contains
 
   subroutine quick_solve(problem_at, request_at, contest, solution_at) &
     bind(c, name="quick_solve_level")
-    !! Compute the angular velocity at the first of the times: row, status, steps of the last
-    !! attempt, error. The status is any but STOPPED. It is SENSITIVE if rounding may count, which
-    !! only the series can measure; the error is then without amplified rounding.
+    !! Compute the angular velocity at the first of the times. The results are row, status, steps of
+    !! the last attempt, and error. The status is any but STOPPED. It is SENSITIVE if rounding may
+    !! count, which only the series can measure; the error then excludes amplified rounding.
     ! Addresses of a problem_t, a request_t and a solution_t, passed through C.
     type(c_ptr), intent(in), value :: problem_at, request_at, solution_at
     !! not 0: REFUSED if the series is faster, or will be needed anyway

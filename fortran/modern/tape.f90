@@ -14,9 +14,9 @@ module tape
     integer :: n_unknowns                            !! 3, or 7 with attitude; plus own states
     integer :: n_slots
     integer :: n_operations
-    ! Kind, two operands and result. The operand of LINEAR is the number of its combination. Of a
-    ! sine and cosine whose angle is proportional to time, operand 2 is the number of the
-    ! combination that holds the frequency, else 0.
+    ! Kind, two operands and result. The operand of LINEAR is the number of its combination. Operand
+    ! 2 of a sine and cosine is the number of the combination with the frequency if the angle is
+    ! proportional to time, else 0.
     integer, pointer, contiguous :: operations(:, :)
     ! Linear combination number n has the terms starts(n) to starts(n + 1) - 1. The last
     ! n_unknowns combinations are the derivatives of the unknowns.

@@ -475,7 +475,7 @@ contains
     end function reached_size
 
     subroutine weigh()
-      !! Make errors of omega relative to the scale, those of the quaternion angles, and those of
+      !! Make errors of omega relative to the scale, errors of the quaternion angles, and errors of
       !! own states relative to their sizes, or to the sizes that they are about to reach.
       real(dp) :: own_size, before, last
       integer :: i
@@ -775,7 +775,6 @@ contains
     end subroutine add_rows
 
     subroutine add_row(high, low, error, row)
-      !! Store a row.
       real(dp), intent(in) :: high(:), low(:), error(:)
       integer, intent(in) :: row
       real(dp) :: z(tape%n_unknowns)

@@ -57,9 +57,9 @@ contains
     !! of the unknowns alone do not show it: an exponential may be so small at the beginning of a
     !! step that it changes no digit, and large a little later. Its argument therefore changes by at
     !! most half the order, unless the exponential stays invisible; the terms of its series then
-    !! decrease before the last. The derivative of a hyperbolic tangent is such a pulse too. A
-    !! divisor, and the argument of a square root, has no zero in the circle around the beginning of
-    !! the step. Products of many factors are in `tape_powers`.
+    !! decrease before the last. The derivative of a hyperbolic tangent may grow in the same way. A
+    !! divisor, and the argument of a square root, must have no zero in the circle around the
+    !! beginning of the step. `tape_powers` treats products of many factors.
     type(tape_t), intent(in) :: tape
     integer, intent(in) :: order
     real(dp), intent(in) :: smallest !! unknown that matters

@@ -21,8 +21,8 @@ module tape_powers
   real(dp), parameter, public :: INVISIBLE = 100.0_dp
 
   type, public :: powers_t
-    ! (slots): the number of factors of a product that is of many factors, or part of one, negative;
-    ! 1 for a factor of one that is no product; otherwise 0
+    ! (slots): minus the number of factors of a product of many factors, or of a part of it; 1 for
+    ! any other factor of such a product; else 0
     integer, allocatable :: factors(:)
     ! (slots): logarithm of the largest coefficient with which a product of many factors is added
     ! to others; -huge if it is a factor of other products alone

@@ -18,7 +18,7 @@ module tape_solve
   real(dp), parameter :: STEPS_BETWEEN_LOOKS = 5e4_dp ! between polls for an interrupt
   real(dp), parameter :: ANOTHER = 2.2_dp ! cost of two integrations, relative to the first
   ! One integration suffices if its error is at most TRUSTED tolerances and its amplification at
-  ! most PLANNED_GROWTH. Otherwise another one with an error smaller by SAFETY follows.
+  ! most PLANNED_GROWTH. Otherwise another one follows, with an error smaller by SAFETY.
   real(dp), parameter :: TRUSTED = 0.25_dp
   real(dp), parameter :: DOUBTED = 256.0_dp ! amplification that halves the trust in an estimate
   real(dp), parameter :: PLANNED_GROWTH = 2e3_dp

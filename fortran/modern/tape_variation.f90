@@ -96,7 +96,6 @@ contains
   contains
 
     subroutine begin()
-      !! Set the values at time 0.
       integer :: block, column, lane
 
       s%blocks = 0.0_dp
@@ -139,7 +138,6 @@ contains
     end subroutine begin
 
     subroutine take()
-      !! Take a step of the solution.
       real(dp) :: reached
 
       do
@@ -231,7 +229,6 @@ contains
     end function arrives
 
     subroutine advance()
-      !! Move to the end of the step.
       integer :: block, i, k
 
       do block = 1, n_blocks

@@ -21,8 +21,8 @@ module taylor
   real(dp), parameter :: FARTHEST_COUNT = 4e18_dp
   real(dp), parameter :: ANOTHER = 2.2_dp ! cost of two integrations, relative to the first
   ! One integration suffices if its error is at most TRUSTED tolerances and its amplification at
-  ! most PLANNED_GROWTH. Otherwise errors may cancel in the one that is propagated, and another
-  ! integration is planned with an error smaller by SAFETY.
+  ! most PLANNED_GROWTH. Otherwise errors may cancel in the propagated error, and another
+  ! integration is planned with an error smaller by the factor SAFETY.
   real(dp), parameter :: TRUSTED = 0.25_dp
   real(dp), parameter :: DOUBTED = 256.0_dp ! amplification that halves the trust in an estimate
   real(dp), parameter :: PLANNED_GROWTH = 2e3_dp

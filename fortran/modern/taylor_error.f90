@@ -17,8 +17,8 @@ module taylor_error
   real(dp), parameter :: LEAST = tiny(1.0_dp)
   real(dp), parameter :: FIRST(4) = [1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp] ! selects the first lane
   real(dp), parameter :: WORTH_A_LOOK = 1e6_dp ! amplification from which all blocks are checked
-  ! A larger norm or error would have no further meaning; the square of a product of two such is in
-  ! range.
+  ! A larger norm or error would have no further meaning. The square of a product of two such
+  ! numbers is in range.
   real(dp), parameter :: LARGEST = 1e75_dp
   real(dp), parameter :: UNIT(3, 3) = reshape([1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp, 0.0_dp, &
                                                0.0_dp, 0.0_dp, 1.0_dp], [3, 3])

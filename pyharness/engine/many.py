@@ -129,7 +129,7 @@ def solve_many(
         Whether to return estimated errors and error amplifications.
     events : callable, Event, or list of these
         Functions whose roots are computed, as in `solve`; none may be terminal. The method must be
-        `auto`, `taylor` or `closed-form`. Events take some milliseconds per body.
+        `auto`, `taylor` or `closed-form`.
     sensitivities : iterable of str
         Names of parameters, as in `solve`, with respect to which the final states are
         differentiated. The allowed methods are those for `events`.

@@ -242,7 +242,7 @@ def _scaled(values: Any, exponents: Any) -> Any:
 
 
 def unscaled(trajectory: Trajectory, times: Sequence[float], factor: float) -> Trajectory:
-    """Return a trajectory of rescaled time in rad/s and s, without rows that overflow."""
+    """Convert a trajectory of rescaled time to rad/s and s; rows that overflow are left out."""
     with np.errstate(over="ignore"):
         omega = trajectory.omega / factor
     finite = np.isfinite(omega).all(axis=1)

@@ -116,7 +116,6 @@ def _body(table: dict[str, Any]) -> dict[str, Any]:
             check_keys(given, _TABLE, f"[body] {place}")
             if not {"times", "values"} <= given.keys():
                 raise InputError(f"[body] {place}: a table needs times and values; give both")
-            # Imported only here, because most scenes have no table.
             from pyharness.engine.table_terms import inertia_table
 
             return {**table, place: inertia_table(**given)}
@@ -171,7 +170,6 @@ def _torque(
         first = parsed(given["expression"], given.get("constants", {}), rates)
     if "terms" not in table:
         return first
-    # Imported late, because few scenes have ready terms.
     from pyharness.engine.term_file import read_terms
 
     terms = read_terms(table["terms"], body)

@@ -281,7 +281,7 @@ class Stepper:
                 self._time = end
 
     def at(self, times: float | Sequence[float] | Array) -> Array:
-        """Return the state at times (s) within the last step, as before later changes by the user.
+        """Return the state at times (s) within the last step, without changes made after it.
 
         The state is omega (rad/s), the quaternion if computed, and own states, with shape (m,), or
         (m, n) for n times. Raise InputError for a time outside the step.

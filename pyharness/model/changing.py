@@ -221,7 +221,6 @@ class ChangingInertia(Changing):
 
     def __post_init__(self) -> None:
         """Check the matrices, and convert elements to floats."""
-        # Imported only here, because the programs need no exact numbers.
         from pyharness.model.inertia import checked_inertia, symmetric_matrix
 
         where = "[body] inertia"

@@ -395,10 +395,9 @@ class Conversions:
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the trajectory with its scene to a file, from which `pyharness.load` restores it.
 
-        The restored numbers are bit-for-bit the same. The file is written completely or not at all,
-        in the format of `numpy.savez`, with an array for each attribute that is an array. The array
-        `scene` is the text of a scene file; `header`, in JSON, has the other attributes and the
-        operations of a recorded torque.
+        The restored numbers are bit-for-bit the same. The format is that of `numpy.savez`, with an
+        array for each attribute that is an array. The array `scene` is the text of a scene file;
+        `header`, in JSON, has the other attributes and the operations of a recorded torque.
 
         Parameters
         ----------

@@ -33,11 +33,11 @@ class Dual:
     __radd__ = __add__
 
     def __sub__(self, other: Any) -> "Dual":
-        """Return the difference from any number."""
+        """Return this number minus any number."""
         return self.__add__(-1.0 * other)
 
     def __rsub__(self, other: Any) -> "Dual":
-        """Return a number minus this one."""
+        """Return any number minus this one."""
         return self.__mul__(-1.0).__add__(other)
 
     def __mul__(self, other: Any) -> "Dual":

@@ -158,8 +158,8 @@ class Ensemble(BatchResult):
         -------
         pandas.DataFrame
             Its index is `body`, from 0, or `body` and `time` (s). Its columns are `omega1` to
-            `omega3` (rad/s), `ended`, and, if present, `q0` to `q3`, `error`, `growth`, own states.
-            ``attrs["units"]`` has the units.
+            `omega3` (rad/s), `ended`, and, if present, `q0` to `q3`, `error`, `growth`, and the
+            own states by name. ``attrs["units"]`` has the units.
 
         Raises
         ------

@@ -138,7 +138,7 @@ def inertia_function(place: str, function: Callable[[Any], Any]) -> InertiaFunct
 
 
 def inertia_of_texts(place: str, values: Any) -> InertiaFunction:
-    """Return the moments or inertia of a scene file's expressions of t, and numbers."""
+    """Return the moments or inertia that a scene file gives by expressions of t and numbers."""
     where = f"[body] {place}"
     rows = [values] if place == "moments" else values
     if not isinstance(values, list) or not all(

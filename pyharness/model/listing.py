@@ -99,7 +99,7 @@ class Listing:
 
     @classmethod
     def original(cls, program: str, readings: Iterable[str] = ()) -> "Listing":
-        """Return the program as printed: with all names of `switches`, and with `readings`."""
+        """Return the program as printed, with the names of `switches`, and `readings`, active."""
         return cls(program, frozenset(switches(program)), frozenset(readings))
 
     @classmethod

@@ -93,7 +93,8 @@ class Trajectory(Conversions):
     time : ndarray, shape (n,)
         The true times, s.
     recorded_time : ndarray, shape (n,)
-        The variable TIME that a program of the thesis prints, s; a defect may falsify it.
+        The variable TIME that a program of the thesis prints, s, which a defect may falsify; for
+        methods, `time`.
     omega : ndarray, shape (n, 3)
         Angular velocity about the body axes, rad/s.
     velocity : ndarray, shape (n, 3), or None

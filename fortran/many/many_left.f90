@@ -218,7 +218,7 @@ contains
 
   real(dp) function roundings_of(packed, n_packed, omega0, time)
     !! Return the rounding errors of omega and of the torque's terms, in roundings of omega. Terms
-    !! that nearly cancel have larger ones than their sum.
+    !! that nearly cancel have larger rounding errors than their sum.
     integer, intent(in) :: n_packed
     real(dp), intent(in), target :: packed(0:n_packed - 1)
     real(dp), intent(in) :: omega0(3)   !! rad/s

@@ -25,7 +25,7 @@ module scaled_motion
     real(dp) :: slope(3)     ! constant torque in the unknowns, rad/s2
     real(dp) :: climb(3)     ! rate of the torque in the unknowns, rad/s3
     integer :: waves         ! number of waves
-    integer :: resolved      ! the first waves, which are resolved; the others are averaged
+    integer :: resolved      ! number of resolved waves, which precede the averaged waves
     real(dp) :: frequency(MOST_WAVES)    ! rad/s
     real(dp) :: on_sine(3, MOST_WAVES)   ! the integral of the wave is this times sine
     real(dp) :: on_versine(3, MOST_WAVES) ! plus this times 1 - cosine

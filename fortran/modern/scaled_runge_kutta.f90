@@ -301,7 +301,7 @@ contains
   contains
 
     subroutine add(wave, most)
-      !! Add a wave to those of the same frequency, and its reach to the turn.
+      !! Add a wave to the waves of its frequency, and its reach to the turn.
       real(dp), intent(in) :: wave(4)
       real(dp), intent(in) :: most !! largest integral of its sine or cosine over an angle
       real(dp) :: largest, size_of_wave

@@ -73,8 +73,8 @@ contains
   function tape_of(numbers) result(tape)
     !! Return the tape that an array contains. Its first numbers are the counts of unknowns, slots,
     !! operations, combinations, terms, tables and pieces, and the number that `leaves_at` reads.
-    !! The arrays of the tape follow: those of integers, two integers in the place of a number, then
-    !! the others.
+    !! The arrays of the tape follow: first the integers, two in the place of a number, then the
+    !! other arrays.
     real(dp), intent(in), target :: numbers(0:)
     type(tape_t) :: tape
     integer, parameter :: COUNTS = 8

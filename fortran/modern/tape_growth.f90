@@ -1,6 +1,6 @@
 module tape_growth
   !! The error amplification of an integration of a tape: the largest norm of the state-transition
-  !! matrices from earlier times to the requested ones, which are formed in blocks of steps.
+  !! matrices from earlier to requested times. The matrices are formed in blocks of steps.
   use kinds, only: dp
   use storage, only: MOST_UNKNOWNS
   implicit none(type, external)
@@ -79,7 +79,7 @@ contains
     !! rounding error at a requested time.
     real(dp), intent(in) :: matrix(:, :) !! of the open block
     real(dp), intent(in) :: noise(:)     !! squares of the rounding errors in it
-    !! Of the unknowns, to which perturbations are relative; 0 of one that does not count.
+    !! Of the unknowns, to which perturbations are relative; 0 if an unknown does not count.
     real(dp), intent(in) :: sizes(:)
     type(transitions_t), intent(in) :: transitions
     real(dp), intent(out) :: growth, blur !! relative

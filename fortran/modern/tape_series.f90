@@ -96,7 +96,8 @@ module tape_series
 
     subroutine sum_terms(tape, order, factor, changes, slopes, sizes) &
       bind(c, name="sum_terms_level")
-      !! Sum the terms of the unknowns, of their derivatives times h, and of these without signs.
+      !! Sum the terms of the unknowns, the terms of their derivatives times h, and the absolute
+      !! terms of the latter.
       import :: c_int, dp, PADDED, tape_arrays_t
       implicit none(type, external)
       type(tape_arrays_t), intent(in) :: tape

@@ -1,6 +1,6 @@
 module tape_solve
   !! The solution of a scene whose equations of motion are a tape: integrations from 0 to the last
-  !! time, until the error of one is small enough or cannot be reduced.
+  !! time, until the error is small enough or cannot be reduced.
   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp

@@ -221,7 +221,7 @@ contains
           return
         end if
       end if
-      ! It may have crossed a level together with another one.
+      ! The operand may have crossed a level together with another operand.
       do level = LOWER, UPPER
         if (switches%on_level(i) /= 0 .or. .not. has_level(i, level)) cycle
         terms = terms_from(i, level, switches, s)

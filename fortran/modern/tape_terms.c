@@ -253,8 +253,8 @@ void OF_LEVEL(expand_tape, LEVEL)(const struct tape *tape, double h, int order)
   }
 }
 
-/* Sum the terms of the unknowns but the first for the part `factor` of the step: their changes, those
-   of their derivatives times the step, and the latter without signs. */
+/* For the part `factor` of the step, sum the terms of the unknowns from 1 on (`changes`), the terms
+   of their derivatives times the step (`slopes`), and the absolute terms of these (`sizes`). */
 void OF_LEVEL(sum_terms, LEVEL)(const struct tape *tape, int order, double factor, double *changes,
                                 double *slopes, double *sizes)
 {

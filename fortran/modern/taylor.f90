@@ -1,6 +1,6 @@
 module taylor
-  !! Taylor series: integrations from 0 to the last time, until the error of one is small enough or
-  !! cannot be reduced.
+  !! Taylor series: integrations from 0 to the last time, until the error is small enough or cannot
+  !! be reduced.
   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_intptr_t, c_loc, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp

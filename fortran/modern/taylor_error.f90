@@ -226,7 +226,7 @@ contains
 
   pure subroutine turn_axes(derivative, lanes)
     !! Orthonormalise the axes in the lanes by Gram and Schmidt; `derivative` has the old axes along
-    !! the new ones.
+    !! the new axes.
     real(dp), intent(inout) :: derivative(3, 3)
     real(dp), intent(inout) :: lanes(4, 3)
     real(dp) :: length

@@ -21,8 +21,9 @@ from pyharness.model.trajectory import ROUNDING, WITH_ALL_ROWS
 # the tolerance. The computed amplification may be too small by a factor of three, because of the
 # norm and of the number of perturbations.
 _SHARE = 0.3
-# Relative error of a closed form (checked by tests/engine/test_closed_form.py); amplification up to
-# which the errors of double-double arithmetic, and so of the phase, are negligible.
+# Relative error of a closed form (checked by tests/engine/test_closed_form.py). Up to the error
+# amplification _NEGLIGIBLE_TO, errors of double-double arithmetic, and so of the phase, are
+# negligible.
 _CLOSED_FORM_ERROR = 16.0 * ROUNDING
 _NEGLIGIBLE_TO = 2.0**44
 # Tolerance, and work limit (a twentieth of a second), of a Taylor series that supplies only the

@@ -61,7 +61,7 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
         The same problem with `moments`; its attitude, if any, describes the principal axes. A
         torque about the axes of space is unchanged; the result then always has an attitude.
     axes : ndarray, shape (3, 3)
-        The principal axes, in columns of components about the body's own axes. They form a
+        The principal axes as columns, in components about the body's own axes. They form a
         right-handed frame; each axis is near the body's own axis of the same number.
 
     Raises

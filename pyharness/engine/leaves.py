@@ -251,7 +251,7 @@ def _kept(unknowns: range, k: str) -> Iterator[str]:
 
 
 def _set_jacobian(tape: Structure) -> Iterator[str]:
-    """Yield the function that computes the Jacobian of the rates at the nodes."""
+    """Yield the function of the Jacobian of the rates at the nodes."""
     # By slot: the names of its derivatives, by unknown.
     by = {slot: {slot: "one"} for slot in _unknowns(tape)}
     yield "void set_jacobian(const double *restrict a, const double *restrict c,"

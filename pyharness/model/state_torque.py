@@ -33,7 +33,7 @@ class StateTorque:
     """A torque about the body axes that depends on time, omega and attitude.
 
     It is in N m for a body with moments or inertia; for a body with coefficients it is torque over
-    moment, in rad/s2. A scene converts a function to a StateTorque.
+    moment, in rad/s2. A scene converts a function to a StateTorque, or to an equal TorqueLaw.
 
     Attributes
     ----------

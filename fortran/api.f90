@@ -6,17 +6,18 @@ subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosin
                        omega0, n_times, times, tolerance, n_attitudes, attitudes, effort, &
                        n_nodes, nodes, n, most, ends, at_nodes, rows, n_rows, status, steps, &
                        n_steps)
-  ! Integrate by Taylor series: omega and, if n_attitudes > 0, the attitude at `times`, which have
-  ! one sign and are ordered away from 0. If most > 0, the unknowns at nodes of each step too.
+  ! Integrate by Taylor series. Compute omega and, if n_attitudes > 0, the attitude at `times`,
+  ! which have one sign and are ordered away from 0. If most > 0, also compute the unknowns at nodes
+  ! of each step.
   !f2py threadsafe
   use levels, only: taylor_solve
   use problem, only: problem_t, request_nodes, request_t, solution_t
   implicit none
   real(8), intent(in) :: coefficients(3)        ! A, B, C
-  real(8), intent(in) :: m_constant(3)          ! torque over moment, 1/s2
-  real(8), intent(in) :: m_rate(3)              ! 1/s3
+  real(8), intent(in) :: m_constant(3)          ! torque over moment, rad/s2
+  real(8), intent(in) :: m_rate(3)              ! rad/s3
   integer(4), intent(in) :: n_sines
-  real(8), intent(in), target :: sines(4, n_sines)      ! amplitude (3) in 1/s2, frequency in rad/s
+  real(8), intent(in), target :: sines(4, n_sines)      ! amplitude (3), rad/s2; frequency, rad/s
   integer(4), intent(in) :: n_cosines
   real(8), intent(in), target :: cosines(4, n_cosines)  ! as sines
   real(8), intent(in) :: omega0(3)              ! rad/s
@@ -65,7 +66,7 @@ end subroutine taylor_rows
 
 subroutine choose_instructions(highest, taken)
   ! Select the kernels of one instruction set, for tests: 0 plain, 1 AVX2, 2 AVX-512. If the
-  ! processor lacks it, the best set below it is taken. `taken` is the set that is used.
+  ! processor lacks this set, `taken` is the best set below it.
   use levels, only: choose_level
   implicit none
   integer(4), intent(in) :: highest
@@ -153,7 +154,7 @@ subroutine sphere_solution(m_constant, m_rate, n_sines, sines, n_cosines, cosine
   use problem, only: problem_t, request_t, solution_t
   use sphere, only: sphere_rows
   implicit none
-  real(8), intent(in) :: m_constant(3)        ! torque over moment, 1/s2; its rate below, 1/s3
+  real(8), intent(in) :: m_constant(3)        ! torque over moment, rad/s2; its rate below, rad/s3
   real(8), intent(in) :: m_rate(3)
   integer(4), intent(in) :: n_sines
   real(8), intent(in), target :: sines(4, n_sines)  ! amplitude (3), frequency in rad/s
@@ -186,7 +187,7 @@ subroutine torque_noise_ratio(m_constant, m_rate, n_sines, sines, n_cosines, cos
   use problem, only: problem_t
   use torque_noise, only: torque_noise_of
   implicit none
-  real(8), intent(in) :: m_constant(3), m_rate(3) ! torque over moment, 1/s2, and its rate, 1/s3
+  real(8), intent(in) :: m_constant(3), m_rate(3) ! torque over moment, rad/s2, and its rate, rad/s3
   integer(4), intent(in) :: n_sines
   real(8), intent(in), target :: sines(4, n_sines)
   integer(4), intent(in) :: n_cosines
@@ -286,7 +287,7 @@ subroutine solve_packed(packed, n_packed, omega0, t_end, omega, status, steps, f
   real(8), intent(out) :: omega(3)   ! rad/s; NaN unless the status is 0 or 6
   integer(4), intent(out) :: status
   integer(8), intent(out) :: steps   ! or right-hand sides, of Gauss collocation;
-  ! negative: the steps of quick, where the kernel chose between it and the series
+  ! negative if the kernel chose quick instead of the series
   real(8), intent(out) :: found(2)   ! estimated relative error, amplification; negative: unknown
 
   call solve_prepared(packed, n_packed, omega0, t_end, omega, status, steps, found)

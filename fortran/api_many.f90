@@ -82,9 +82,9 @@ subroutine solve_ensemble(code, tolerance, step, effort, by_moments, n_body, bod
   integer(4), intent(in) :: n_body
   real(8), intent(in), target :: body(3, n_body)
   integer(4), intent(in) :: n_constant
-  real(8), intent(in), target :: constant(3, n_constant) ! N m, or 1/s2
+  real(8), intent(in), target :: constant(3, n_constant) ! N m, or rad/s2
   integer(4), intent(in) :: n_rate
-  real(8), intent(in), target :: rate(3, n_rate)         ! N m/s, or 1/s3
+  real(8), intent(in), target :: rate(3, n_rate)         ! N m/s, or rad/s3
   integer(4), intent(in) :: n_sines, n_sine_sets
   real(8), intent(in), target :: sines(4, n_sines, n_sine_sets)       ! amplitude (3) as constant,
   ! frequency in rad/s

@@ -17,7 +17,7 @@ subroutine run_program(program, flags, by_moments, body, omega, masses, forces, 
   real(8), intent(in) :: omega(3)          ! rad/s at time 0
   real(8), intent(in) :: masses(3), forces(3)
   real(8), intent(in) :: torque_constant(3), torque_rate(3)
-  real(8), intent(in) :: torque_first(3)   ! torque over moment in the first step, if assumed, 1/s2
+  real(8), intent(in) :: torque_first(3)   ! assumed torque over moment in the first step, rad/s2
   integer(4), intent(in) :: torque_varies  ! 0: only torque_constant acts
   integer(4), intent(in) :: n_sines
   real(8), intent(in), target :: sines(4, n_sines)      ! amplitude (3), frequency in rad/s

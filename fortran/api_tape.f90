@@ -3,9 +3,9 @@
 subroutine tape_rows(n_numbers, numbers, omega0, n_times, times, tolerance, n_attitudes, &
                      attitudes, n_own, own_sizes, n_own_times, own, effort, n_nodes, nodes, n, &
                      most, ends, at_nodes, rows, n_rows, status, steps, n_steps)
-  ! Integrate a tape by Taylor series: omega and, if n_attitudes > 0, the attitude, and n_own states
-  ! of the user's own, at `times`, which have one sign and are ordered away from 0. If most > 0, the
-  ! unknowns at nodes of each step too.
+  ! Integrate a tape by Taylor series. Compute omega, the attitude if n_attitudes > 0, and n_own own
+  ! states (unknowns that the user adds) at `times`, which have one sign and are ordered away from
+  ! 0. If most > 0, also compute the unknowns at nodes of each step.
   !f2py threadsafe
   use levels, only: tape_solve
   use problem, only: request_nodes, request_t, solution_t

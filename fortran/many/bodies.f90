@@ -12,8 +12,7 @@ module bodies
   integer, parameter, public :: LANES = 64   !! bodies side by side, one in each lane
   integer, parameter, public :: A_GROUP = 8  !! bodies in a register: blocks are multiples of it
   integer(i1), parameter, public :: NEEDS_FALLBACK = -1_i1 !! status: left to the single-body kernel
-  ! Status before the multi-lane kernels run: which of them solves the body. Only the numbers of the
-  ! body decide it, so that no result depends on the other bodies of a call.
+  ! Status before the multi-lane kernels run: which of them solves the body (see many_kinds.f90).
   integer(i1), parameter, public :: FREE = -2_i1    !! no torque: the closed form
   integer(i1), parameter, public :: STEPPED = -3_i1 !! constant torque: a fixed step
   integer(i1), parameter, public :: RAMPED = -4_i1  !! torque without waves: the series
@@ -22,7 +21,7 @@ module bodies
   !! takes any number
 
   type, public :: bodies_t
-    logical :: by_moments       !! body in kg m2, torque in N m; else A, B, C and 1/s2
+    logical :: by_moments       !! body in kg m2, torque in N m; else A, B, C and rad/s2
     real(dp) :: tolerance       !! relative
     real(dp) :: step            !! s, of the methods with a fixed step
     real(dp) :: effort          !! factor on the work limit of each body

@@ -26,7 +26,7 @@ module lanes
     real(dp), dimension(LANE_COUNT) :: step, DT, TIME
     real(dp), dimension(LANE_COUNT) :: lipschitz
     real(dp), dimension(LANE_COUNT, 3) :: body, torque_constant, torque_first
-    real(dp) :: M(LANE_COUNT, 3, POINTS)  !! torque over moment, 1/s2
+    real(dp) :: M(LANE_COUNT, 3, POINTS)  !! torque over moment, rad/s2
     integer(int64) :: alive(LANE_COUNT)   !! EVERY_BIT until the run ends, then 0
     integer :: ier(LANE_COUNT)
     real(dp) :: ACL1, ACL2, ACL3          !! force over mass, m/s2

@@ -1,7 +1,6 @@
 module many_bodies
   !! Many bodies in one call. Multi-lane kernels solve them side by side where they are accurate
-  !! enough; the single-body kernel solves the others one by one. Which kernel solves a body depends
-  !! on that body alone.
+  !! enough; the single-body kernel solves the others one by one.
   use, intrinsic :: iso_c_binding, only: c_loc
   use bodies, only: bodies_t, FREE, i1, NEEDS_FALLBACK, RAMPED, STEPPED, WAVED, with_attitude
   use kinds, only: dp

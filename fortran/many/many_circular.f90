@@ -25,7 +25,7 @@ module many_circular
 contains
 
   pure subroutine sine_cosine_lanes(m, angle, sine, cosine)
-    !! Compute sine and cosine to 2e-16 for angles up to 1e6 rad; for larger ones they are
+    !! Compute sine and cosine to 2e-16 for angles up to 1e6 rad; for larger angles the results are
     !! meaningless.
     integer, intent(in) :: m
     real(dp), intent(in) :: angle(LANES)

@@ -94,7 +94,7 @@ contains
     real(dp), intent(in) :: t(LANES)              !! s
     integer(int64), intent(inout) :: n_steps(LANES)
     real(dp), intent(inout) :: h(LANES)           !! s
-    real(dp), intent(inout) :: last(LANES)        !! last step over the others
+    real(dp), intent(inout) :: last(LANES)        !! last step over the other steps
     real(dp), intent(inout) :: odd(LANES)         !! 0 if left to the single-body kernel
     real(dp) :: count
     integer :: i
@@ -217,7 +217,7 @@ contains
   pure subroutine scale_back(m, factor, s, w)
     !! Compute omega about the body's axes; NaN for a body that is left to the single-body kernel.
     integer, intent(in) :: m
-    real(dp), intent(in) :: factor(LANES) !! length of the last step over the others
+    real(dp), intent(in) :: factor(LANES) !! last step over the other steps
     type(scaled_t), intent(in) :: s
     real(dp), intent(inout) :: w(LANES, 3)
     integer :: i

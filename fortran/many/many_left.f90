@@ -20,7 +20,6 @@ module many_left
 
   ! As in sensitivity.py, which decides what a prepared solver reports.
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
-  ! See sensitivity.py.
   real(dp), parameter :: CLOSED_FORM_ERROR = 16.0_dp*ROUNDING ! relative
   real(dp), parameter :: NEGLIGIBLE_TO = 2.0_dp**44
   real(dp), parameter :: UNSURE = 0.3_dp ! rounding times amplification, in tolerances
@@ -219,7 +218,7 @@ contains
 
   real(dp) function roundings_of(packed, n_packed, omega0, time)
     !! Return the rounding errors of omega and of the torque's terms, in roundings of omega. Terms
-    !! that nearly cancel have larger ones than their sum.
+    !! that nearly cancel have larger rounding errors than their sum.
     integer, intent(in) :: n_packed
     real(dp), intent(in), target :: packed(0:n_packed - 1)
     real(dp), intent(in) :: omega0(3)   !! rad/s

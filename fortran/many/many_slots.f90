@@ -20,7 +20,7 @@ module many_slots
   real(dp), parameter, public :: BLURRED = 0.1_dp
   real(dp), parameter, public :: SHORTEST = 1e-7_dp !! shortest step over the time
   real(dp), parameter, public :: FAR = 1e60_dp  !! products of rates from 1/FAR to FAR are finite
-  ! Factor by which the truncation error of a step may exceed that in an integration of one body,
+  ! Factor by which the truncation error of a step may be larger than in an integration of one body,
   ! because it is estimated and subtracted. This factor does not change the order.
   real(dp), parameter :: MORE = 3.0_dp
   real(dp), parameter :: MORE_WITH_WAVES = 2.0_dp ! with waves, whose terms do not come
@@ -41,7 +41,7 @@ module many_slots
   type, public :: slots_t
     real(dp), dimension(SLOTS, 3) :: w, low   !! omega and its rounding error, rad/s
     real(dp), dimension(SLOTS, 3) :: a        !! A, B, C
-    real(dp), dimension(SLOTS, 3) :: constant, rate !! torque over moment: 1/s2, 1/s3
+    real(dp), dimension(SLOTS, 3) :: constant, rate !! torque over moment: rad/s2, rad/s3
     real(dp), dimension(SLOTS, 3) :: error    !! truncation error, propagated so far, rad/s
     real(dp), dimension(SLOTS) :: worst       !! its largest size so far, as it may decrease again
     real(dp) :: small(SLOTS, 3, 3)            !! state-transition matrix from time 0: row, column
@@ -131,7 +131,7 @@ contains
       r%scale(i) = max(abs(r%w(i, 1)), abs(r%w(i, 2)), abs(r%w(i, 3)))
       call steady_rates(coupling(i), r%scale(i), push, ramp, r%rest(i), gain(i), rate(i))
       ! Numbers that are not finite, or near the limits of the range, may have products that are
-      ! not.
+      ! not finite.
       r%fits(i) = 1.0_dp
       if (.not. (abs(r%w(i, 1)) + abs(r%w(i, 2)) + abs(r%w(i, 3)) <= FAR &
                  .and. r%scale(i) >= 1.0_dp/FAR)) r%fits(i) = -1.0_dp

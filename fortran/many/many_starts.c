@@ -22,8 +22,7 @@ typedef struct {
   PyObject *callable;    /* the kernel as a Python object, which keeps its address valid */
   kernel *address;
   PyArrayObject *packed; /* read-only */
-  /* The same scene for the closed form alone, or NULL. This call keeps the GIL, as it is shorter
-     than releasing the GIL and waiting for it again. */
+  /* The same scene for the closed form alone, whose call keeps the GIL; or NULL. */
   PyArrayObject *packed_with_gil;
   PyObject *slowly;      /* Python function that takes any arguments */
 } many_starts;

@@ -1,8 +1,8 @@
 /* Many bodies under one torque that depends on the state, one in each lane of a register: Taylor
    series with a step of its own for each body. When a body reaches its end, the next one takes its
    lane. The truncation error of each step is estimated, propagated to the end and subtracted there.
-   A body whose error can't be relied on, or whose series is not what a step expects, is left to the
-   single-body kernel. This is C because no Fortran compiler keeps eight sums in registers. */
+   A body whose error estimate is unreliable, or for which a step fails, is left to the single-body
+   kernel. This is C because no Fortran compiler keeps eight sums in registers. */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -843,7 +843,7 @@ static int order_for(const struct bodies *all, int *factors)
   return order > least ? order : least;
 }
 
-/* Compute omega of each body at its time, and its attitude. Its status becomes COMPLETE, and remains
+/* Compute omega of each body at its time, and its attitude. Its status becomes COMPLETE, or remains
    NEEDS_FALLBACK if it is left to the single-body kernel. */
 void OF_LEVEL(solve_tape_bodies, LEVEL)(struct bodies *all)
 {

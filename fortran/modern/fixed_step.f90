@@ -23,9 +23,9 @@ contains
 
   subroutine fixed_step_rows(problem, request, method, step, solution)
     !! Compute the angular velocity at each of the times, which are ordered away from 0. Between two
-    !! of them there are as many whole steps as fit and then a shorter one. The last whole step may
-    !! be longer by up to EXCESS instead. The status is COMPLETE, OVERFLOW, GAVE_UP, INTERRUPTED, or
-    !! REFUSED for an unknown method.
+    !! times there are as many whole steps as fit, then a shorter step. If the rest is at most the
+    !! part EXCESS of a step, the last whole step is longer instead. The status is COMPLETE,
+    !! OVERFLOW, GAVE_UP, INTERRUPTED, or REFUSED for an unknown method.
     type(problem_t), intent(in) :: problem
     type(request_t), intent(in) :: request         !! its tolerance is not used
     integer, intent(in) :: method                  !! IMPROVED_EULER, TAYLOR_3 or RK4
@@ -105,8 +105,8 @@ contains
   end function steps_to
 
   pure integer function per_step(method)
-    !! Return the number of right-hand sides in a step; 0 for an unknown method. The derivative of
-    !! one counts as another.
+    !! Return the number of right-hand sides and their derivatives in a step; 0 for an unknown
+    !! method.
     integer, intent(in) :: method
 
     select case (method)

@@ -43,7 +43,7 @@ contains
     type(solution_t), intent(inout) :: solution    !! without steps and estimates
     real(dp), intent(out) :: reached(4)            !! time and omega after the last successful step
     type(state_t) :: now
-    real(dp) :: m(MOST_STAGES, 3)    ! torque over moment at the nodes, 1/s2
+    real(dp) :: m(MOST_STAGES, 3)    ! torque over moment at the nodes, rad/s2
     real(dp) :: at_node(3)
     real(dp) :: begin, h
     real(dp) :: h_low                ! rounding error of the step, s
@@ -140,7 +140,7 @@ contains
     real(dp) :: states(MOST_STAGES, 3)
     real(dp) :: low(MOST_STAGES, 3)     ! contribution of MATRIX_LOW
     real(dp) :: change, change_before, scale
-    real(dp) :: push                    ! largest torque over moment, 1/s2
+    real(dp) :: push                    ! largest torque over moment, rad/s2
     real(dp) :: increment, total, part, back, rest
     integer :: axis, iteration, k
 
@@ -179,7 +179,7 @@ contains
         end do
         if (.not. change > 0.0_dp) status = COMPLETE
         if (change >= change_before .and. change <= ROUNDING*scale) status = COMPLETE
-        ! A torque that adds far more than omega, and removes it again, leaves its rounding error.
+        ! A torque may add far more than omega, and remove it; its rounding error then remains.
         if (iteration > PATIENT .and. change >= change_before &
             .and. change <= ROUNDING*(scale + abs(h)*push)) status = COMPLETE
         if (status == COMPLETE) exit
@@ -195,8 +195,8 @@ contains
           part = part + WEIGHTS_LOW(k, stages)*f(k, axis)
           increment = increment + WEIGHTS(k, stages)*f(k, axis)
         end do
-        ! The low parts are finer than the last place of the sum. What the sum cannot hold goes into
-        ! `carry` (compensated summation, after Hairer, McLachlan and Razakarivony 2008).
+        ! The low parts are finer than the last place of the sum. `carry` takes the rounding error
+        ! of the sum (compensated summation, after Hairer, McLachlan and Razakarivony 2008).
         increment = h*increment
         part = carry(axis) + h*part
         total = increment + part

@@ -1,6 +1,6 @@
 module levels
-  !! The interfaces of levels.c: the kernels of the chosen instruction set. C passes on the address
-  !! of a problem_t, a request_t, a solution_t, a bodies_t or an ensemble_t and does not read it.
+  !! The interfaces of levels.c, which calls the kernels of the chosen instruction set. It passes on
+  !! the address of an argument of a derived type, such as problem_t, and does not read it.
   use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t, c_ptr
   use bodies, only: i1
   implicit none(type, external)
@@ -18,34 +18,29 @@ module levels
     end function choose_level
 
     subroutine taylor_solve(problem, request, solution) bind(c, name="taylor_solve")
-      !! Call taylor_solve of taylor.f90 at the chosen level.
       implicit none(type, external)
       type(*), intent(in) :: problem, request
       type(*), intent(inout) :: solution
     end subroutine taylor_solve
 
     subroutine tape_solve(tape, request, solution) bind(c, name="tape_solve")
-      !! Call solve_tape of tape_solve.f90 at the chosen level.
       implicit none(type, external)
       type(*), intent(in) :: tape, request
       type(*), intent(inout) :: solution
     end subroutine tape_solve
 
     subroutine tape_bodies(bodies) bind(c, name="tape_bodies")
-      !! Call solve_tape_bodies of tape_lanes.c at the chosen level.
       implicit none(type, external)
       type(*), intent(inout) :: bodies
     end subroutine tape_bodies
 
     subroutine tape_step(tape, request, step) bind(c, name="tape_step")
-      !! Call step_tape of tape_step.f90 at the chosen level.
       implicit none(type, external)
       type(*), intent(in) :: tape, request
       type(*), intent(inout) :: step
     end subroutine tape_step
 
     subroutine tape_variation(tape, request, variation) bind(c, name="tape_variation")
-      !! Call vary_solution of tape_variation.f90 at the chosen level.
       implicit none(type, external)
       type(*), intent(in) :: tape, request
       type(*), intent(inout) :: variation
@@ -59,7 +54,6 @@ module levels
     end function ready_leaves
 
     subroutine quick_solve(problem, request, contest, solution) bind(c, name="quick_solve")
-      !! Call quick_solve of scaled_runge_kutta.f90 at the chosen level.
       import :: c_int
       implicit none(type, external)
       type(*), intent(in) :: problem, request
@@ -68,7 +62,6 @@ module levels
     end subroutine quick_solve
 
     subroutine many_free(bodies, n, omega, status) bind(c, name="many_free")
-      !! Call many_free_solve of many_free.f90 at the chosen level.
       import :: c_double, c_int, c_ptr, i1
       implicit none(type, external)
       type(c_ptr), intent(in), value :: bodies
@@ -78,7 +71,6 @@ module levels
     end subroutine many_free
 
     subroutine many_taylor(bodies, n, omega, status, interrupted) bind(c, name="many_taylor")
-      !! Call many_taylor_solve of many_taylor.f90 at the chosen level.
       import :: c_double, c_int, c_ptr, i1
       implicit none(type, external)
       type(c_ptr), intent(in), value :: bodies
@@ -89,7 +81,6 @@ module levels
     end subroutine many_taylor
 
     subroutine many_fixed(bodies, method, n, omega, status, interrupted) bind(c, name="many_fixed")
-      !! Call many_fixed_solve of many_fixed.f90 at the chosen level.
       import :: c_double, c_int, c_ptr, i1
       implicit none(type, external)
       type(c_ptr), intent(in), value :: bodies
@@ -100,7 +91,6 @@ module levels
     end subroutine many_fixed
 
     subroutine run_lanes(ensemble) bind(c, name="run_lanes")
-      !! Call run_lanes of many_programs.f90 at the chosen level.
       implicit none(type, external)
       type(*), intent(in) :: ensemble
     end subroutine run_lanes

@@ -186,8 +186,8 @@ contains
   end subroutine solve_by_series
 
   subroutine compare_with_series(problem, request, omega, ended, found)
-    !! Compare with the series a result whose method does not measure the amplification of rounding
-    !! errors: compute its error and amplification.
+    !! Compute the error and the error amplification of a result by the series, because the method
+    !! of the result does not measure them.
     type(problem_t), intent(in) :: problem
     type(request_t), intent(in) :: request
     real(dp), intent(in) :: omega(3)   !! the result, rad/s

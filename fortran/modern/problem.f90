@@ -11,12 +11,12 @@ module problem
 
   type, public :: problem_t
     real(dp) :: coefficients(3)                    !! A, B, C, without unit
-    real(dp) :: constant(3)                        !! torque over moment, 1/s2
-    real(dp) :: rate(3)                            !! torque over moment, 1/s3
+    real(dp) :: constant(3)                        !! torque over moment, rad/s2
+    real(dp) :: rate(3)                            !! torque over moment, rad/s3
     integer :: n_sines
     integer :: n_cosines
     ! Associated only if there is a wave.
-    real(dp), pointer, contiguous :: sines(:, :)   !! amplitude (3) in 1/s2, frequency in rad/s
+    real(dp), pointer, contiguous :: sines(:, :)   !! amplitude (3) in rad/s2, frequency in rad/s
     real(dp), pointer, contiguous :: cosines(:, :) !! as sines
   end type problem_t
 

@@ -9,8 +9,8 @@ module scaled_march
   integer, parameter :: EXACT_AGAIN = 64     ! groups of four steps between recomputed sines
   real(dp), parameter :: THIRD_PART = 1.0_dp/3.0_dp
   integer, parameter :: BETWEEN_LOOKS = 2**17 - 1 ! passes of the loops between interrupt polls
-  ! Steps of twice the length have 16 times the error, so the gap is 15 times the error of the
-  ! shorter ones.
+  ! Steps of twice the length have 16 times the error. The gap between both results is therefore 15
+  ! times the error of the shorter steps.
   real(dp), parameter, public :: GAIN = 15.0_dp
 
   type, public :: marched_t
@@ -139,8 +139,8 @@ contains
   end subroutine march_constant
 
   subroutine march_varying(motion, start, aside, t_end, fours, found)
-    !! Do the same under a torque that varies. The integral of the torque is exact, and the rest is
-    !! smooth.
+    !! Take the steps of march_constant under a torque that varies. The integral of the torque is
+    !! exact; the rest is smooth.
     type(motion_t), intent(in) :: motion
     real(dp), intent(in) :: start(3)
     real(dp), intent(in) :: aside(3)     !! offset of the start of the longer steps

@@ -22,15 +22,15 @@ module scaled_motion
 
   type, public :: motion_t
     real(dp) :: scale(3)     ! angular velocity (rad/s) is scale times unknown (1/s)
-    real(dp) :: slope(3)     ! constant torque in the unknowns, 1/s2
-    real(dp) :: climb(3)     ! rate of the torque in the unknowns, 1/s3
+    real(dp) :: slope(3)     ! constant torque in the unknowns, rad/s2
+    real(dp) :: climb(3)     ! rate of the torque in the unknowns, rad/s3
     integer :: waves         ! number of waves
-    integer :: resolved      ! the first waves, which are resolved; the others are averaged
+    integer :: resolved      ! number of resolved waves, which precede the averaged waves
     real(dp) :: frequency(MOST_WAVES)    ! rad/s
     real(dp) :: on_sine(3, MOST_WAVES)   ! the integral of the wave is this times sine
     real(dp) :: on_versine(3, MOST_WAVES) ! plus this times 1 - cosine
     real(dp) :: mean(3)      ! mean of the averaged waves' integral, 1/s
-    real(dp) :: push(3)      ! mean of the products of these integrals, 1/s2
+    real(dp) :: push(3)      ! mean of the products of these integrals, rad/s2
     real(dp) :: sign_2       ! sign of the second product: -1 for a body
     integer :: axes(3)       ! axis of the body for each unknown
   end type motion_t
@@ -81,7 +81,7 @@ contains
 
   pure subroutine add_wave(wave, is_cosine, t_end, motion)
     !! Add the integral of one more wave. Waves of one frequency share their sine and versine.
-    real(dp), intent(in) :: wave(4)       !! amplitude (3), 1/s2; frequency, rad/s
+    real(dp), intent(in) :: wave(4)       !! amplitude (3), rad/s2; frequency, rad/s
     logical, intent(in) :: is_cosine
     real(dp), intent(in) :: t_end         !! s
     type(motion_t), intent(inout) :: motion
@@ -124,7 +124,7 @@ contains
     real(dp), intent(in) :: faint        !! allowed error, rad/s
     real(dp), intent(out) :: left_out    !! error of averaging, in the unknowns
     real(dp) :: largest                  ! largest scale
-    real(dp) :: change                   ! rate of change of the unknowns, 1/s2
+    real(dp) :: change                   ! rate of change of the unknowns, rad/s2
     real(dp) :: f                        ! frequency, rad/s
     real(dp) :: size(MOST_WAVES)         ! of the integral of each wave, 1/s
     real(dp) :: error
@@ -169,7 +169,6 @@ contains
   end subroutine average
 
   pure subroutine swap(motion, n, k)
-    !! Exchange two waves.
     type(motion_t), intent(inout) :: motion
     integer, intent(in) :: n, k
 

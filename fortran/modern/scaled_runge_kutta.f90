@@ -65,9 +65,9 @@ contains
 
   subroutine quick_solve(problem_at, request_at, contest, solution_at) &
     bind(c, name="quick_solve_level")
-    !! Compute the angular velocity at the first of the times: row, status, steps of the last
-    !! attempt, error. The status is any but STOPPED. It is SENSITIVE if rounding may count, which
-    !! only the series can measure; the error is then without amplified rounding.
+    !! Compute the angular velocity at the first of the times. The results are row, status, steps of
+    !! the last attempt, and error. The status is any but STOPPED. It is SENSITIVE if rounding may
+    !! count, which only the series can measure; the error then excludes amplified rounding.
     ! Addresses of a problem_t, a request_t and a solution_t, passed through C.
     type(c_ptr), intent(in), value :: problem_at, request_at, solution_at
     !! not 0: REFUSED if the series is faster, or will be needed anyway
@@ -235,7 +235,7 @@ contains
     real(dp), intent(in) :: bits       !! bits of the target error
     real(dp) :: c(3), root(3) ! squares of the rates per omega, and the rates
     real(dp) :: fastest      ! frequency, rad/s
-    real(dp) :: rate         ! largest rate of the torque in the unknowns, 1/s3
+    real(dp) :: rate         ! largest rate of the torque in the unknowns, rad/s3
     real(dp) :: turn_0, turn ! as in solve, rad
     real(dp) :: both         ! squares of these two, summed
     real(dp) :: frequencies(MOST_WAVES) ! which differ, rad/s
@@ -301,7 +301,7 @@ contains
   contains
 
     subroutine add(wave, most)
-      !! Add a wave to those of the same frequency, and its reach to the turn.
+      !! Add a wave to the waves of its frequency, and its reach to the turn.
       real(dp), intent(in) :: wave(4)
       real(dp), intent(in) :: most !! largest integral of its sine or cosine over an angle
       real(dp) :: largest, size_of_wave

@@ -36,7 +36,7 @@ contains
   end function parts_from
 
   pure function powers_of(x, exponent) result(powers)
-    !! Return whole powers, each by the same products as a single one.
+    !! Return whole powers, each by the same products as if computed alone.
     real(dp), intent(in) :: x(AT_ONCE)
     integer, intent(in) :: exponent !! above 0
     real(dp) :: powers(AT_ONCE), square(AT_ONCE)

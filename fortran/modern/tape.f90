@@ -11,12 +11,12 @@ module tape
   integer, parameter, public :: N_INPUTS = 8 !! time, omega and attitude
 
   type, public :: tape_t
-    integer :: n_unknowns                            !! 3, or 7 with attitude, and own states
+    integer :: n_unknowns                            !! 3, or 7 with attitude; plus own states
     integer :: n_slots
     integer :: n_operations
-    ! Kind, two operands and result. The operand of LINEAR is the number of its combination. Of a
-    ! sine and cosine whose angle is proportional to time, operand 2 is the number of the
-    ! combination that holds the frequency, else 0.
+    ! Kind, two operands and result. The operand of LINEAR is the number of its combination. Operand
+    ! 2 of a sine and cosine is the number of the combination with the frequency if the angle is
+    ! proportional to time, else 0.
     integer, pointer, contiguous :: operations(:, :)
     ! Linear combination number n has the terms starts(n) to starts(n + 1) - 1. The last
     ! n_unknowns combinations are the derivatives of the unknowns.
@@ -73,8 +73,8 @@ contains
   function tape_of(numbers) result(tape)
     !! Return the tape that an array contains. Its first numbers are the counts of unknowns, slots,
     !! operations, combinations, terms, tables and pieces, and the number that `leaves_at` reads.
-    !! The arrays of the tape follow: those of integers, two integers in the place of a number, then
-    !! the others.
+    !! The arrays of the tape follow: first the integers, two in the place of a number, then the
+    !! other arrays.
     real(dp), intent(in), target :: numbers(0:)
     type(tape_t) :: tape
     integer, parameter :: COUNTS = 8

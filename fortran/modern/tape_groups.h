@@ -46,7 +46,7 @@ struct work {
   int n_items, n_products, n_pairs, n_groups, n_slots;
   struct item *items; /* in the order of their execution */
   struct pairs *products, *others;
-  struct combinations *combinations; /* those of the derivatives of the unknowns are the last ones */
+  struct combinations *combinations; /* the derivatives of the unknowns come last */
   places *slots;          /* of the combinations */
   abreast *coefficients;
   abreast *sums;          /* of the products of `others` */

@@ -1,6 +1,6 @@
 module tape_growth
   !! The error amplification of an integration of a tape: the largest norm of the state-transition
-  !! matrices from earlier times to the requested ones, which are formed in blocks of steps.
+  !! matrices from earlier to requested times. The matrices are formed in blocks of steps.
   use kinds, only: dp
   use storage, only: MOST_UNKNOWNS
   implicit none(type, external)
@@ -76,10 +76,10 @@ contains
 
   subroutine find_growth(matrix, noise, sizes, transitions, growth, blur)
     !! Find the largest norm from the beginning of any block to any requested time, and the largest
-    !! rounding error at one.
+    !! rounding error at a requested time.
     real(dp), intent(in) :: matrix(:, :) !! of the open block
     real(dp), intent(in) :: noise(:)     !! squares of the rounding errors in it
-    !! Of the unknowns, to which perturbations are relative; 0 of one that does not count.
+    !! Of the unknowns, to which perturbations are relative; 0 if an unknown does not count.
     real(dp), intent(in) :: sizes(:)
     type(transitions_t), intent(in) :: transitions
     real(dp), intent(out) :: growth, blur !! relative
@@ -105,9 +105,9 @@ contains
   contains
 
     subroutine grow(last, behind, noise_behind)
-      !! Find the same for the time after block `last` and what is behind it.
+      !! Update both for the end of block `last`, or for a later time.
       integer, intent(in) :: last
-      real(dp), intent(in) :: behind(MOST_UNKNOWNS, MOST_UNKNOWNS) !! from the end of that block
+      real(dp), intent(in) :: behind(MOST_UNKNOWNS, MOST_UNKNOWNS) !! from this end to the time
       real(dp), intent(in) :: noise_behind
       real(dp) :: product(MOST_UNKNOWNS, MOST_UNKNOWNS), noise_of_block(MOST_UNKNOWNS), squares
       integer :: m
@@ -143,7 +143,7 @@ contains
   end function norm
 
   pure real(dp) function sum_of_squares(n, a, perturbations, sizes)
-    !! Return the square of the relative perturbation that a matrix makes of independent ones.
+    !! Return the square of the relative perturbation to which a matrix changes independent ones.
     integer, intent(in) :: n
     real(dp), intent(in) :: a(MOST_UNKNOWNS, MOST_UNKNOWNS)
     real(dp), intent(in) :: perturbations(:)

@@ -1,6 +1,6 @@
 module tape_live
-  !! The operations of a tape that matter. Those of a branch that no SELECT chooses do not, and may
-  !! be singular: 1/t where t > 1.
+  !! The operations of a tape that matter. An operation in a branch that no SELECT chooses does not
+  !! matter, and may be singular: for example 1/t, if it is chosen only for t > 1.
   use, intrinsic :: iso_c_binding, only: c_loc
   use kinds, only: dp
   use operations, only: ARCSINE => ASIN, ARCTANGENT => ATAN, LINEAR, LOGARITHM => LOG, PRODUCT, &

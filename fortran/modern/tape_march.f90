@@ -71,9 +71,9 @@ module tape_march
     real(dp) :: blur = 0.0_dp   ! the same, amplified until any requested time
     real(dp) :: ahead = 0.0_dp  ! estimated steps to the end, if the work limit is exceeded
     logical :: finest = .false. ! whether the local tolerance is the smallest
-    integer :: switch = 0            ! that slides, or is touched and changes most
+    integer :: switch = 0            ! that slides, or whose touch has the largest effect
     real(dp) :: switches_at = 0.0_dp ! s
-    real(dp) :: touched = 0.0_dp     ! what its change is, relative
+    real(dp) :: touched = 0.0_dp     ! this effect, relative
   end type outcome_t
 
   public :: march
@@ -110,14 +110,14 @@ contains
     logical :: arrives, at_end, from_rest, is_full, has_guess
     logical :: is_rejected                    ! whether a longer step was rejected
     logical :: has_values                     ! whether terms 0 of all slots are known
-    logical :: is_short                       ! whether all terms of perturbations do not suffice
+    logical :: is_short                       ! whether the terms of perturbations do not suffice
     logical :: is_compared                    ! whether terms 0 are those of a touch
     logical :: is_low                         ! whether the order must be raised
-    logical :: is_guessed                     ! whether the size of an own state is
-    logical :: diverges                       ! whether its terms do, as far as they are known
+    logical :: is_guessed                     ! whether the size of an own state is guessed
+    logical :: diverges                       ! whether the known terms of an own state do
     real(dp) :: rates(tape%n_unknowns)        ! at the end of the step
     real(dp) :: whole_step                    ! s: h without switches
-    real(dp) :: nearly                        ! relative distance from a switch that is a touch
+    real(dp) :: nearly                        ! relative distance from a switch: a touch
     integer :: i, n, n_before, order, tries
     integer :: last_terms(MOST_BLOCKS)        ! of the perturbations
     integer :: first_own, n_blocks
@@ -475,7 +475,7 @@ contains
     end function reached_size
 
     subroutine weigh()
-      !! Make errors of omega relative to the scale, those of the quaternion angles, and those of
+      !! Make errors of omega relative to the scale, errors of the quaternion angles, and errors of
       !! own states relative to their sizes, or to the sizes that they are about to reach.
       real(dp) :: own_size, before, last
       integer :: i
@@ -775,7 +775,6 @@ contains
     end subroutine add_rows
 
     subroutine add_row(high, low, error, row)
-      !! Store a row.
       real(dp), intent(in) :: high(:), low(:), error(:)
       integer, intent(in) :: row
       real(dp) :: z(tape%n_unknowns)

@@ -57,9 +57,9 @@ contains
     !! of the unknowns alone do not show it: an exponential may be so small at the beginning of a
     !! step that it changes no digit, and large a little later. Its argument therefore changes by at
     !! most half the order, unless the exponential stays invisible; the terms of its series then
-    !! decrease before the last. The derivative of a hyperbolic tangent is such a pulse too. A
-    !! divisor, and the argument of a square root, has no zero in the circle around the beginning of
-    !! the step. Products of many factors are in `tape_powers`.
+    !! decrease before the last. The derivative of a hyperbolic tangent may grow in the same way. A
+    !! divisor, and the argument of a square root, must have no zero in the circle around the
+    !! beginning of the step. `tape_powers` treats products of many factors.
     type(tape_t), intent(in) :: tape
     integer, intent(in) :: order
     real(dp), intent(in) :: smallest !! unknown that matters
@@ -120,7 +120,7 @@ contains
 
   pure integer function order_for(local_tolerance, powers, of_steps)
     !! Return the order with the least work for the requested digits (Jorba and Zou 2005), or the
-    !! larger one that shows powers.
+    !! larger order that resolves powers.
     real(dp), intent(in) :: local_tolerance
     type(powers_t), intent(in) :: powers
     logical, intent(in) :: of_steps !! whether of single steps
@@ -133,9 +133,9 @@ contains
   end function order_for
 
   pure real(dp) function local_tolerance_of(tolerance, steps, with_attitude)
-    !! Return the largest last terms. An error of omega becomes an error of phase, which grows with
-    !! time; the weights are those of the special kernel for 0.4 radians in a step. It becomes an
-    !! error of the attitude too.
+    !! Return the largest last terms. An error of omega becomes an error of the attitude, and of the
+    !! phase, which grows with time. The weights are those of taylor_plan.f90 for 0.4 radians in a
+    !! step.
     real(dp), intent(in) :: tolerance
     real(dp), intent(in) :: steps !! expected number
     logical, intent(in) :: with_attitude

@@ -21,8 +21,8 @@ module tape_powers
   real(dp), parameter, public :: INVISIBLE = 100.0_dp
 
   type, public :: powers_t
-    ! (slots): the number of factors of a product that is of many factors, or part of one, negative;
-    ! 1 for a factor of one that is no product; otherwise 0
+    ! (slots): minus the number of factors of a product of many factors, or of a part of it; 1 for
+    ! any other factor of such a product; else 0
     integer, allocatable :: factors(:)
     ! (slots): logarithm of the largest coefficient with which a product of many factors is added
     ! to others; -huge if it is a factor of other products alone
@@ -154,8 +154,7 @@ contains
   end function merged
 
   pure subroutine keep_many(tape, powers)
-    !! Set the number of factors of all others than products of many factors, and their factors, to
-    !! 0.
+    !! Set the number of factors to 0, except of products of many factors and of their factors.
     type(tape_t), intent(in) :: tape
     type(powers_t), intent(inout) :: powers
     logical :: is_product, is_part(tape%n_slots)
@@ -225,7 +224,7 @@ contains
   contains
 
     subroutine find_largest()
-      !! Find the largest mean order of a product that matters, over that allowed.
+      !! Find the largest ratio of the mean order of a product that matters to the allowed order.
       integer :: n
 
       largest = 0.0_dp

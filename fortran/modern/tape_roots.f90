@@ -13,9 +13,9 @@ module tape_roots
 contains
 
   pure subroutine first_root(c, degree, most, nearly, root, touch)
-    !! Find the first place in a step where a polynomial becomes negative. Bounds of the Taylor
-    !! polynomial around the middle of an interval show that it has no root, or is monotonic; other
-    !! intervals are halved.
+    !! Find the first place in a step where a polynomial becomes negative. Intervals are halved
+    !! until bounds of the Taylor polynomial around their middle show that there is no root, or that
+    !! the polynomial is monotonic.
     real(dp), intent(in) :: c(0:LAST_TERM)
     integer, intent(in) :: degree
     real(dp), intent(in) :: most, nearly

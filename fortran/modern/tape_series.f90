@@ -96,7 +96,8 @@ module tape_series
 
     subroutine sum_terms(tape, order, factor, changes, slopes, sizes) &
       bind(c, name="sum_terms_level")
-      !! Sum the terms of the unknowns, of their derivatives times h, and of these without signs.
+      !! Sum the terms of the unknowns, the terms of their derivatives times h, and the absolute
+      !! terms of the latter.
       import :: c_int, dp, PADDED, tape_arrays_t
       implicit none(type, external)
       type(tape_arrays_t), intent(in) :: tape
@@ -444,7 +445,7 @@ contains
   pure subroutine noise_of(tape, s, noise, of_unknowns)
     !! Compute bounds of the rounding errors of the derivatives of the unknowns, in units of the
     !! rounding error of 1, by running error analysis of terms 0 (Higham 2002, section 3.3). The
-    !! time is taken as exact, and so are the unknowns if nothing is said of them.
+    !! time counts as exact, and so do the unknowns without `of_unknowns`.
     type(tape_t), intent(in) :: tape
     type(series_t), intent(inout) :: s
     real(dp), intent(out) :: noise(:)

@@ -1,6 +1,6 @@
 module tape_solve
   !! The solution of a scene whose equations of motion are a tape: integrations from 0 to the last
-  !! time, until the error of one is small enough or cannot be reduced.
+  !! time, until the error is small enough or cannot be reduced.
   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
@@ -16,9 +16,9 @@ module tape_solve
   real(dp), parameter :: MOST_STEPS = 4e6_dp    ! work limit with ten slots; some ten seconds
   real(dp), parameter :: CHEAP_SLOTS = 10.0_dp
   real(dp), parameter :: STEPS_BETWEEN_LOOKS = 5e4_dp ! between polls for an interrupt
-  real(dp), parameter :: ANOTHER = 2.2_dp ! cost of this and another integration over this one
+  real(dp), parameter :: ANOTHER = 2.2_dp ! cost of two integrations, relative to the first
   ! One integration suffices if its error is at most TRUSTED tolerances and its amplification at
-  ! most PLANNED_GROWTH. Otherwise another one with an error smaller by SAFETY follows.
+  ! most PLANNED_GROWTH. Otherwise another one follows, with an error smaller by SAFETY.
   real(dp), parameter :: TRUSTED = 0.25_dp
   real(dp), parameter :: DOUBTED = 256.0_dp ! amplification that halves the trust in an estimate
   real(dp), parameter :: PLANNED_GROWTH = 2e3_dp

@@ -14,8 +14,8 @@ module tape_switches
   integer, parameter, public :: STAYS = 0, CROSSES = 1, SLIDES = 2, IS_CHANGED = 3
   real(dp), parameter :: ZERO_TERM = 1e-13_dp   ! part of the terms that is a rounding error
   real(dp), parameter :: ROUNDED = 1e-14_dp     ! rounding error of an operand, over its terms
-  real(dp), parameter :: FAR = 1e-8_dp          ! part that is none
-  real(dp), parameter :: TOGETHER = 2.0_dp**(-50) ! relative difference of roots that are one
+  real(dp), parameter :: FAR = 1e-8_dp          ! part of the terms that is no rounding error
+  real(dp), parameter :: TOGETHER = 2.0_dp**(-50) ! relative difference of roots that count as one
   integer, parameter :: MOST_CUTS = 100
 
   type, public :: switches_t
@@ -24,9 +24,9 @@ module tape_switches
     logical, allocatable :: is_floor(:)
     integer, allocatable :: on_level(:)  !! LOWER or UPPER where the step begins there, else 0
     integer, allocatable :: crosses(:)   !! the level that the operand crosses at the step's end
-    logical, allocatable :: is_turned(:) !! changed since the last step, because it did not move
+    logical, allocatable :: is_turned(:) !! changed since the last step, by turn_back
     logical, allocatable :: is_live(:)   !! whether it matters in this step
-    logical, allocatable :: is_new(:)    !! whether it matters again, and its result is an old one
+    logical, allocatable :: is_new(:)    !! whether it matters again, but its result is outdated
     ! All operations that matter in this step, and whether each operation of the tape does.
     integer, allocatable :: operations(:, :)
     logical, allocatable :: matters(:)
@@ -221,7 +221,7 @@ contains
           return
         end if
       end if
-      ! It may have crossed a level together with another one.
+      ! The operand may have crossed a level together with another operand.
       do level = LOWER, UPPER
         if (switches%on_level(i) /= 0 .or. .not. has_level(i, level)) cycle
         terms = terms_from(i, level, switches, s)
@@ -353,8 +353,8 @@ contains
   end subroutine turn_back
 
   pure subroutine update(switches, s, is_changed)
-    !! Change the first switch whose result is not that of its operand's term 0 at the end of a
-    !! step. One that crosses is changed, unless a change of another moved its operand away.
+    !! Change the first switch whose result does not fit term 0 of its operand at the end of a step.
+    !! A switch that crosses is changed, unless the change of another switch moved its operand away.
     type(switches_t), intent(inout) :: switches
     type(series_t), intent(inout) :: s
     logical, intent(out) :: is_changed

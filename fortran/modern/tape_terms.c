@@ -253,8 +253,8 @@ void OF_LEVEL(expand_tape, LEVEL)(const struct tape *tape, double h, int order)
   }
 }
 
-/* Sum the terms of the unknowns but the first for the part `factor` of the step: their changes, those
-   of their derivatives times the step, and the latter without signs. */
+/* For the part `factor` of the step, sum the terms of the unknowns from 1 on (`changes`), the terms
+   of their derivatives times the step (`slopes`), and the absolute terms of these (`sizes`). */
 void OF_LEVEL(sum_terms, LEVEL)(const struct tape *tape, int order, double factor, double *changes,
                                 double *slopes, double *sizes)
 {
@@ -601,10 +601,10 @@ static ALWAYS_INLINE void perturb_all(const int n, const int nodes, perturbation
   else perturb_with(n, SIDE_BY_SIDE, nodes, v, jacobian, k);
 }
 
-/* Expand eight perturbations, from number `number` on, whose values are terms 0 of the unknowns, to as
-   many terms as they need for the part `factor` of the step, and return the number of the last term.
-   `is_long` says that there are many steps. The number is negative if all terms do not suffice. `tolerance` is the largest relative size of a term
-   that is left out. */
+/* Expand eight perturbations, from number `number` on, to as many terms as the part `factor` of the
+   step needs. Term 0 of the unknowns is an input. Return the number of the last term, negative if
+   all terms do not suffice. `is_long` says that there are many steps; `tolerance` is the largest
+   relative size of a term that is left out. */
 int OF_LEVEL(perturb_tape, LEVEL)(const struct tape *tape, int number, double h, int order,
                                   double factor, const double *weights, double tolerance, int is_long)
 {

@@ -96,7 +96,6 @@ contains
   contains
 
     subroutine begin()
-      !! Set the values at time 0.
       integer :: block, column, lane
 
       s%blocks = 0.0_dp
@@ -139,7 +138,6 @@ contains
     end subroutine begin
 
     subroutine take()
-      !! Take a step of the solution.
       real(dp) :: reached
 
       do
@@ -231,7 +229,6 @@ contains
     end function arrives
 
     subroutine advance()
-      !! Move to the end of the step.
       integer :: block, i, k
 
       do block = 1, n_blocks
@@ -245,7 +242,7 @@ contains
         end do
       end do
       state(:n) = state(:n) + ends(:n)
-      ! A step that was cut says nothing of the next one.
+      ! The length of a cut step is no guess for the next.
       trial = merge(max(trial, abs(step%h)), abs(step%h), arrives())
       t = merge(break_time, t + step%h, arrives())
       largest = max(largest, maxval(abs(state(:3))))

@@ -1,6 +1,6 @@
 module taylor
-  !! Taylor series: integrations from 0 to the last time, until the error of one is small enough or
-  !! cannot be reduced.
+  !! Taylor series: integrations from 0 to the last time, until the error is small enough or cannot
+  !! be reduced.
   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_intptr_t, c_loc, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
@@ -19,18 +19,18 @@ module taylor
   real(dp), parameter :: A_WAVE = 0.5_dp
   real(dp), parameter :: STEPS_BETWEEN_LOOKS = 1e5_dp ! between polls for an interrupt
   real(dp), parameter :: FARTHEST_COUNT = 4e18_dp
-  real(dp), parameter :: ANOTHER = 2.2_dp ! cost of this and another integration over this one
+  real(dp), parameter :: ANOTHER = 2.2_dp ! cost of two integrations, relative to the first
   ! One integration suffices if its error is at most TRUSTED tolerances and its amplification at
-  ! most PLANNED_GROWTH. Otherwise errors may cancel in the one that is propagated, and another
-  ! integration is planned with an error smaller by SAFETY.
+  ! most PLANNED_GROWTH. Otherwise errors may cancel in the propagated error, and another
+  ! integration is planned with an error smaller by the factor SAFETY.
   real(dp), parameter :: TRUSTED = 0.25_dp
   real(dp), parameter :: DOUBTED = 256.0_dp ! amplification that halves the trust in an estimate
   real(dp), parameter :: PLANNED_GROWTH = 2e3_dp
   real(dp), parameter :: SAFETY = 10.0_dp
   real(dp), parameter :: CHOOSING = 1e15_dp ! amplification that makes rounding errors large
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
-  ! Steps whose rounding errors may amount to one more at the worst time; measured. In some scenes
-  ! they do not cancel as in a random walk.
+  ! Number of steps whose rounding errors may add up to one rounding error at the worst time
+  ! (measured). In some scenes they do not cancel as in a random walk.
   real(dp), parameter :: WALK = 5e3_dp
   real(dp), parameter :: UNSURE = 0.3_dp ! rounding times amplification, in tolerances
   integer, parameter :: FEW_WAVES = 16    ! waves that need no allocated array

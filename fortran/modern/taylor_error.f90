@@ -17,8 +17,8 @@ module taylor_error
   real(dp), parameter :: LEAST = tiny(1.0_dp)
   real(dp), parameter :: FIRST(4) = [1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp] ! selects the first lane
   real(dp), parameter :: WORTH_A_LOOK = 1e6_dp ! amplification from which all blocks are checked
-  ! A larger norm or error would have no further meaning; the square of a product of two such is in
-  ! range.
+  ! A larger norm or error would have no further meaning. The square of a product of two such
+  ! numbers is in range.
   real(dp), parameter :: LARGEST = 1e75_dp
   real(dp), parameter :: UNIT(3, 3) = reshape([1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp, 0.0_dp, &
                                                0.0_dp, 0.0_dp, 1.0_dp], [3, 3])
@@ -99,7 +99,7 @@ contains
   end subroutine estimate_truncation
 
   pure subroutine estimate_truncation_from_rest(s, order, unit, left)
-    !! Do the same for a body that starts from rest.
+    !! Estimate the truncation error for a body that starts from rest.
     type(series_t), intent(inout) :: s
     integer, intent(in) :: order
     real(dp), intent(in) :: unit       !! s/rad
@@ -226,7 +226,7 @@ contains
 
   pure subroutine turn_axes(derivative, lanes)
     !! Orthonormalise the axes in the lanes by Gram and Schmidt; `derivative` has the old axes along
-    !! the new ones.
+    !! the new axes.
     real(dp), intent(inout) :: derivative(3, 3)
     real(dp), intent(inout) :: lanes(4, 3)
     real(dp) :: length

@@ -33,8 +33,8 @@ contains
     real(dp), intent(out) :: local_tolerance !! largest last terms over the scale
     real(dp), intent(out) :: h              !! s
     real(dp) :: coupling
-    real(dp) :: push                        ! largest torque over moment, 1/s2
-    real(dp) :: ramp                        ! its largest rate, 1/s3
+    real(dp) :: push                        ! largest torque over moment, rad/s2
+    real(dp) :: ramp                        ! its largest rate, rad/s3
     real(dp) :: gain                        ! omega that torques may add, rad/s
     real(dp) :: rate                        ! rate of change, 1/s
     real(dp) :: turned                      ! angle of the waves, rad
@@ -64,8 +64,8 @@ contains
     !! Compute the contributions of the free motion and of the constant and linear torque.
     real(dp), intent(in) :: coupling        !! largest of |A|, |B|, |C|
     real(dp), intent(in) :: scale           !! largest |omega|, rad/s
-    real(dp), intent(in) :: push            !! 1/s2
-    real(dp), intent(in) :: ramp            !! 1/s3
+    real(dp), intent(in) :: push            !! rad/s2
+    real(dp), intent(in) :: ramp            !! rad/s3
     real(dp), intent(in) :: time            !! time to go, s
     real(dp), intent(out) :: gain           !! omega that the torque may add, rad/s
     real(dp), intent(out) :: rate           !! rate of change, 1/s
@@ -101,14 +101,14 @@ contains
 
   pure subroutine add_wave_rates(wave, is_sine, coupling, time, gain, rate, turned)
     !! Add the contributions of one wave to the omega that may be added and to the rate of change.
-    real(dp), intent(in) :: wave(4)         !! amplitude (3) in 1/s2, frequency in rad/s
+    real(dp), intent(in) :: wave(4)         !! amplitude (3) in rad/s2, frequency in rad/s
     logical, intent(in) :: is_sine
     real(dp), intent(in) :: coupling
     real(dp), intent(in) :: time            !! time to go, s
     real(dp), intent(inout) :: gain         !! rad/s
     real(dp), intent(inout) :: rate         !! 1/s
     real(dp), intent(inout) :: turned       !! rad
-    real(dp) :: push                        ! 1/s2
+    real(dp) :: push                        ! rad/s2
 
     push = max(abs(wave(1)), abs(wave(2)), abs(wave(3)))
     ! A slow sine does not reach its amplitude.

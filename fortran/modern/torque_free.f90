@@ -146,7 +146,7 @@ contains
     w = w(orbit%axes)
     s = abs(a)
     s_low = s_low(orbit%axes)
-    ! Growth without bound: two coefficients of one sign, and none of the other.
+    ! Growth without bound: two coefficients of one sign, none of the other sign.
     if (.not. s(2) > 0.0_dp .and. s(1)*s(3) > 0.0_dp) then
       status = REFUSED
       return

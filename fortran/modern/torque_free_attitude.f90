@@ -331,7 +331,6 @@ contains
   end subroutine take_before
 
   pure type(pair_t) function unsigned(x)
-    !! Return |x|.
     type(pair_t), intent(in) :: x
 
     unsigned = x

@@ -6,8 +6,8 @@ module torque_free_differences
   implicit none(type, external)
   private
 
-  ! Relative size of a perturbation. One that does not grow keeps some bits of its own. One that
-  ! grows remains small to the end as long as any digit of the result is left.
+  ! Relative size of a perturbation. A perturbation that does not grow keeps some bits. A growing
+  ! perturbation remains small to the end as long as any digit of the result is left.
   real(dp), parameter :: SMALL = 2.0_dp**(-48)
   integer, parameter :: INSTANTS = 64
   ! If only a comparison with a limit is needed, every APART-th instant suffices when the

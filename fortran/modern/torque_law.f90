@@ -15,7 +15,7 @@ contains
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: time      !! s
     real(dp), intent(in) :: time_low  !! rounding error of time, s
-    real(dp), intent(out) :: m(3)     !! 1/s2
+    real(dp), intent(out) :: m(3)     !! rad/s2
 
     m = problem%constant + problem%rate*time
     if (problem%n_sines + problem%n_cosines > 0) then
@@ -27,11 +27,11 @@ contains
   pure subroutine add_waves(n, waves, are_sines, time, time_low, m)
     !! Add the sines or the cosines.
     integer, intent(in) :: n
-    real(dp), intent(in) :: waves(4, n) !! amplitude (3), 1/s2; frequency, rad/s
+    real(dp), intent(in) :: waves(4, n) !! amplitude (3), rad/s2; frequency, rad/s
     logical, intent(in) :: are_sines
     real(dp), intent(in) :: time        !! s
     real(dp), intent(in) :: time_low    !! s
-    real(dp), intent(inout) :: m(3)     !! 1/s2
+    real(dp), intent(inout) :: m(3)     !! rad/s2
     real(dp) :: sine, cosine
     integer :: k
 
@@ -45,7 +45,7 @@ contains
     !! Compute the derivative of the torque over moment by time.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: time      !! s
-    real(dp), intent(out) :: rate(3)  !! 1/s3
+    real(dp), intent(out) :: rate(3)  !! rad/s3
     real(dp) :: wave(4)
     integer :: k
 

@@ -29,7 +29,7 @@ module torque_terms
 
   ! All that a step needs of a wave, side by side.
   type, public :: wave_t
-    real(dp) :: amplitude(4)  !! 1/s2, the fourth 0
+    real(dp) :: amplitude(4)  !! rad/s2, the fourth 0
     real(dp) :: frequency     !! rad/s
     real(dp) :: value         !! of the sine or cosine at the step's beginning
     real(dp) :: slope         !! its derivative by the angle
@@ -92,7 +92,7 @@ contains
 
   pure subroutine torque_terms_at(steady, t, h, order, longest, fresh, waves, torque)
     !! Compute the terms of omega around t that the torque adds, rad/s.
-    real(dp), intent(in) :: steady(4, 2) !! constant torque, 1/s2, and rate, 1/s3; the fourth 0
+    real(dp), intent(in) :: steady(4, 2) !! constant torque, rad/s2, and rate, rad/s3; the fourth 0
     real(dp), intent(in) :: t(2)       !! time and its rounding error, s
     real(dp), intent(in) :: h          !! step, s
     integer, intent(in) :: order

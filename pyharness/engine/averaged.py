@@ -1,7 +1,7 @@
 """The method `averaged`: weak torques over very many revolutions, by two-scale averaging.
 
-A weak torque changes the periodic torque-free motion slowly. One macro-step computes the change
-over very many revolutions, from the stroboscopic solution: the state once in each revolution.
+A weak torque changes the periodic torque-free motion slowly. One macro-step computes this change
+over very many revolutions. It uses the stroboscopic solution, the state once in each revolution.
 
 Stroboscopic averaging: Calvo, Chartier, Murua and Sanz-Serna 2011, Numerical stroboscopic averaging
 for ODEs and DAEs, Applied Numerical Mathematics 61. Two scales: Chartier, Crouseilles, Lemou and
@@ -37,10 +37,10 @@ _MOST_STEPS = 3000  # work limit in macro-steps, some ten seconds
 # The last macro-step is longer than the rest of the motion by this fraction and this number of
 # revolutions, because the time at its end is only estimated.
 _BEYOND, _TURNS_BEYOND = 0.02, 3
-# Factors on the length of a macro-step after a failure, and on the length of the next one after a
-# success at the first and at a later attempt.
+# Factors on the length of a macro-step: after a failure; after a success at the first attempt; and
+# after a success at a later attempt.
 _SHORTER, _LONGER, _HARDLY_LONGER = 0.5, 4.0, 1.2
-_RELATIVE = 1.3  # first length of a macro-step over the angle in which the motion changes
+_RELATIVE = 1.3  # ratio of the first macro-step to the angle in which the motion changes
 _APPROACH = 2.0  # the length is divided by this if the motion approaches the separatrix
 _WAVE = 4.0  # phase of a wave (rad) that counts as a relative change of 1
 # The number of angles gives oscillations the relative error exp(-_DIGITS/2), means exp(-_DIGITS).
@@ -100,11 +100,12 @@ def averaged(
     """Return the trajectory of a scene with a weak torque at `times` (s), by averaging.
 
     In the result, `steps` counts macro-steps, and `error` is the difference from a solution with
-    more nodes and a higher order of averaging. Raise InputError if the torque is opaque, depends on
-    the attitude, is not weak, or may be in resonance; if omega without torque would not circle a
-    principal axis, as for a sphere, or is near the separatrix; and if the work limit is exceeded. A
-    recorded torque must be a sum of polynomials in omega and time multiplied by sines and cosines
-    of time, because a macro-step might miss changes of another torque.
+    more nodes and a higher order of averaging. A recorded torque must be a sum of terms, each a
+    polynomial in omega and time multiplied by sines and cosines of time; a macro-step might miss
+    changes of any other torque. Raise InputError if the torque has another form, is opaque, depends
+    on the attitude, is not weak, or may be in resonance; if the torque-free omega is near the
+    separatrix, or does not circle a principal axis, as for a sphere; and if the work limit is
+    exceeded.
     """
     # The next macro-step refuses a point that is not finite.
     with np.errstate(all="ignore"):
@@ -189,7 +190,6 @@ class _Run:
         )
 
     def _pace(self, point: Array) -> float:
-        """Return the approximate frequency of the motion (rad/s)."""
         low = float(point[2])
         high = low + self.coordinates.bend * float(point[0] * point[0] + point[1] * point[1])
         # One step of the arithmetic-geometric mean of the least and the largest |w_a|.

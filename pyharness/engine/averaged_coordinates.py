@@ -178,8 +178,8 @@ class _Slot(NamedTuple):
 def fastest_of(torque: TorqueLaw | StateTorque) -> float:
     """Return the highest frequency of the waves (sines and cosines of time) of a torque (rad/s).
 
-    Raise InputError unless a recorded torque is a sum of polynomials, of degree 8 at most, times
-    waves: a macro-step may miss a pulse, or an effect in a narrow range of omega.
+    A recorded torque must be a sum of polynomials of degree 8 at most, multiplied by waves. Else
+    raise InputError: a macro-step may miss a pulse, or an effect in a narrow range of omega.
     """
     if isinstance(torque, TorqueLaw):
         return max((abs(f) for a, f in torque.sines + torque.cosines if any(a)), default=0.0)

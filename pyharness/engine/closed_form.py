@@ -18,12 +18,12 @@ from pyharness.model.principal import principal
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
 
-_CALM = 1e3  # error amplification; a smaller one is taken at the last time alone
+_CALM = 1e3  # error amplification below which only the last time is evaluated
 _MOST_ROWS = 16  # rows at which a larger amplification is computed
 
 
 def period_of(scene: Scene) -> float:
-    """Return the period of omega (s), or 0: without one, under a torque, for a changing inertia."""
+    """Return the period of omega (s); 0 without period, under a torque, for a changing inertia."""
     if scene.changing is not None or not scene.torque.is_zero:
         return 0.0
     bare = principal(scene)[0]

@@ -58,7 +58,10 @@ def get_include() -> str:
 def check_call(
     scene: Scene, with_attitude: bool, omega0: object, t_end: object, third: object
 ) -> tuple[tuple[float, ...], float]:
-    """Return the initial state and `t_end` (s) of a call whose arguments the C code refused."""
+    """Return the initial state and `t_end` (s) of a call whose arguments the C code refused.
+
+    `third` is the attitude or `out`. Raise InputError for an invalid argument.
+    """
     start, time = three_floats("omega", omega0), number("t_end", t_end)
     if scene.changing is not None and math.isfinite(time):
         scene.changing.check([time])

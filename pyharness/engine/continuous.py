@@ -76,7 +76,7 @@ def with_events(
 def _first_periods(
     found: Trajectory, rows: dense.Rows, tolerance: float, period: float
 ) -> Trajectory:
-    """Return the trajectory; if a side of time 0 has over six periods (s), only the first three."""
+    """Return `found`, with three periods in place of a side of time 0 that has more than six."""
     ends = found.time[[0, -1]]
     last = PERIODS * period
     # For little more than three periods, repetition would save nothing.

@@ -29,14 +29,14 @@ from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Trajectory
 
-# Tolerance of the results at the nodes, over the requested one. It is below 1 because a polynomial
-# may have larger errors between its nodes. The second is for methods that can't meet the first.
+# Ratios of the tolerance at the nodes to the requested tolerance. They are below 1 because a
+# polynomial may have larger errors between its nodes. The second applies if the first can't be met.
 _NODE_TOLERANCE = 0.25
 _LARGEST_NODE_TOLERANCE = 0.75
-# Bound of the last coefficients of a polynomial, relative to the state, over the tolerance.
+# Largest ratio of a polynomial's last coefficients, relative to the state, to the tolerance.
 _LAST = 0.02
-# Rounding errors of a method, over the error amplification; they are not smooth in time. Then the
-# smallest bound of the last coefficients.
+# Ratio of a method's rounding errors, which are not smooth in time, to the error amplification; and
+# the smallest bound of the last coefficients.
 _OWN_ROUNDING = 4e-15
 _ROUNDING = 4e-16
 _TAIL = 3  # last coefficients, whose magnitude estimates the omitted ones
@@ -90,8 +90,9 @@ def dense_output(
 ) -> DenseOutput:
     """Return the solution as a function of time from time 0 to the last row of `found`.
 
-    `rows` computes the states at other times, `finest` is the smallest tolerance of the method, and
-    the tolerance 1 means fixed steps. Raise InputError if over 200 000 polynomials are needed.
+    `rows` computes the states at other times, and `finest` is the smallest tolerance of the method.
+    The tolerance 1 means fixed steps. A closed form (`is_closed`) is evaluated directly. Raise
+    InputError if over 200 000 polynomials are needed.
     """
     ends = sorted({0.0, *found.time[[0, -1]].tolist()}) if len(found.time) else [0.0]
     states: Callable[[Array], Array]

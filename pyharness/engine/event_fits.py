@@ -1,7 +1,7 @@
 """Polynomials through the values of an event's function, and the errors (noise) of these values.
 
-In a zero interval, a function is 0 to within its error. The interval is a root if the function
-reaches it by a kink or a jump, but not if it decays to 0.
+In a zero interval, a function is 0 to within its error. The interval counts as a root if the
+function becomes 0 there by a kink or a jump, but not if it decays to 0.
 """
 
 import math
@@ -21,7 +21,7 @@ _LAST = 2e-14
 _TAIL = 3  # last coefficients, whose magnitude estimates the omitted ones
 _MOST_DIVISIONS = 44  # halvings of an interval after which a function counts as not smooth
 # A function reaches 0 by a kink or a jump, not by decay, if it exceeds _SUDDEN times its error at
-# the distance _BEFORE, relative to an interval of the solution.
+# a distance of _BEFORE times the length of the solution's polynomial.
 _SUDDEN, _BEFORE = 1e3, 0.01
 _MOST_PIECES = 100_000  # intervals that are divided at the same time
 _SHIFT = 2.0**-26  # relative change of an argument for a numerical derivative
@@ -114,7 +114,7 @@ class Solution:
 
     @cached_property
     def _sizes(self) -> Array:
-        """The sizes of the unknowns, by `sizes_of`, between time 0 and the end of a polynomial."""
+        """For each polynomial, the sizes (by `sizes_of`) of the unknowns from time 0 to its end."""
         largest = np.abs(self.pieces.values).max(axis=1)
         count = np.searchsorted(self.pieces.edges[:-1], 0.0)
         for side in (largest[:count][::-1], largest[count:]):

@@ -36,9 +36,9 @@ _MORE_ARGUMENTS = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS
 class Event:
     """An event of `pyharness.events`.
 
-    `function` takes time, omega, attitude (followed by the scene's own states, if any) and the
-    derivative of omega. `terminal` and `direction` are as in `crosses`. With `counts_touches`,
-    roots without a sign change are events.
+    `function` takes time, omega, attitude, and the derivative of omega. Own states, the unknowns
+    that `Scene.states` adds, follow the attitude in its array. `terminal` and `direction` are as in
+    `pyharness.events.crosses`. With `counts_touches`, roots without a sign change are events.
     """
 
     name: str
@@ -211,8 +211,6 @@ def _without_attitude(given: Callable[..., Any]) -> Callable[[Any, Any, Any, Any
 def _with_own(
     given: Callable[..., Any], own: Sequence[str], n_attitude: int, needs_attitude: bool
 ) -> Callable[..., Any]:
-    """Return a user's function with the signature of `Event.function`."""
-
     def function(t: Any, omega: Any, rest: Any, rates: Any) -> Any:
         states = dict(zip(own, rest[n_attitude:], strict=True))
         attitude = (rest[:n_attitude],) if needs_attitude else ()

@@ -92,7 +92,7 @@ class Roots(_Columns):
     With increasing time, `change` is 1 for a sign change to positive, -1 to negative, 0 for none.
     `slope` and `curvature` are the first and second time derivatives of the polynomial. Values of
     the function below `noise`, and of the polynomial below `near`, can't be distinguished from 0.
-    The function remains 0 for `lasting` (s), negative before time 0.
+    The function remains 0 for the time `lasting` (s), which is negative before time 0.
     """
 
     time: Array

@@ -114,7 +114,6 @@ def _merged(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
 
 
 def _are_same(g: EventFunction, solution: Solution, roots: Roots) -> Index:
-    """Return which pairs of adjacent roots may be one root."""
     time = roots.time
     noise = np.maximum(roots.noise[:-1], roots.noise[1:])
     gap = np.diff(time)

@@ -19,7 +19,7 @@ def attitude_from_rows(scene: Scene, time: Array, omega: Array) -> Array:
     """Return the attitudes, shape (n, 4), at the times (s) of a table of omega (rad/s).
 
     A commutator-free step of order 4 (Celledoni, Marthinsen and Owren 2003) leads from each row to
-    the next, with omega at the Gauss points by cubic Hermite interpolation. After a rotation that
+    the next. Cubic Hermite interpolation supplies omega at its Gauss points. After a rotation that
     overflows, all attitudes are NaN.
     """
     times = np.concatenate([[0.0], time])

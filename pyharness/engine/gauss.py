@@ -126,10 +126,10 @@ def gauss(
 def _blows_up(finer: _Solution, coarser: _Solution, start: float) -> bool:
     """Return whether two solutions end because omega grows without bound.
 
-    Both then end before the last time, nearly together. Let m and n be the largest components of
-    omega at the end of the finer and the coarser solution. Either both exceed 1e300 rad/s; or m
-    exceeds 1.5 n, and 1.5 n exceeds 1000 times `start` (rad/s) and every component at a requested
-    time.
+    Both then end before the last time, nearly together. Let m and n (rad/s) be the largest
+    components of omega at the end of the finer and the coarser solution, and s the larger of
+    `start` and all components at requested times. Either m and n both exceed 1e300 rad/s, or m >
+    1.5 n > 1000 s.
     """
     if COMPLETE in (finer.status, coarser.status):
         return False

@@ -53,10 +53,10 @@ _Listed = tuple[int, int, int, int]  # kind, operands x and y, and slot o of an 
 class Operation(NamedTuple):
     """The recurrence and the slopes of an operation, as C.
 
-    The slots of its results are o, p and q, those of its operands x and y. For slot o, t_o is term
-    k of the series (l_o if it is known before), b_o term k - 1, z_o term 0, f_o term 1, and m_o the
-    value at a node; likewise for the other slots. i is 1/k. s0 and s1 are sums of products of terms
-    1 to k - 1 of the slots in `pairs`.
+    The letters o, p and q stand for the slots of its results, x and y for the slots of its
+    operands. For each slot, such as o, t_o is term k of the series (l_o if known before), b_o term
+    k - 1, z_o term 0, f_o term 1, and m_o the value at a node. i is 1/k. s0 and s1 are sums of
+    products of terms 1 to k - 1 of the slots in `pairs`.
     """
 
     series: tuple[str, ...]
@@ -335,7 +335,6 @@ def _slopes_of_combination(
 def _products(
     slopes: Iterable[tuple[int, str]], operation: _Listed, by: dict[int, dict[int, str]]
 ) -> dict[int, str]:
-    """Return the derivatives of an operation with respect to the unknowns, by the chain rule."""
     parts = [
         (unknown, f"({_written(slope, operation)})*{name}")
         for slot, slope in slopes

@@ -45,7 +45,7 @@ from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.trajectory import ROUNDING, Array
 from pyharness.model.values import Number, Numbers, boolean, checked_effort, finite
 
-_PLAIN, _TILTED = -2, -1  # kinds of scenes about principal axes, and with an inertia matrix
+_PLAIN, _TILTED = -2, -1  # kinds of scenes: about principal axes; with an inertia matrix
 _NO_DETAILS: dict[str, Any] = dict.fromkeys(("t_events", "y_events", "sensitivities", "refusals"))
 
 
@@ -82,8 +82,8 @@ def solve_many(
     Parameters
     ----------
     scene : Scene, or sequence of Scene
-        One scene, whose values apply where no array is given; or a sequence of all scenes, without
-        arrays.
+        One scene, whose values apply where no array is given; or a sequence of all scenes, which
+        allows no arrays.
     t_end : float, or array of shape (n,)
         Final times, s; positive, negative or 0.
     times : float or iterable of float, shape (m,)
@@ -111,14 +111,16 @@ def solve_many(
         name. Bodies that differ only in these values, moments or coefficients, and initial states
         are solved side by side.
     states : dict of arrays, shape (n,), or of float
-        Values at time 0 of the scene's own states, by name; by default those in the scene. Bodies
-        with own states are solved one by one, without events, sensitivities and `out`.
+        Values at time 0 of the scene's own states (the unknowns that `Scene.states` adds), by name;
+        the default is the scene's values. Bodies with own states are solved one by one; `events`,
+        `sensitivities` and `out` are then not allowed.
     method : str
         A name in `pyharness.engine.solver.PREPARED`. `auto` uses a closed form if there is one,
         else the Taylor series.
     tolerance : float
-        Largest allowed error of a component of omega, relative to the largest |omega| from time 0
-        to the end; and of the attitude, as an angle (rad). The default depends on the method.
+        Largest allowed error. The error of a component of omega is relative to the largest |omega|
+        from time 0 to the end; the error of the attitude is an angle (rad). The default depends on
+        the method.
     step : float, optional
         Step size of Gauss collocation and fixed-step methods, s. The default is the scene's.
     effort : float
@@ -127,10 +129,10 @@ def solve_many(
         Whether to return estimated errors and error amplifications.
     events : callable, Event, or list of these
         Functions whose roots are computed, as in `solve`; none may be terminal. The method must be
-        `auto`, `taylor` or `closed-form`. Events take some milliseconds per body.
+        `auto`, `taylor` or `closed-form`.
     sensitivities : iterable of str
         Names of parameters, as in `solve`, with respect to which the final states are
-        differentiated. The same three methods are allowed as for events.
+        differentiated. The allowed methods are those for `events`.
     threads : int
         Number of threads. The kernel releases the GIL.
     out : Ensemble, or array of shape (n, 3), optional
@@ -148,8 +150,8 @@ def solve_many(
     ------
     InputError
         If the arrays differ in their numbers of rows, the method can't solve the bodies, the
-        tolerance or effort is out of range, events or sensitivities can't be computed, or neither
-        or both of `t_end` and `times` are given.
+        tolerance or effort is out of range, events or sensitivities can't be computed, or not
+        exactly one of `t_end` and `times` is given.
     NotBuiltError
         If the extension is not built.
 

@@ -1,7 +1,6 @@
 """Solution of bodies one by one: events, sensitivities, and scenes that the vector kernel refuses.
 
-These scenes have a torque that depends on the state or is about the axes of space, or a changing
-inertia.
+It refuses a torque that depends on the state or is about the axes of space, and a changing inertia.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -269,7 +268,7 @@ def solve_with_states(
 ) -> Ensemble:  # fmt: skip
     """Return the final states of bodies with own states, at `t_end` or at common `times` (s).
 
-    One integration reaches all times. `refused` are arguments that must be None.
+    Each body has one integration for all times. `refused` are arguments that must be None.
     """
     for name, value in refused.items():
         if value is not None:

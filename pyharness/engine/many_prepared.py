@@ -63,7 +63,7 @@ def many_starts(
 
 
 def times_within(scene: Scene, times: Array) -> Array:
-    """Return times (s), with NaN, which kernels refuse, beyond a time at which a moment is 0."""
+    """Return times (s); those beyond a zero of a moment become NaN, which kernels refuse."""
     if scene.changing is None:
         return times
     first, last = scene.changing.span
@@ -74,7 +74,7 @@ def many_states(
     solver: "Solver[Any]", omega: Any, t_end: Any, attitude: Any = None, *, threads: int = 1,
     out: "Ensemble | Array | None" = None,
 ) -> tuple[Array, Array, NDArray[np.int8]]:  # fmt: skip
-    """Return omegas, (n, 3), attitudes, (n, 4), and statuses, as `Solver.many`."""
+    """Return omegas, (n, 3), attitudes, (n, 4), and statuses, as `Solver.many` describes."""
     usual = solver.scene.attitude or IDENTITY
     given = usual if attitude is None else scalar_first(attitude)
     starts, times = rows_of("omega", omega, 3), rows_of("t_end", t_end)
@@ -103,8 +103,8 @@ def solve_each(
 ) -> None:  # fmt: skip
     """Solve the bodies in `piece` side by side, or else by single calls.
 
-    Single calls solve bodies whose error the first way can't measure; and all bodies if the torque
-    is neither recorded nor in space, or the inertia matrix is full.
+    A single call solves each body whose error can't be measured side by side. It solves every body
+    if the torque is neither recorded nor about the axes of space, or if the inertia matrix is full.
     """
     left = list(range(piece.start, piece.stop))
     if solver.packed[Places.METHOD] == Methods.TAPE and solver.scene.inertia is None:
@@ -144,7 +144,8 @@ def solve_lanes(
 ) -> list[int]:  # fmt: skip
     """Solve bodies side by side, and return the indices of those that remain unsolved.
 
-    Their equations are a tape (recorded operations) with `parameters`, (n, k) or (1, k).
+    `packed` has their equations as a tape (recorded operations) with `parameters`, (n, k) or (1,
+    k). `turns` are the initial quaternions, if any. The results are written to `found`.
     """
     n = piece.stop - piece.start
     sets = parameters if len(parameters) < 2 else parameters[piece]

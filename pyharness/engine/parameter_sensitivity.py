@@ -1,8 +1,8 @@
 """Sensitivities: the derivatives of a solution with respect to parameters, by Taylor series.
 
-For scenes whose rates jump at a switch, or that have states of their own, they are extrapolated
-from central differences with decreasing steps (Ridders 1982): linearised equations would leave out
-that a parameter moves the time of a switch.
+If the torque jumps at a switch, or the scene has own states (unknowns that `Scene.states` adds),
+they are extrapolated from central differences with decreasing steps (Ridders 1982). Linearised
+equations would ignore that a parameter moves the time of a switch.
 """
 
 import itertools
@@ -50,10 +50,10 @@ _PERIODIC = {OMEGA, "moments", "coefficients", "inertia", _CONSTANT}
 
 _FIRST = 0.02  # first change of a parameter for a difference, relative to the parameter
 _LEVELS, _RATIO = 13, 2.0
-_ENOUGH = 1e-11  # estimated error, relative, at which no smaller differences are tried
+_ENOUGH = 1e-11  # relative estimated error at which no smaller differences are tried
 # Largest estimated error, relative to the largest derivative by a parameter.
 _ALLOWED = 1e-7
-_SMALL = 1e-10  # allowed in addition: error relative to the state over the size of the parameter
+_SMALL = 1e-10  # allowed in addition, times the largest state over the size of the parameter
 
 # A function that returns the states at the times, shape (n, m), of a scene.
 States = Callable[[Scene], Array]

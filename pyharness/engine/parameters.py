@@ -35,10 +35,10 @@ _Body = tuple[Triple | None, Triple | None, tuple[Triple, ...] | None, Changing 
 class VariedEquations(NamedTuple):
     """The equations of motion of a scene, and how they depend on parameters.
 
-    The outputs of `tape` are the partial derivatives of the rates, then the rates. Each value of a
-    parameter has a column; `columns` has a parameter's columns by its name. An element of
-    `forcings`, for n rates and m columns, is the number, from 1, of the output with the partial
-    derivative of the rate with respect to the value, or 0 if the derivative is 0.
+    The outputs of `tape` are the partial derivatives of the n rates, then the rates. Each of the m
+    values of parameters has a column; `columns` has a parameter's columns by its name. Element
+    (i, j) of `forcings`, shape (n, m), is the number, from 1, of the output that is the derivative
+    of rate i with respect to value j; it is 0 if this derivative is 0.
     """
 
     tape: Tape

@@ -71,7 +71,6 @@ def plan(
     form = closed_form(
         checked_scene(scene, any_torque=True, any_state=True, changing=True, states=True)
     )
-    # The plan includes the attitude if the torque needs it.
     check_torque(scene, method, attitude=True)
     fallback = None
     if method == "auto":

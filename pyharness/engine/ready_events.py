@@ -22,7 +22,7 @@ def crosses(
     value : float
         The value (rad/s).
     terminal : bool or int
-        Whether the first event ends the integration; with a number n, the n-th event does.
+        Whether the first event ends the integration. With a number n, the n-th event ends it.
     direction : {-1, 0, 1}
         1 for increasing, -1 for decreasing components, in the direction of integration; 0 for both.
         With 0, an extremum that equals the value is also an event.
@@ -110,8 +110,9 @@ def extremum(axis: int, *, terminal: bool | int = False, direction: int = 0) -> 
     terminal : bool or int
         As in `crosses`.
     direction : {-1, 0, 1}
-        The sign change of the derivative in the direction of integration; 0 for both. Forward in
-        time, -1 selects maxima and 1 minima; backward, 1 selects maxima.
+        1 for changes of the derivative to positive, -1 to negative, in the direction of
+        integration; 0 for both. Forward in time, 1 selects minima, and -1 maxima; backward, 1
+        selects maxima, and -1 minima.
 
     Returns
     -------
@@ -142,12 +143,12 @@ def extremum(axis: int, *, terminal: bool | int = False, direction: int = 0) -> 
 
 
 def rest(value: Number, *, terminal: bool | int = False, direction: int = -1) -> Event:
-    """Return the event that the magnitude of omega reaches a value, by default by falling.
+    """Return the event that the magnitude of omega falls to a value (by default), or rises to it.
 
     Parameters
     ----------
     value : float
-        The value (rad/s), above 0, because a damped body never reaches 0.
+        The value (rad/s). It is above 0, because a damped body never reaches 0.
     terminal : bool or int
         As in `crosses`.
     direction : {-1, 0, 1}

@@ -46,7 +46,7 @@ LONGEST_TRIAL = 1e3
 
 
 def inputs_of(times: Array, state: Array) -> list[Array]:
-    """Return the eight inputs of a tape, each of shape (n,); states are (n, 3) or (n, 7)."""
+    """Return the eight inputs of a tape, each (n,); states are (n, 7), or (n, 3) if no attitude."""
     columns = [times, *state.T]
     return columns + [np.zeros(len(times))] * (N_INPUTS - len(columns))
 
@@ -67,10 +67,10 @@ def outputs_at(tape: Tape, times: Array, state: Array) -> Array:
 def system_of(scene: Scene, attitude: bool | None = None) -> Tape:
     """Return the equations of motion of a scene with principal axes as a tape.
 
-    The outputs are the rates of omega by equations 16-18 of the thesis; if `attitude` (by default:
-    if the scene has one), those of the quaternion, q' = q (0, omega)/2; and those of the scene's
-    own states. The inputs are the time and the unknowns in this order. Raise InputError for an
-    opaque torque.
+    The outputs are the time derivatives of omega (equations 16-18 of the thesis), of the quaternion
+    (q' = q (0, omega)/2), and of own states (unknowns that `Scene.states` adds). The quaternion is
+    missing if `attitude` is false; by default, if the scene has no attitude. The inputs are the
+    time and the unknowns in this order. Raise InputError for an opaque torque.
     """
     torque = scene.torque
     if not isinstance(torque, StateTorque) or torque.tape is None:

@@ -96,9 +96,9 @@ def integrate(
 def rescaling_factor(scene: Scene, time: float) -> float:
     """Return the factor, a power of 2, that brings omega near 1 rad/s.
 
-    Omega is the larger of the initial one and of that which the torque may cause until `time` (s):
-    a bound, or for a torque that depends on the state an estimate. The factor is 1 if no rescaling
-    is needed or, as for an opaque torque, possible.
+    This omega is the initial omega, or the omega that the torque may cause until `time` (s) if that
+    is larger. The latter is a bound; for a torque that depends on the state, an estimate. The
+    factor is 1 if no rescaling is needed, or if none is possible, as for an opaque torque.
     """
     if is_ordinary(scene.omega):
         return 1.0
@@ -127,7 +127,7 @@ def rescaling_factor(scene: Scene, time: float) -> float:
 
 
 def omega_by_torque(scene: Scene, time: float) -> float:
-    """Return a bound on omega (rad/s) from rest until `time` (s), without gyroscopic torques."""
+    """Return a bound on omega (rad/s) after `time` (s) from rest, without gyroscopic torques."""
     law, span = scene.law, abs(time)
     moments = scene.moments or (1.0, 1.0, 1.0)
     if law.in_space:
@@ -168,7 +168,7 @@ def _tape(torque: StateTorque, factor: float) -> Tape | None:
 
 @lru_cache(maxsize=64)
 def scaled_tape(tape: Tape, exponent: int) -> Tape | None:
-    """Return the tape of a torque in the unit of time 2**exponent s, without rounding.
+    """Return the tape (recorded operations) of a torque in the unit of time 2**exponent s.
 
     Each slot (input or result) has its own power of two as factor, so that none overflows or
     underflows. The factor of the outputs is 2**(2 * exponent). Return None if a number would be
@@ -183,7 +183,6 @@ def scaled_tape(tape: Tape, exponent: int) -> Tape | None:
     combinations: dict[int, Linear] = {TIME: Linear(0.0, ((TIME, 1.0),))}
 
     def combine(linear: Linear, power: int) -> Linear:
-        """Return a combination of the new slots, times 2**power."""
         terms = tuple(
             (places[slot], float(_scaled(np.float64(factor), power - exponents[slot])))
             for slot, factor in linear.terms
@@ -195,7 +194,6 @@ def scaled_tape(tape: Tape, exponent: int) -> Tape | None:
         return N_INPUTS + len(operations) - 1
 
     def copy_slot(slot: int, power: int) -> int:
-        """Return a new slot that has the original value of `slot`, times 2**power."""
         if exponents[slot] == power:
             return places[slot]
         # The kernel recognises waves by linear combinations of time alone.
@@ -244,7 +242,7 @@ def _scaled(values: Any, exponents: Any) -> Any:
 
 
 def unscaled(trajectory: Trajectory, times: Sequence[float], factor: float) -> Trajectory:
-    """Return a trajectory of rescaled time in rad/s and s, without rows that overflow."""
+    """Convert a trajectory of rescaled time to rad/s and s; rows that overflow are left out."""
     with np.errstate(over="ignore"):
         omega = trajectory.omega / factor
     finite = np.isfinite(omega).all(axis=1)

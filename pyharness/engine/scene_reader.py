@@ -110,14 +110,12 @@ def scene_of(data: dict[str, Any], default_name: str) -> Scene:
 
 
 def _body(table: dict[str, Any]) -> dict[str, Any]:
-    """Return the table [body] with an inertia that changes in place of its description."""
     moments, inertia = table.get("moments"), table.get("inertia")
     for place, given in (("moments", moments), ("inertia", inertia)):
         if isinstance(given, dict):
             check_keys(given, _TABLE, f"[body] {place}")
             if not {"times", "values"} <= given.keys():
                 raise InputError(f"[body] {place}: a table needs times and values; give both")
-            # Imported only here, because most scenes have no table.
             from pyharness.engine.table_terms import inertia_table
 
             return {**table, place: inertia_table(**given)}
@@ -172,7 +170,6 @@ def _torque(
         first = parsed(given["expression"], given.get("constants", {}), rates)
     if "terms" not in table:
         return first
-    # Imported late, because few scenes have ready terms.
     from pyharness.engine.term_file import read_terms
 
     terms = read_terms(table["terms"], body)

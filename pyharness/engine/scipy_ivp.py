@@ -1,8 +1,8 @@
 """The methods of `scipy.integrate.solve_ivp`; SciPy is imported when one of them is first used.
 
-SciPy controls the local error of a step; our tolerance limits the error at the requested times, to
-which local errors add up in proportion to the phase. The local tolerance therefore follows from the
-largest |omega|, the error amplification and the phase of a preliminary integration with few digits.
+SciPy controls the local error of a step. Our tolerance limits the error at the requested times,
+which grows in proportion to the phase. A preliminary integration with few digits therefore supplies
+largest |omega|, error amplification and phase, from which the local tolerance follows.
 """
 
 import math
@@ -24,9 +24,9 @@ from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import ROUNDING, Trajectory
 
-# Largest ratio of the error at the end to the local error: in a motion of a few radians, and for
-# each further radian, times the error amplification. Both were measured on random scenes that the
-# checks do not use, and increased by half.
+# Largest ratio of the error at the end to the local error. _SUM is for a motion of a few radians.
+# _SUM_A_RADIAN, times the error amplification, is added for each further radian. Both were measured
+# on random scenes that the checks do not use, and increased by half.
 _SUM = {"DOP853": 30.0, "RK45": 90.0, "Radau": 30.0, "LSODA": 90.0}
 _SUM_A_RADIAN = {"DOP853": 0.05, "RK45": 0.15, "Radau": 0.05, "LSODA": 1.2}
 # Added for each radian by which the body rotates, if the attitude is requested, because an error of

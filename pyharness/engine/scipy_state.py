@@ -36,10 +36,10 @@ from pyharness.model.trajectory import Array, Trajectory
 _FIRST = {"DOP853": 4.0, "RK45": 8.0, "Radau": 4.0, "LSODA": 25.0}
 # Smallest and largest ratio of a local tolerance to the next.
 _RATIO, _LARGEST_RATIO = 8.0, 1e3
-# The estimated error of the second of two integrations is their difference, divided by the ratio of
-# the local tolerances, times _SAFETY; but at least this fraction of the difference. With LSODA,
-# which also changes its order, or a torque that jumps, errors are not in proportion to the local
-# tolerances.
+# The estimated error of the second of two integrations is their difference times _SAFETY, divided
+# by the ratio of the local tolerances; but at least _LEAST_FRACTION of the difference. This is 1 if
+# errors are not in proportion to the local tolerances: with LSODA, which also changes its order, or
+# with a torque that jumps.
 _SAFETY = 4.0
 _LEAST_FRACTION = {"DOP853": 0.25, "RK45": 0.25, "Radau": 0.25, "LSODA": 1.0}
 # The longest step is the time span over a number that grows with each integration, so that no two
@@ -290,7 +290,6 @@ class _StateRun(Run):
             raise InputError(f"[torque]: {HAS_MEMORY}")
 
     def work_error(self, time: float) -> TimedError:
-        """Return the exception for an exceeded work limit at `time` (s)."""
         if self._jumps():
             return TimedError(
                 f"{self.label}: the torque jumps back and forth at t = {{time}} s; write a smooth "

@@ -21,8 +21,9 @@ from pyharness.model.trajectory import ROUNDING, WITH_ALL_ROWS
 # the tolerance. The computed amplification may be too small by a factor of three, because of the
 # norm and of the number of perturbations.
 _SHARE = 0.3
-# Relative error of a closed form (checked by tests/engine/test_closed_form.py); amplification up to
-# which the errors of double-double arithmetic, and so of the phase, are negligible.
+# Relative error of a closed form (checked by tests/engine/test_closed_form.py). Up to the error
+# amplification _NEGLIGIBLE_TO, errors of double-double arithmetic, and so of the phase, are
+# negligible.
 _CLOSED_FORM_ERROR = 16.0 * ROUNDING
 _NEGLIGIBLE_TO = 2.0**44
 # Tolerance, and work limit (a twentieth of a second), of a Taylor series that supplies only the
@@ -44,10 +45,10 @@ def torque_noise(
 ) -> float:
     """Return the rounding error of torque terms that nearly cancel, divided by that of omega.
 
-    It is the omega that each term alone would cause until `t_end` (s), with rounding in each of
-    `steps` steps, over `scale` (rad/s). By default, the scale is the initial |omega| or the omega
-    that the whole torque causes. The result is 0 if no terms nearly cancel, or if the torque
-    depends on the state.
+    Let each term alone cause an omega until `t_end` (s), with rounding in each of `steps` steps.
+    The result is the ratio of these omegas, added up, to `scale` (rad/s), by default the initial
+    |omega| or the omega that the whole torque causes. It is 0 if no terms nearly cancel, or if the
+    torque depends on the state.
     """
     if isinstance(scene.torque, StateTorque) or not (scene.law.sines or scene.law.cosines):
         return 0.0

@@ -9,8 +9,8 @@ from pyharness.model.errors import TimedError
 from pyharness.model.tape import OMEGA, WITH_DERIVATIVE, Tape, live_slots, slot_values
 from pyharness.model.tape_arrays import ARRAYS
 
-# An operand counts as 0 if its ratios to its initial value, and to its value before the last, very
-# short step, are at most these.
+# An operand counts as 0 if it is at most _NEARLY_ZERO times its initial value, and at most _SHRUNK
+# times its value before the last, very short step.
 _NEARLY_ZERO = 1e-6
 _SHRUNK = 0.9
 # Omega counts as unbounded if its ratio to the initial omega is larger.

@@ -214,8 +214,7 @@ class Solver(BoundKernel[Result]):
 
         It is ``gave up`` if the work limit was exceeded or the phase has no correct digit left,
         ``refused`` if the method does not apply, and ``sensitive`` if amplified rounding errors
-        exceed the tolerance. The test for ``sensitive`` takes microseconds for a closed form,
-        milliseconds for Gauss collocation.
+        exceed the tolerance.
         """
         return self._judge()[0]
 

@@ -41,9 +41,9 @@ class Stepper:
     scene : Scene
         The body, its torque and its state at time 0. The torque must not be opaque.
     tolerance : float, optional
-        The largest error of a step: of a component of omega, relative to the largest |omega| so
-        far; of the attitude, as an angle (rad); and of an own state, relative to its largest
-        absolute value so far. Default is 1e-9.
+        The largest error of a step. The error of a component of omega is relative to the largest
+        |omega| so far, and of an own state to its largest absolute value so far. The error of the
+        attitude is an angle (rad). Default is 1e-9.
     attitude : bool, optional
         Whether the attitude is computed, as in `pyharness.solve`.
 
@@ -56,11 +56,12 @@ class Stepper:
     attitude : ndarray, shape (4,), or None
         The quaternion from body to space, scalar first. It may be set.
     states : dict of str to float
-        The scene's own states. Another dict, of some or all names, may be set.
+        The scene's own states, the unknowns that `Scene.states` adds. A dict of some or all may be
+        set.
     held_torque : ndarray, shape (3,)
-        A torque about the body axes that is added to the scene's torque, in N m; for a body given
-        by coefficients it is torque over moment, in rad/s2. It is 0 at first, and applies until it
-        is set again, even if another scene is set.
+        A torque about the body axes, added to the scene's torque, in N m; for a body given by
+        coefficients, torque over moment in rad/s2. It is 0 at first, and remains until it is set
+        again, even if another scene is set.
     scene : Scene
         The scene. If another scene is set, time, omega, attitude and states are kept.
     steps : int
@@ -280,7 +281,7 @@ class Stepper:
                 self._time = end
 
     def at(self, times: float | Sequence[float] | Array) -> Array:
-        """Return the state at times (s) within the last step, as before later changes by the user.
+        """Return the state at times (s) within the last step, without changes made after it.
 
         The state is omega (rad/s), the quaternion if computed, and own states, with shape (m,), or
         (m, n) for n times. Raise InputError for a time outside the step.
@@ -324,7 +325,7 @@ def steps_to(
 def step_lengths(
     scene: Scene, attitude: bool, end: float, tolerance: float, bounds: Sequence[float]
 ) -> dict[float, float]:
-    """Return each step's length (s), from 0 to `end` (s), by its end if not in `bounds`."""
+    """Return the length (s) of each step from 0 to `end` (s), by its end, if not in `bounds`."""
     cuts = frozenset(bounds)
     return {
         stepper.time: abs(stepper.time - before)
@@ -334,7 +335,7 @@ def step_lengths(
 
 
 def with_reason(scene: Scene, found: Trajectory, end: float) -> Trajectory:
-    """Return `found`, which ends early; with the ending ``singular`` if its torque is undefined."""
+    """Return `found`, which ends early; its ending is ``singular`` if the torque is undefined."""
     if not is_recorded(scene):
         return found
     try:

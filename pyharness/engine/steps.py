@@ -23,7 +23,8 @@ MOST_STEPS = 20_000  # that `sol` has; it limits the memory
 def rates(scene: Scene, times: Array, state: Array) -> Array:
     """Return the time derivatives of n states, shape (n, m): omega, quaternion, own states.
 
-    A derivative is not finite where the torque is singular.
+    Own states are unknowns that `Scene.states` adds. A derivative is not finite where the torque is
+    singular.
     """
     bare, axes = principal(scene)
     bare = with_constant_body(bare)

@@ -49,7 +49,6 @@ def with_text(reason: str | None, scene: Scene) -> str | None:
 
 
 def _text(tape: Tape, slot: int, names: tuple[str, ...]) -> str | None:
-    """Return the formula of a slot; None if it is long."""
     if slot < tape.n_inputs:
         return names[slot]
     kind, operands, linear, _ = tape.operations[slot - tape.n_inputs]

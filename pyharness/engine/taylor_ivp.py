@@ -27,8 +27,8 @@ _LEAST_RTOL = 100.0 * np.finfo(float).eps
 # The least allowed error that counts, whose reciprocal is finite.
 _LEAST_SCALE = 2.0**-1000
 # `solve_ivp` misses pairs of roots in a step, and in the first step roots of an event function that
-# is 0 at the start. Therefore the state changes at most by this fraction in the first step, and
-# steps grow at most by this factor, as in SciPy's methods.
+# is 0 at the start. Therefore the state changes in the first step at most by the fraction
+# _FIRST_CHANGE, and steps grow at most by the factor _MOST_GROWTH, as in SciPy's methods.
 _FIRST_CHANGE = 0.01
 _MOST_GROWTH = 10.0
 _FIRST_PARTS = 1e-12, 1e-2  # least and largest first step, over the step that the tolerances allow

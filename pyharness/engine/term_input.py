@@ -23,7 +23,6 @@ def ready_term(kind: str, function: Function, **arguments: Any) -> StateTorque:
 
 
 def _file_value(value: Any) -> Any:
-    """Return an argument in its shortest form in scene files."""
     if isinstance(value, np.ndarray):
         if value.shape == (3, 3) and is_diagonal(value):
             value = np.diag(value)

@@ -163,9 +163,9 @@ def attitude_control(
 
     For the attitude q, the error quaternion (e0, e) is target* q, with the conjugate target*. A
     quaternion and its negative have the same torque, so that the body does not rotate the long way
-    round (unwinding). If k is a number, the first term is -k sin(a) about the axis of the error,
-    with the angle a of the error; its potential is k (1 - cos(a)), and the equilibrium at a = 180
-    degrees is unstable.
+    round (unwinding). Let a be the angle of the error. If k is a number, the first term is -k
+    sin(a) about the axis of the error, its potential is k (1 - cos(a)), and the equilibrium at a =
+    180 degrees is unstable.
 
     Parameters
     ----------
@@ -215,10 +215,10 @@ def attitude_control(
 def wheels(
     momentum: Numbers, motor: TorqueLaw | Numbers | Callable[..., Any] | None = None
 ) -> StateTorque:
-    """Return the torque -omega x h - u of wheels, with the angular momentum h, on their body.
+    """Return the torque -omega x h - u that wheels with the angular momentum h exert on their body.
 
-    The motors exert u on the wheels: h' = u. Without motors, h is constant, and the body is a
-    gyrostat.
+    The motors exert the torque u on the wheels: h' = u. Without motors, h is constant, and the body
+    is a gyrostat.
 
     If h is the absolute angular momentum of the wheels about their axes, the inertia of the body
     must exclude the moments of the wheels about these axes. If h is relative to the body, the

@@ -26,7 +26,7 @@ _OTHERS = (".csv", ".json", ".md", ".toml", ".tsv", ".txt", ".xlsx", ".xml")
 
 
 def checked_path(where: str, path: object) -> str:
-    """Return the path as text, with .npz if it is new and has no ending; or raise InputError."""
+    """Return a path as text, with .npz added to a new file without ending; or raise InputError."""
     if not isinstance(path, (str, os.PathLike)):
         raise InputError(f"{where}: {kind_of(path)}; allowed: a path, as text or a Path")
     name = os.fsdecode(path)
@@ -71,10 +71,10 @@ def add_entry(digest: Any, name: str, data: bytes | memoryview) -> None:
 def read_archive(
     where: str, name: str, kinds: tuple[str, str], known: Iterable[str], written: str
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the arrays and the header of an archive, or raise InputError, beginning with `where`.
+    """Return the arrays and the header of an archive, or raise InputError.
 
-    `kinds` are the kind as the header and as messages name it, `known` are the names of allowed
-    arrays, and `written` describes a valid file.
+    Messages begin with `where`, and describe a valid file by `written`. `kinds` are the names of
+    the kind of file in the header and in messages; `known` are the names of allowed arrays.
     """
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     content = read_input(name, where, memory // 4, written)

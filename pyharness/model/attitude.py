@@ -101,8 +101,7 @@ def angles(attitude: Array, sequence: str) -> Array:
     """Return n attitudes, (n, 4), as angles (degrees) of three successive rotations, (n, 3).
 
     Where the axes of the first and last rotation are parallel, only the sum or difference of their
-    angles is determined; the last angle is then 0. Arc tangents of half angles are accurate even
-    near such an attitude.
+    angles is determined; the last angle is then 0.
     """
     q0, q1, q2, q3 = attitude.T
     if sequence == "3-1-3":
@@ -177,7 +176,7 @@ def rotated(vectors: Array, matrix: Array) -> Array:
 
 
 def turned_back(attitudes: Array, turn: Any) -> Array:
-    """Return attitudes of a body's own axes, from those of axes rotated by `turn` against them."""
+    """Return the attitudes of a body from attitudes of axes rotated by `turn` against it."""
     w, x, y, z = np.moveaxis(np.asarray(turn), -1, 0)
     first, *rest = np.moveaxis(attitudes, -1, 0)
     parts: Any = product((first, rest[0], rest[1], rest[2]), (w, -x, -y, -z))

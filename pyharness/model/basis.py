@@ -14,8 +14,8 @@ MARKS = {
 class Basis:
     """The basis of a limit.
 
-    `mark`, a key of `MARKS`, is that of the weakest part of the argument. `limit` states the limit,
-    and `source` names the theorem, derivation or command, in Markdown.
+    `mark`, a key of `MARKS`, classifies the weakest part of the argument. `limit` states the limit;
+    `source` names the theorem, derivation or command, in Markdown.
     """
 
     mark: str

@@ -38,7 +38,7 @@ _LEVELS = ("plain", "avx2", "avx512")
 
 @dataclass(frozen=True)
 class Build:
-    """The versions, the Fortran compiler and its flags; None for what is missing."""
+    """The versions, the Fortran compiler and its flags; None for a missing item."""
 
     version: str
     compiler: str | None

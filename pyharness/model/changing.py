@@ -22,7 +22,7 @@ _MATRICES = f"allowed: a list of 1 to {_MOST} matrices, each of three rows of th
 
 
 class Changing:
-    """The base class of inertias that change with time, with the methods of polynomials."""
+    """The base class of inertias that change with time; its methods are those of polynomials."""
 
     if TYPE_CHECKING:
 
@@ -83,7 +83,7 @@ class Changing:
 
     @cached_property
     def span(self) -> tuple[float, float]:
-        """The times (s) around 0, or infinities, between which the inertia is positive definite."""
+        """The ends (s) of the interval around 0 with positive definite inertia; may be infinite."""
         # Imported only here, because the programs need no exact numbers.
         from pyharness.model.exact_zeros import determinant, first_zeros
 
@@ -221,7 +221,6 @@ class ChangingInertia(Changing):
 
     def __post_init__(self) -> None:
         """Check the matrices, and convert elements to floats."""
-        # Imported only here, because the programs need no exact numbers.
         from pyharness.model.inertia import checked_inertia, symmetric_matrix
 
         where = "[body] inertia"

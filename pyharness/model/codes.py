@@ -106,5 +106,6 @@ class Operations:
     # The result is constant in a step.
     SWITCH = 12  # 1 where the operand is positive, else 0
     FLOOR = 13
-    # The linear combination number operand 2 where operand 1 is not 0, else the next one.
+    # Operand 2 is the number of a linear combination. The result is this combination where operand
+    # 1 is not 0, else the next combination.
     SELECT = 14

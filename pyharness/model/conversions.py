@@ -52,7 +52,7 @@ class _Quantity(NamedTuple):
 class Conversions:
     """The base class of trajectories: fields, mechanical quantities and conversions.
 
-    In each row, an inertia that changes has its value at the row's time.
+    If the inertia changes with time, each row uses its value at the row's time.
     """
 
     time: Array
@@ -181,10 +181,10 @@ class Conversions:
     def work(self) -> Array:
         """Return the work of the torque on the body from time 0 to each row.
 
-        It is the change of the kinetic energy, computed from the inertia I and the initial omega0
-        as (omega - omega0) . I (omega + omega0)/2, which loses no digits where omega has changed
-        little. The error of the work is the error of omega times the angular momentum. The work
-        that the motors of `pyharness.torques.wheels` do on the wheels is not included.
+        The work equals the change of the kinetic energy. It is computed as (omega - omega0) .
+        I (omega + omega0)/2, with the inertia I and the initial omega0; this form loses no digits
+        where omega has changed little. Its error is the error of omega times the angular momentum.
+        The work of the motors of `pyharness.torques.wheels` on the wheels is not included.
 
         Returns
         -------
@@ -250,7 +250,7 @@ class Conversions:
         pandas.DataFrame
             Its index is `time` (s). Its columns, if present, are `omega1` to `omega3` (rad/s),
             `velocity1` to `velocity3` (m/s), `q0` to `q3`, `recorded_time` (s, if it differs from
-            `time`), `ier` and the scene's own states. ``attrs["units"]`` has the units.
+            `time`), `ier`, and the names in `Scene.states`. ``attrs["units"]`` has the units.
 
         Raises
         ------
@@ -285,8 +285,8 @@ class Conversions:
         xarray.Dataset
             Its variables, if present, are `omega` and `velocity` (dimensions `time` and `axis`),
             `attitude` (`time` and `component`), `recorded_time` (if it differs from `time`), `ier`
-            and the scene's own states. Each has `units` and `long_name`. Attributes say how the
-            integration ended.
+            and the names in `Scene.states`. Each variable has `units` and `long_name`. Attributes
+            of the Dataset say how the integration ended.
 
         Raises
         ------
@@ -395,10 +395,9 @@ class Conversions:
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the trajectory with its scene to a file, from which `pyharness.load` restores it.
 
-        The restored numbers are bit-for-bit the same. The file is written completely or not at all,
-        in the format of `numpy.savez`, with an array for each attribute that is an array. The array
-        `scene` is the text of a scene file; `header`, in JSON, has the other attributes and the
-        operations of a recorded torque.
+        The restored numbers are bit-for-bit the same. The format is that of `numpy.savez`, with an
+        array for each attribute that is an array. The array `scene` is the text of a scene file;
+        `header`, in JSON, has the other attributes and the operations of a recorded torque.
 
         Parameters
         ----------
@@ -409,8 +408,8 @@ class Conversions:
         Raises
         ------
         InputError
-            If the file can't be written, the torque is opaque, or the trajectory is that of a
-            program in another arithmetic than binary64.
+            If the file can't be written, the torque is opaque, or a program in another arithmetic
+            than binary64 computed the trajectory.
 
         Examples
         --------

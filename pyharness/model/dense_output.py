@@ -87,9 +87,9 @@ class Pieces:
 def sizes_of(largest: Array, n_own: int) -> Array:
     """Return the sizes to which errors are relative, from the largest values of m unknowns.
 
-    The size of a component of omega is the largest of the three values, of the quaternion 1, of
-    one of the last `n_own` unknowns, the own states, its value. A size of 0 becomes 1. Shapes are
-    (..., m).
+    `largest` and the result have the shape (..., m). The size of each component of omega is the
+    largest of the three values. The size of the quaternion is 1. Each of the last `n_own` unknowns,
+    the own states, has its own value as size. A size of 0 becomes 1.
     """
     sizes = np.ones_like(largest)
     sizes[..., :3] = largest[..., :3].max(axis=-1, keepdims=True)
@@ -107,11 +107,11 @@ class DenseOutput:
     t_min, t_max : float
         The times (s) between which it can be evaluated.
     states, rates : callable
-        `states` is a function of times (s) that returns the states in rows: omega in rad/s, the
-        attitude if requested, and the scene's own states. `rates` is a function of times and states
-        that returns the time derivatives of the states.
+        `states` is a function of times (s) that returns a row for each time: omega (rad/s), the
+        attitude if requested, and the own states. `rates` is a function of times and such rows; it
+        returns their time derivatives.
     n_own : int
-        The number of own states.
+        The number of own states, the unknowns that `Scene.states` adds.
 
     Examples
     --------
@@ -135,13 +135,13 @@ class DenseOutput:
         Parameters
         ----------
         t : float or array_like, shape (n,)
-            Times from `t_min` to `t_max` (s), in any order; up to 4 units in the last place beyond
-            an end count as the end.
+            Times from `t_min` to `t_max` (s), in any order. A time that exceeds an end by at most
+            4 units in the last place counts as this end.
 
         Returns
         -------
         ndarray, shape (m,) or (m, n)
-            Omega (rad/s), if requested the unit quaternion, scalar first, and own states.
+            Omega (rad/s); the unit quaternion, scalar first, if requested; and the own states.
 
         Raises
         ------
@@ -180,7 +180,6 @@ class DenseOutput:
         return states
 
     def _at(self, t: Any, function: Callable[[Array, Array], Array]) -> Array:
-        """Return a function of times and states at checked times."""
         allowed = f"allowed: numbers from {self.t_min:.16g} to {self.t_max:.16g} s"
         try:
             times = np.asarray(t, dtype=np.float64)

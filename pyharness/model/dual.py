@@ -1,4 +1,4 @@
-"""Forward differentiation: dual numbers, and tapes that compute the derivatives of a tape."""
+"""Forward differentiation: dual numbers, and tapes (recorded operations) of derivatives."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -9,8 +9,8 @@ import numpy as np
 from pyharness.model.symbols import MOST_OPERATIONS, SYMBOLS, Recorder
 from pyharness.model.tape import Functions, Table, Tape, evaluate, selected, step, whole
 
-# Factors on the largest number of operations of a recorded torque: for a tape that no kernel reads,
-# and for a tape that a kernel reads, whose memory is proportional to it.
+# Factors on the largest number of operations of a recorded torque. _MORE is for tapes that no
+# kernel reads, _FEWER for tapes of a kernel, whose memory is proportional to the number.
 _MORE, _FEWER = 100, 10
 
 
@@ -33,11 +33,11 @@ class Dual:
     __radd__ = __add__
 
     def __sub__(self, other: Any) -> "Dual":
-        """Return the difference from any number."""
+        """Return this number minus any number."""
         return self.__add__(-1.0 * other)
 
     def __rsub__(self, other: Any) -> "Dual":
-        """Return a number minus this one."""
+        """Return any number minus this one."""
         return self.__mul__(-1.0).__add__(other)
 
     def __mul__(self, other: Any) -> "Dual":

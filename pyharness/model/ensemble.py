@@ -44,7 +44,7 @@ class Ensemble(BatchResult):
     refusals : dict of str, or None
         The reasons for missing events and sensitivities, by index of the body.
     own, names : ndarray, shape (n, k), or None, and tuple of str
-        The values and names of the scene's own states, which `states` has by name.
+        The values and names of the scene's own states, the unknowns that `Scene.states` adds.
     times : ndarray, shape (m,), or None
         The times (s) of the results of all bodies. All arrays then have an axis of length m after
         the first axis: for example, `omega` has the shape (n, m, 3).
@@ -143,7 +143,7 @@ class Ensemble(BatchResult):
         return energy
 
     def with_times(self, times: Array) -> "Ensemble":
-        """Return the result for n * m bodies as one for n bodies and m times, without copies."""
+        """Return this result for n * m bodies as a result for n bodies at m times, as views."""
 
         def divided(array: Any) -> Any:
             return None if array is None else array.reshape(-1, len(times), *array.shape[1:])
@@ -158,8 +158,8 @@ class Ensemble(BatchResult):
         -------
         pandas.DataFrame
             Its index is `body`, from 0, or `body` and `time` (s). Its columns are `omega1` to
-            `omega3` (rad/s), `ended`, and, if present, `q0` to `q3`, `error`, `growth`, own states.
-            ``attrs["units"]`` has the units.
+            `omega3` (rad/s), `ended`, and, if present, `q0` to `q3`, `error`, `growth`, and the
+            own states by name. ``attrs["units"]`` has the units.
 
         Raises
         ------

@@ -28,9 +28,9 @@ def determinant(elements: Sequence[Sequence[Sequence[float]]]) -> list[Fraction]
 
 
 def first_zeros(polynomial: Iterable[float | Fraction]) -> tuple[float, float]:
-    """Return the last zero (s) before and the first after time 0 of a polynomial above 0 at time 0.
+    """Return the last zero (s) of a polynomial before time 0, and the first after time 0.
 
-    Where there is none, return infinity.
+    The polynomial is above 0 at time 0. A missing zero is -inf or inf.
     """
     exact = [Fraction(c) for c in polynomial]
     backward = [-c if n % 2 else c for n, c in enumerate(exact)]
@@ -40,8 +40,8 @@ def first_zeros(polynomial: Iterable[float | Fraction]) -> tuple[float, float]:
 def _first_zero(polynomial: Sequence[Fraction]) -> float:
     """Return the first zero (s) of a polynomial after time 0, or infinity.
 
-    The polynomial is above 0 in an interval if its coefficients in Bernstein's basis are (Farouki
-    2012, Computer Aided Geometric Design 29); other intervals are halved.
+    A polynomial is above 0 in an interval if its coefficients in Bernstein's basis are above 0
+    (Farouki 2012, Computer Aided Geometric Design 29). Other intervals are halved.
     """
     if min(polynomial) >= 0:
         return math.inf
@@ -80,7 +80,6 @@ def _bound(polynomial: Sequence[int]) -> int:
 
 
 def _bernstein(polynomial: Sequence[int]) -> list[int]:
-    """Return the coefficients in Bernstein's basis, times a common factor."""
     degree = len(polynomial) - 1
     factor = math.lcm(*(math.comb(degree, j) for j in range(degree + 1)))
     parts = [c * (factor // math.comb(degree, j)) for j, c in enumerate(polynomial)]

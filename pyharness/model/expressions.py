@@ -60,8 +60,9 @@ def parsed(
 ) -> StateTorque | TorqueLaw:
     """Return the torque of three expressions about the body axes, as a torque law if possible.
 
-    They may contain t (s), w1, w2, w3 (rad/s), the quaternion q0, q1, q2, q3, pi, `constants`, and
-    own states, whose `rates` are expressions too. Values are in N m, or in rad/s2 for a body with
+    They may contain t (s), w1, w2, w3 (rad/s), the quaternion q0, q1, q2, q3, pi, the names in
+    `constants`, and own states (unknowns that `Scene.states` adds). `rates` has an expression for
+    the time derivative of each own state. Values are in N m, or in rad/s2 for a body with
     coefficients. Raise InputError for an invalid expression.
     """
     values = _checked_constants(constants)

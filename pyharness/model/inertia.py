@@ -35,7 +35,7 @@ class PrincipalFrame:
     """Principal moments (kg m2) and axes of a body, as floats and fractions (30 or more digits).
 
     The columns of `axes` form a right-handed frame, each near the body's own axis of the same
-    number. `moments_low` is the exact minus the rounded moments.
+    number. `moments_low` is the exact moments minus `moments`.
     """
 
     moments: Triple
@@ -174,7 +174,6 @@ def _rotate(a: list[list[int]], vectors: list[list[int]], p: int, q: int, bits: 
 
 
 def _last_bit(x: float) -> int:
-    """Return the exponent of a number's lowest nonzero bit."""
     numerator, denominator = x.as_integer_ratio()
     if denominator > 1:
         return 1 - denominator.bit_length()

@@ -138,7 +138,7 @@ def inertia_function(place: str, function: Callable[[Any], Any]) -> InertiaFunct
 
 
 def inertia_of_texts(place: str, values: Any) -> InertiaFunction:
-    """Return the moments or inertia of a scene file's expressions of t, and numbers."""
+    """Return the moments or inertia that a scene file gives by expressions of t and numbers."""
     where = f"[body] {place}"
     rows = [values] if place == "moments" else values
     if not isinstance(values, list) or not all(
@@ -157,7 +157,7 @@ def inertia_of_texts(place: str, values: Any) -> InertiaFunction:
 def inertia_of_tables(
     place: str, tables: Iterable[Table], written: tuple[Any, ...]
 ) -> InertiaFunction:
-    """Return the moments or inertia whose elements are `tables` of time; a file has `written`."""
+    """Return the inertia whose elements are `tables` of time; scene files have `written`."""
     recorder = Recorder(place=f"[body] {place}")
     time, *_ = recorder.inputs()
     values = [value_of_table(without_equal_constants(each), time) for each in tables]

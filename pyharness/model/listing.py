@@ -99,7 +99,7 @@ class Listing:
 
     @classmethod
     def original(cls, program: str, readings: Iterable[str] = ()) -> "Listing":
-        """Return the listing with the defects and conjectures of `switches`, and `readings`."""
+        """Return the program as printed, with the names of `switches`, and `readings`, active."""
         return cls(program, frozenset(switches(program)), frozenset(readings))
 
     @classmethod
@@ -164,7 +164,7 @@ def subset(
         The listing to start from. The default is `corrected` if only `keep` has names, else
         `original`.
     fix, keep : iterable of str
-        Names of defects, readings and conjectures to correct, and to keep active.
+        Names of defects, readings and conjectures: `fix` corrects them, `keep` leaves them active.
     readings : iterable of str
         The readings to activate. In a corrected base only `keep` activates a reading, because a
         corrected statement is the same under every reading.

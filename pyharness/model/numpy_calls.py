@@ -144,7 +144,7 @@ def _viewed(found: Any) -> Any:
 
 
 def _by_element(function: Callable[..., Any], count: int) -> Callable[..., Any]:
-    """Return a function of arrays that acts on their elements; for scalars it returns no array."""
+    """Return a function of arrays that acts on their elements; for scalars it returns a scalar."""
     loop = np.frompyfunc(function, count, 1)
 
     def called(*given: Any) -> Any:

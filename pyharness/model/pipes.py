@@ -29,7 +29,6 @@ def read_input(path: str | os.PathLike[str], where: str, limit: int, what: str) 
 
 
 def _read(path: str, limit: int) -> bytes | None:
-    """Return the content of a file, or None above `limit` bytes."""
     # Without O_NONBLOCK, opening a pipe waits for a writer.
     handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY)
     try:

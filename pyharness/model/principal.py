@@ -58,10 +58,10 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
     Returns
     -------
     scene : Scene
-        The same problem with `moments`; its attitude, if any, is that of the principal axes. A
-        torque about the axes of space is unchanged, and the result then always has an attitude.
+        The same problem with `moments`; its attitude, if any, describes the principal axes. A
+        torque about the axes of space is unchanged; the result then always has an attitude.
     axes : ndarray, shape (3, 3)
-        The principal axes, in columns of components about the body's own axes. They form a
+        The principal axes as columns, in components about the body's own axes. They form a
         right-handed frame; each axis is near the body's own axis of the same number.
 
     Raises
@@ -115,7 +115,10 @@ def in_scene_axes(found: Trajectory, axes: Array) -> Trajectory:
 
 
 def states_in_scene_axes(states: Array, axes: Array, own: int) -> Array:
-    """Return rows of states about the body's own axes; own states begin at column `own`."""
+    """Return rows of states, transformed from principal `axes` (columns) to the body's own.
+
+    Columns from `own` on, unknowns that `Scene.states` adds, remain unchanged.
+    """
     turned, rest = states[:, 3:own], states[:, own:]
     if own > 3:
         turned = _attitude_in_scene_axes(turned, axes)

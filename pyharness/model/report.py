@@ -73,7 +73,7 @@ def format_bytes(number: float) -> str:
 
 
 class Column(NamedTuple):
-    """A column of a table, with a head and a format for rounded numbers, and others for CSV."""
+    """A column of a table: head and format of rounded numbers, and both again for CSV."""
 
     head: str
     write: Callable[[Any], str] = plain

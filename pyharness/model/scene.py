@@ -99,31 +99,32 @@ class Scene:
     omega : three numbers
         The angular velocity about the body axes at time 0 (rad/s).
     moments : three numbers, ChangingMoments, or function of t, optional
-        The principal moments of inertia (kg m2). A function of the time t (s) is recorded, and must
-        not jump; `inertia_table` makes one from a table. If the moments change, the attribute
-        `moments` is None, and `changing` has them.
+        The principal moments of inertia (kg m2). A function of the time t (s) must be continuous;
+        `inertia_table` makes moments from a table. If the moments change with time, the attribute
+        `changing` has them, and `moments` is None.
     coefficients : three numbers, optional
         The dimensionless coefficients A, B, C of Euler's equations (13-15 of the thesis).
     torque : TorqueLaw, three numbers, StateTorque, or function of (t, omega[, attitude])
-        The torque; zero by default, and constant for three numbers. The functions of
-        `pyharness.torques` return a StateTorque. A function returns the components about the body
-        axes; its arithmetic is recorded in calls with symbols. Pass a function that can't be
-        recorded as ``opaque(function)``.
+        The torque in N m; for `coefficients`, torque over moment in rad/s2. The default is zero.
+        `pyharness.torques` has functions that return a StateTorque. A function of your own returns
+        the components about the body axes. It is called with symbols, which record its arithmetic;
+        if that fails, pass ``opaque(function)``.
     attitude : four numbers or scipy.spatial.transform.Rotation, optional
         The quaternion from body to space at time 0, scalar first. It is normalised.
     inertia : three rows of three numbers, ChangingInertia, or function of t, optional
-        A symmetric inertia matrix about the body axes (kg m2). If it changes, the attribute is
-        None, and `changing` has it.
+        A symmetric inertia matrix about the body axes (kg m2). If it changes with time, the
+        attribute `changing` has it, and `inertia` is None.
     changing : ChangingMoments, ChangingInertia, or a recorded function, optional
         An inertia that changes with time.
     states : dict of str to float, or to pair of floats, optional
-        Own states: at most eight further unknowns, in any unit, with their values at time 0 by
-        name. The torque is then a function of ``(t, omega, states)`` or ``(t, omega, attitude,
-        states)`` that returns the torque and a dict of the states' rates. Errors of a state are
-        relative to its largest absolute value so far, or to the second number of a pair if larger.
+        Own states: at most eight unknowns beside omega and attitude, in any unit. The dict has each
+        name with its value at time 0, or with a pair of this value and a scale. The torque is then
+        a function of ``(t, omega, states)`` or ``(t, omega, attitude, states)``, which returns the
+        torque and a dict of the states' time derivatives. The error of a state is relative to its
+        largest absolute value so far, or to its scale if that is larger.
     step_size : float
-        The step size (s) of methods with a fixed step, and of the programs of 1982. The following
-        arguments are for these programs.
+        The step size (s) of methods with a fixed step, and of the programs of the thesis. The
+        arguments below are for these programs only.
     steps : int
         The number of steps.
     masses, forces : three numbers
@@ -322,8 +323,8 @@ class Scene:
     def is_impossible(self) -> bool:
         """Whether no rigid body has the moments of inertia at time 0.
 
-        The largest moment then exceeds the sum of the others by over 2**-50 of itself; less may be
-        due to rounding.
+        True if the largest moment exceeds the sum of the others by more than 2**-50 of itself. A
+        smaller excess may be a rounding error.
         """
         moments, inertia = self.moments, self.inertia
         if self.changing is not None:
@@ -424,7 +425,11 @@ def checked_scene(
     changing: bool = False,
     states: bool = False,
 ) -> Scene:
-    """Return `scene`; raise InputError unless it is a Scene of a kind that the flags allow."""
+    """Return `scene`; raise InputError unless it is a Scene of a kind that the flags allow.
+
+    They allow a full inertia matrix (`any_axes`), a torque about the axes of space (`any_torque`)
+    or dependent on the state (`any_state`), a changing inertia, and own states.
+    """
     if isinstance(scene, Scene):
         if scene.states and not states:
             raise InputError(OWN_STATES)

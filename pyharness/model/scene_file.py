@@ -163,7 +163,7 @@ def _torque_lines(scene: Scene) -> list[str]:
 
 
 def _term_lines(term: tuple[tuple[str, Any], ...], changing: Changing | None) -> list[str]:
-    """Return the lines of a ready term; an inertia in it may change only as that of the body."""
+    """Return the lines of a ready term; an inertia in it that changes must be that of the body."""
     if any(isinstance(value, Changing) and value != changing for _, value in term):
         raise InputError(
             f"[torque]: a term {term[0][1]} whose inertia changes otherwise than that of the body "

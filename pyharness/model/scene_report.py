@@ -33,7 +33,7 @@ def heading(scene: Scene, listings: Iterable[Listing] = ()) -> list[str]:
         body = f"I = {_tuple(scene.moments)} kg m2"
     else:
         body = f"A, B, C = {_tuple(scene.euler_coefficients)}"
-    unit = "N m" if scene.coefficients is None else "1/s2"
+    unit = "N m" if scene.coefficients is None else "rad/s2"
     if isinstance(scene.torque, StateTorque):
         torque = _state_torque(scene.torque, unit)
     else:

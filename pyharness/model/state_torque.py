@@ -38,34 +38,34 @@ _WITH_STATES = (
 class StateTorque:
     """A torque about the body axes that depends on time, omega and attitude.
 
-    The unit is N m for a body with moments or inertia, rad/s2 for one with coefficients. A scene
-    creates a StateTorque if its torque is a function.
+    It is in N m for a body with moments or inertia; for a body with coefficients it is torque over
+    moment, in rad/s2. A scene converts a function to a StateTorque, or to an equal TorqueLaw.
 
     Attributes
     ----------
     tape : Tape or None
-        The recorded function; None for an opaque torque.
+        The recorded operations; None for an opaque torque.
     function : callable or None
         The function that an opaque torque calls, else None.
     needs_attitude : bool
         Whether the torque depends on the attitude.
     expression, constants : tuple
-        The three expressions of a scene file, if the torque was recorded from them, and pairs of
-        name and value of their constants.
+        If the torque was recorded from a scene file: its three expressions, and pairs of name and
+        value of their constants; else empty.
     terms : tuple
-        The torque's other summands in a scene file: at most one `TorqueLaw`, and ready terms
-        (torques of `pyharness.torques`) as pairs of keys and values.
+        The other summands that a scene file has: at most one `TorqueLaw`, and ready terms. A ready
+        term is a torque of `pyharness.torques`, as pairs of key and value.
     parameters : tuple of pairs
-        Names and values of the recorded function's keyword arguments with numbers as defaults.
+        Name and value of each keyword argument of the function whose default is a number.
     varied : Tape or None
-        The recorded function with these parameters as further inputs.
+        The recorded operations, with `parameters` as further inputs.
     own : tuple of str
-        The names of the scene's own states: further inputs of the tape, whose rates are further
-        outputs.
+        The names of the scene's own states, the unknowns that `Scene.states` adds. Their values are
+        further inputs of the tape, and their time derivatives further outputs.
     starts : tuple of OwnState
-        States that a scene with this torque gets if it has none.
+        Own states that a scene with this torque gets if it defines none.
     parts : tuple
-        The torques and torque laws of a sum.
+        The summands, if the torque is a sum.
     is_zero, varies, in_space : bool
         Always False, True and False; for code that also takes a `TorqueLaw`.
     """
@@ -110,8 +110,8 @@ class StateTorque:
     ) -> Triple:
         """Return the torque at `time` (s), omega (rad/s) and attitude; NaN where it is singular.
 
-        `own` are the values of the scene's own states. Raise InputError if an opaque function does
-        not return three numbers.
+        `own` has the values of the own states. Raise InputError if an opaque function does not
+        return three numbers.
         """
         if self.tape is None:
             assert self.function is not None
@@ -195,7 +195,8 @@ def turned_law(law: TorqueLaw, time: Symbol, attitude: Any) -> Array:
 def recorded(function: Function, states: Sequence[str] = ()) -> StateTorque:
     """Return the torque that a user's function computes, recorded with symbols.
 
-    Use it for summands; a scene records a function as its only torque itself.
+    Use it for a function that is one of several summands. A function that is the only torque of a
+    scene can be passed to `Scene` directly.
 
     Parameters
     ----------
@@ -203,8 +204,9 @@ def recorded(function: Function, states: Sequence[str] = ()) -> StateTorque:
         A function of (t, omega) or (t, omega, attitude) that returns the torque about the body axes
         (N m). Keyword arguments with numbers as defaults are parameters for sensitivities.
     states : sequence of str
-        The names of the scene's own states. If there are any, the function has one more argument,
-        the dict of their values, and returns the torque and a dict of their rates.
+        The names of the scene's own states, the unknowns that `Scene.states` adds. If there are
+        any, the function has a further argument, the dict of their values. It then returns the
+        torque and a dict of their time derivatives.
 
     Returns
     -------
@@ -404,7 +406,6 @@ def _with_parameters(torque: StateTorque, function: Function, called: Function) 
     }
 
     def recorded_with(names: Sequence[str]) -> Tape | None:
-        """Return the tape with these keywords as inputs, or None if it can't be recorded."""
         recorder = Recorder(n_inputs=N_INPUTS + len(names))
         # An exponent, which is a number of factors, is no parameter.
         recorder.has_powers = not names
@@ -428,7 +429,6 @@ def _with_parameters(torque: StateTorque, function: Function, called: Function) 
 
 
 def _list_summands(torque: StateTorque | TorqueLaw) -> "tuple[StateTorque | TorqueLaw, ...]":
-    """Return the summands of a torque; a zero law has none."""
     if isinstance(torque, TorqueLaw):
         return () if torque.is_zero else (torque,)
     return torque.parts or (torque,)

@@ -317,7 +317,6 @@ class Symbol:
         return (self * math.log(number)).exp()
 
     def _own_slot(self) -> int:
-        """Return a slot whose value is that of this symbol."""
         slot, factor = self._slot()
         if factor != 1.0:
             slot = self.recorder.slot(Operation("linear", (), self.linear()))

@@ -347,6 +347,6 @@ def _saturated(kind: str, x: float) -> float:
         return exponential(x)
     if kind == "large":
         return 2.0**1000
-    # The numbers differ between arguments, so that a quotient of two exponentials shows.
+    # Replacements depend on the argument; else a quotient of two would be 1 for each kind.
     part = math.fmod(math.frexp(min(x, 1e308))[0] * (1e7 if kind == "other" else 1e4), 1.0)
     return 1.01 + part if kind == "moderate" else math.ldexp(1.0, 167 + int(600.0 * part))

@@ -1,4 +1,4 @@
-"""Tables of a tape, and the functions of a tape, for arrays."""
+"""Tables and functions of a tape (recorded operations), for arrays."""
 
 from typing import Any
 

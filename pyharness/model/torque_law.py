@@ -25,17 +25,17 @@ class TorqueLaw:
 
     N(t) = constant + rate t + sum of amplitude sin(frequency t) + sum of amplitude cos(frequency t)
 
-    in N m for a body with moments or inertia, in rad/s2 (torque over moment) for one with
-    coefficients. The fields are tuples of floats.
+    For a body with moments or inertia, N is a torque in N m. For a body with coefficients, N is
+    torque over moment in rad/s2. The fields are tuples of floats.
 
     Parameters
     ----------
     constant : three numbers
-        The constant term, in the unit of N.
+        The constant term (N m or rad/s2).
     rate : three numbers
-        The factor of time, in the unit of N per second.
+        The factor of time (N m/s or rad/s3).
     sines, cosines : iterable of waves
-        A wave is a pair of an amplitude, three numbers in the unit of N, and a frequency (rad/s).
+        Each wave is a pair: three amplitudes (N m or rad/s2), and a frequency (rad/s).
     frame : {"body", "space"}
         The axes of the components.
 
@@ -57,7 +57,7 @@ class TorqueLaw:
     sines: tuple[Wave, ...] = ()
     cosines: tuple[Wave, ...] = ()
     frame: str = "body"
-    # The `StateTorque` with named parameters from which the law was derived; None in copies.
+    # The `StateTorque` with named parameters from which `law_of` derived the law; None in copies.
     named: Any = field(default=None, init=False, compare=False, repr=False)
 
     if TYPE_CHECKING:
@@ -124,11 +124,11 @@ class TorqueLaw:
 
     @property
     def in_space(self) -> bool:
-        """Whether the torque is not zero and about the axes of space."""
+        """Whether the torque is about the axes of space, and not zero."""
         return self.frame == "space" and not self.is_zero
 
     def at(self, time: float) -> Triple:
-        """Return the torque N at `time` (s); the order of summation is fixed."""
+        """Return N (N m or rad/s2) at `time` (s); the order of summation is fixed."""
         torque = list(self.constant)
         if self.varies:
             for axis in range(3):

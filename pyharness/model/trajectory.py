@@ -63,8 +63,8 @@ class Stop:
     step : int
         The number of the step, from 1, whose result is the last row.
     variable : str
-        The variable that failed: `U1` to `U3` (omega), `V1` to `V3` (velocity), or the norm `U` (of
-        omega) or `UV` (of both).
+        The variable that failed the test: a component of omega (`U1` to `U3`) or of the velocity
+        (`V1` to `V3`), the norm of omega (`U`), or the norm of all six components (`UV`).
     quotient : float
         The Lipschitz quotient (1/s): the change of the derivative between two stages, divided by
         the change of the variable; infinite if the variable did not change.
@@ -93,38 +93,39 @@ class Trajectory(Conversions):
     time : ndarray, shape (n,)
         The true times, s.
     recorded_time : ndarray, shape (n,)
-        The variable TIME of a program's output, s, which a defect may falsify.
+        The variable TIME that a program of the thesis prints, s, which a defect may falsify; for
+        methods, `time`.
     omega : ndarray, shape (n, 3)
         Angular velocity about the body axes, rad/s.
     velocity : ndarray, shape (n, 3), or None
         Translational velocity along the body axes, m/s.
     steps, evaluations : int
-        The number of steps (for SciPy's methods and the reference, of rows), and the number of
-        evaluations of the right-hand side.
+        The number of steps, and of evaluations of the right-hand side. For SciPy's methods and the
+        method `reference`, `steps` is the number of rows.
     ended : str
-        How the integration ended. Endings with all rows are "complete"; "sensitive" if the
-        amplified rounding error exceeds the tolerance; and "unchecked" if SciPy may have stepped
-        over a short change of a recorded torque, because the series that limits its steps does not
-        reach the end. Early endings are "stopped" by the Lipschitz test, "overflow", "singular" for
-        an undefined torque, "sliding" where a switch of the torque would change back and forth
-        without end, and "event" for a terminal event.
+        How the integration ended. Three endings have all rows: "complete"; "sensitive", if the
+        amplified rounding error exceeds the tolerance; and "unchecked", if SciPy may have stepped
+        over a short change of the torque. The early endings are "overflow"; "stopped", by the
+        Lipschitz test of the Runge-Kutta program; "singular", where the torque is undefined;
+        "sliding", where the torque would jump back and forth without end; and "event", at a
+        terminal event.
     stop : Stop or None
         Where the Lipschitz test ended the run.
     ier : ndarray of int, shape (n,), or None
         Error codes of the collocation programs' linear solver; 129 for a singular matrix.
     error : float or None
-        The largest estimated error in any row: of omega, relative to its largest component along
-        the trajectory, or of the attitude (rad).
+        The largest estimated error of all rows. The error of omega is relative to its largest
+        component along the trajectory; the error of the attitude is an angle (rad).
     growth : float or None
         The error amplification: the largest norm of the state-transition matrix of omega from any
         time to the end.
     reason : str or None
-        Why a recorded torque ended the integration early or made the ending "sensitive", with the
-        time and the operation.
+        The time and the operation at which a recorded torque ended the integration early, or made
+        the ending "sensitive".
     attitude : ndarray, shape (n, 4), or None
         Quaternions from body to space, scalar first, with continuous signs.
     own : ndarray, shape (n, k), or None
-        The scene's own states, in the order of its `states`.
+        The scene's own states: the unknowns that `Scene.states` adds, in this order.
     moments : tuple of three floats, ChangingMoments, ChangingInertia, or None
         Principal moments (kg m2), or an inertia that changes; None if the body has coefficients.
     axes : ndarray, shape (3, 3), or None
@@ -137,9 +138,9 @@ class Trajectory(Conversions):
     scene : Scene or None
         The scene, if `solve` returned the trajectory.
     sol : DenseOutput or None
-        The solution as a function of time. It is not saved.
+        The solution as a function of time; `save` does not write it.
     t_events : list of ndarray, or None
-        The times (s) of the events of each function, in order.
+        For each function, the times (s) of its events, in the order of `time`.
     y_events : list of ndarray, or None
         The states at these times, shape (k, m) for k events; each row is ordered as a column of
         `y`.

@@ -42,7 +42,7 @@ ROWS: dict[str, tuple[str, tuple[int, ...]]] = {
     "ier": ("i4", ()),
 }
 NUMBERS = ("error", "growth", "tolerance")  # of the header; None for unknown
-OWN = "own"  # an array of rows, with a column for each own state
+OWN = "own"  # an array with a column for each own state, an unknown that `Scene.states` adds
 AXES = "axes"  # an array without rows, shape (3, 3)
 # The number of events of each function; the times and states of all events.
 EVENTS = ("event_counts", "event_times", "event_states")

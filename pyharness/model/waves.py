@@ -1,9 +1,9 @@
 """Exact sums of the waves of a torque law that have the same frequency.
 
-A solver divides amplitudes by a moment, and rounds. If two opposite amplitudes differ by 1e-10 of
-their size, the sum of the rounded quotients has only six correct digits; the exact sum, rounded
-afterwards, has all. A merged law has at most one sine and one cosine of each frequency, none of
-frequency 0.
+A solver divides each amplitude by a moment, and rounds the quotient. If two amplitudes of opposite
+sign nearly cancel, to 1e-10 of their size, the sum of the rounded quotients has only six correct
+digits. The exact sum, rounded afterwards, has all. A merged law has at most one sine and one cosine
+of each frequency, and none of frequency 0.
 """
 
 import math

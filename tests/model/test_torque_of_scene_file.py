@@ -60,7 +60,7 @@ def test_expression_may_have_several_lines(tmp_path: Path) -> None:
     assert scene.torque.expression == ("-0.5*w1 - 0.25*w1**3", "0", "0")
     assert scene.torque.at(0.0, (2.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)) == (-3.0, 0.0, 0.0)
     assert restored(scene, tmp_path) == scene
-    assert "N = (-0.5*w1 - 0.25*w1**3, 0, 0) 1/s2; omega(0)" in heading(scene)[1]
+    assert "N = (-0.5*w1 - 0.25*w1**3, 0, 0) rad/s2; omega(0)" in heading(scene)[1]
 
 
 @pytest.mark.parametrize(

@@ -99,7 +99,7 @@ static int has(const Request *r, const char *name) {
     return at != NULL && at < end;
 }
 
-/* Set the torque over moment (1/s2) at n times of a step, which ends when the program has TIME. */
+/* Set the torque over moment (rad/s2) at n times of a step that ends when the program has TIME. */
 static void set_torques(const Request *r, int step, double TIME, int n, const double *times,
                         double torques[][3]) {
     int first = step == 0 && r->has_initial_torque && r->has_moments && has(r, "initial-torque");

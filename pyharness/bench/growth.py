@@ -24,8 +24,8 @@ class Growth:
     """The Taylor method's error at one time, and the effect of rounding that time."""
 
     time: float  # s
-    # Both relative to the largest angular velocity: the largest difference from the closed form,
-    # from `_STARTS` initial states of the same motion; and the change by one rounding of the time.
+    # Largest difference from the closed form, from `_STARTS` initial states of the same motion, and
+    # change of omega by one rounding of the time. Both are relative to the largest omega.
     error: float
     conditioning: float
     steps: int  # number of steps of one integration

@@ -57,7 +57,8 @@ class Workload:
     label: str
     scene: Scene
     horizon: float  # end time T, s
-    # Only for scenes that are not cases: kinds, solution, error amplification, and revolutions.
+    # Only for scenes that are not cases: kinds, solution, error amplification, and number of
+    # revolutions.
     kinds: tuple[str, ...] = ()
     truth: Reference | None = None
     growth: float = 0.0
@@ -73,10 +74,10 @@ class Workload:
 
     @property
     def group(self) -> str:
-        """Return the name of the workload's group; mean ratios are those of a group.
+        """Return the name of the workload's group, over which ratios are averaged.
 
-        Groups differ in the end time; for 3 s, and with attitudes, also in whether there is a
-        torque.
+        A group has one end time. At 3 s, or if attitudes are requested, workloads with and without
+        torque are separate groups.
         """
         if self.horizon != HORIZON and self.scene.attitude is None:
             return f"T = {self.horizon:g}"

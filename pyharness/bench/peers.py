@@ -1,7 +1,7 @@
 """Third-party integrators for `bench`, set up for speed as their documentation recommends.
 
-In the source of the Runge-Kutta methods that numba compiles, the right-hand sides contain the
-scene's numbers, and loops over stages are unrolled.
+numba compiles a Runge-Kutta method for each scene: the right-hand sides contain the scene's
+numbers, and the loop over stages is unrolled.
 """
 
 import warnings
@@ -47,7 +47,7 @@ def peers() -> list[SceneContender]:
 
     return [
         adaptive("heyoka", "heyoka", heyoka_maker),
-        # Derivatives by the initial state, from which our error amplification comes too.
+        # With the derivatives by the initial state, which our error amplification needs too.
         adaptive("heyoka-variational", "heyoka", partial(heyoka_maker, variational=True)),
         fixed("rk4", 4),
         fixed("dop8", 8),

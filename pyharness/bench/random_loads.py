@@ -1,8 +1,8 @@
 """Random scenes of several kinds, on which no method was tuned.
 
 Torques and frequencies scale with the initial angular velocity, so that they affect slow and fast
-bodies alike. A seed and a number determine a scene. The second reference (`integer_series`)
-computes its motion, on which it depends whether the scene is accepted or drawn again.
+bodies alike. A seed and a number determine a scene. Its motion, by the second reference
+(`integer_series`), determines whether the scene is accepted or drawn again.
 """
 
 import math

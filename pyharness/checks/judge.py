@@ -71,7 +71,7 @@ class MethodRun:
 
 
 def by_rows(method: str, tolerance: float, scene: Scene, times: Sequence[float]) -> MethodRun:
-    """Return a deferred run of a method by `solve` at all `times` (s), with any attitude."""
+    """Return a deferred run of a method by `solve` at all `times` (s)."""
     candidate = method_candidate(method, tolerance)
 
     def ask() -> Answer:
@@ -198,7 +198,10 @@ class Policy:
 
 
 def allowed(truth: Truth, made: float, growth: float, steps: float = 0.0) -> float:
-    """Return the limit: the steps' error `made` times `growth`, rounding and the truth's error."""
+    """Return the limit: the steps' error `made` times `growth`, rounding, and the truth's error.
+
+    `steps` is the number of uncompensated roundings of omega.
+    """
     if truth.attitude is not None:
         return truth.flow.angle_limit(made * growth, truth.end) + truth.angle_error
     return replace(truth.flow, amplification=growth).limit(made, steps) + truth.relative_error

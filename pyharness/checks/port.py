@@ -171,7 +171,10 @@ def differences(twin: Trajectory, answer: Answer) -> list[str]:
 
 
 def _difference(wanted: Array, given: Array) -> dict[str, Any] | None:
-    """Return the values in the first step that differs, in hexadecimal; JSON has no inf and nan."""
+    """Return the values in the first step that differs, or None.
+
+    They are in hexadecimal, because JSON has no inf and nan.
+    """
     for step, (due, row) in enumerate(zip(wanted, given, strict=False), 1):
         if ulps(due, row):
             values = []

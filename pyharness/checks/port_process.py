@@ -101,7 +101,7 @@ class PortProcess:
 
     def __exit__(self, *error: object) -> None:
         """End the port's process and all its child processes."""
-        # An empty group is not found, which macOS reports as PermissionError.
+        # All processes may have ended; macOS then raises PermissionError.
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(self._process.pid, signal.SIGKILL)
         # A process may have left the group, and may be starting another.

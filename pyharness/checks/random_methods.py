@@ -64,7 +64,7 @@ CAMPAIGN = Basis(
 )
 """Basis of the limits in random scenes."""
 _CALM = 10.0  # error amplification below which a series has no reason to refuse
-# Scenes of these kinds may diverge, or be too fast for any true solution and any series.
+# Motions in scenes of these kinds may diverge, or be too fast for a true solution or a series.
 _MAY_REFUSE = ("extreme", "coefficients", "violent torque")
 # Below this tolerance, methods in Python or decimal arithmetic take too long.
 _FINE = 1e-9
@@ -133,7 +133,7 @@ TORQUE_POLICY = replace(POLICY, may_refuse=_may_refuse_torque)
 
 
 def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
-    """Yield checks of omega by every entry point or, without a true solution, one of the scene."""
+    """Yield checks of omega by every entry point; without a true solution, one check of a scene."""
     for number in range(chosen.draws):
         if number // 2 % _EVERY or not chosen.may_ask(f"random/{number}"):
             continue
@@ -157,7 +157,7 @@ def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
 
 
 def random_attitudes(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of attitudes, if the true attitude is known despite rounding."""
+    """Yield deferred checks of attitudes, in scenes whose true attitude is known."""
     for number in range(0, chosen.draws, _EVERY_ATTITUDE):
         if not chosen.may_ask(f"random/{number}"):
             continue
@@ -232,7 +232,7 @@ def sample(tried: Callable[[], MethodRun], truth: Truth, policy: Policy, name: N
 
 
 def random_torques(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of omega and attitude, if the true solution is known."""
+    """Yield deferred checks under torques that depend on the state, if the solution is known."""
     for number in range(0, chosen.draws, _EVERY_TORQUE):
         if not chosen.may_ask(f"random/{number}"):
             continue

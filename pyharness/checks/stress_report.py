@@ -140,7 +140,7 @@ def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
         _panel(axes, name, [mark for mark in marks if mark.method == name], places)
     for axes in grid.flat[len(methods) :]:
         axes.set_visible(False)
-    # Without the name of the kind.
+    # The name of the kind, omitted here, is above its problems.
     labels = [name[len(kind) :].lstrip("-") or name for kind, name in places]
     for axes in grid[-1]:
         axes.set_xticks(list(places.values()), labels, rotation=90)
@@ -201,7 +201,7 @@ def _panel(
             at = [places[kind, mark.circumstance] for mark in own]
             axes.plot(at, [_inside(mark.check.limit) for mark in own], **line)
     axes.set_yscale("log")
-    # The names of the kinds are below.
+    # The pad leaves space for the names of the kinds.
     axes.set_title(name, fontsize=9, loc="left", fontweight="bold", pad=14)
     axes.grid(visible=True, axis="y", linewidth=0.3)
     axes.tick_params(labelsize=7)
@@ -268,7 +268,7 @@ def length_picture(found: Sequence["Drift"]) -> Picture:
     return Picture(figure, numbers("motion method what steps error limit starts", rows))
 
 
-# Distinct without colour.
+# Styles that differ without colour too.
 _OF_REGIONS: tuple[dict[str, Any], ...] = (
     {"color": "#000000", "linestyle": "solid", "linewidth": 2.2},
     {"color": "#1040a0", "linestyle": (0, (1, 1.2)), "linewidth": 2.2},

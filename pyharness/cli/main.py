@@ -52,7 +52,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     - 0 for expected results;
     - 1 for an unexpected result, such as a failed check;
     - 2 for wrong usage or input;
-    - 3 without the Fortran extension;
+    - 3 if the Fortran extension is missing;
     - 130 after an interrupt.
     """
     # Garbage collection during the imports takes 4 % of the time of a command and frees nothing.
@@ -160,7 +160,7 @@ def _leave_stdout() -> None:
 
 def _complain(message: str, code: int) -> int:
     if came():
-        # Code since the interrupt may have replaced KeyboardInterrupt by another exception.
+        # The interrupted code may have replaced KeyboardInterrupt by another exception.
         return report()
     line = " ".join(message.split())
     say(f"pyharness: {line}\n")

@@ -155,9 +155,9 @@ def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
 def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
     """Return the picture of a reduction.
 
-    Consider the dimensions with several values that are numbers and not random. The picture is a
-    map over the last two of them, a line if there is only one, and dots over a random dimension if
-    there is none.
+    Its form depends on the dimensions that have several numbers which are not random. With two or
+    more, the picture is a map over the last two; with one, a line. With none, it shows dots over a
+    random dimension.
     """
     from matplotlib.figure import Figure
 

@@ -24,8 +24,8 @@ from pyharness.sweep.sweep import Arrays, Indices, Sweep, spread
 # Scenes in the samples, evenly spread over the grid; the smallest sample is measured first.
 _SAMPLES = (8, 256, 2048, 8192)
 _ENOUGH = 0.2  # s; a sample that took longer is usually large enough
-# The next larger sample is measured anyway if it has at most the fraction `_PART` of all scenes and
-# takes at most `_LONGEST`: a small sample includes too much of a batch's constant cost.
+# In a small sample, the constant cost of a batch weighs too much. The next larger one is therefore
+# measured too if it has at most the fraction `_PART` of all scenes and takes at most `_LONGEST`.
 _PART = 0.01
 _LONGEST = 60.0  # longest expected time (s) of such a sample
 # Fewest values sampled along a dimension in which all scenes of a batch are equal.
@@ -100,7 +100,7 @@ def seconds_per_chunk(sweep: Sweep) -> float:
     seconds = scenes * seconds_per_scene(sweep)
     if seconds > _ENOUGH:
         return seconds
-    # Only whole chunks show the constant cost of a chunk, which matters if they are fast.
+    # Only whole chunks show the constant cost of a chunk.
     begin = time.perf_counter()
     count = min(_FILES, sweep.n_chunks)
     for i in range(count):
@@ -245,8 +245,7 @@ def swept(
     check_size(sweep, path, workers or 1, 0 if is_there else sweep.n_chunks)
     with contextlib.ExitStack() as stack:
         try:
-            # Started first, so that a scheduler that does not answer is reported before any file is
-            # written.
+            # Started first: if a scheduler does not answer, no file is written.
             with engine(executor, workers, address) as own:
                 store = stack.enter_context(opened(sweep, path, repair))
                 with progress_of(progress, "chunks") as report:

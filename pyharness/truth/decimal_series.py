@@ -1,7 +1,7 @@
 """Omega, velocity and attitude by Taylor series of equations 13-15 in decimal arithmetic.
 
-The argument `coefficients` is A, B, C, but in functions of Taylor series the coefficients of each
-unknown.
+In `taylor_series` and `_Equations`, `coefficients` are A, B and C; in all other functions, the
+Taylor coefficients of each unknown.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,8 +26,8 @@ _ORDINARY_STEPS = 20_000
 # exceeded, even if the motion becomes slower by the factor _PACE_SLACK.
 _FIRST_STEPS = 100
 _PACE_SLACK = 3.0
-# Largest defect of a series: the difference between the rates and its derivative at the end of a
-# step, times the step, over the local tolerance. A series that has converged has a smaller defect.
+# Largest defect of a series that has converged, over the local tolerance. The defect is the step
+# times the difference between the series' derivative and the rates at the end of the step.
 _MOST_DEFECT = 64
 _NEARLY_1 = 1 - Decimal("1e-26")  # a relative change of thousands of rounding errors
 # Least growth of the number of steps, as a power of time, that the forecast extrapolates.

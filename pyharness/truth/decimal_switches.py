@@ -11,7 +11,7 @@ from pyharness.model.errors import SLIDING, TimedError
 from pyharness.truth.decimal_functions import Row, value_at
 from pyharness.truth.tape_series import TapeSeries
 
-# Largest last terms of an operand in a step, over the sum of all.
+# In a step, each of the last two terms of an operand's series may be this part of all terms.
 _SMALL = Decimal("1e-8")
 _ZERO = Decimal("1e-20")  # part of the terms that counts as rounding error
 _IMAGINARY = 1e-4  # largest imaginary part of a real root, over the step
@@ -22,8 +22,8 @@ _TOGETHER = Decimal("1e-15")  # relative difference of roots that count as one
 class Switches:
     """The results of the switches of a tape, in `results` by slot.
 
-    A switch changes where its operand crosses a level: 0, or a whole number for a floor. While an
-    operand is at a level, `_levels` has by slot -1 if the result is the one above the level, 1 if
+    A switch changes where its operand crosses a level: 0, or a whole number for a floor. `_levels`
+    has the slots whose operands are at a level: -1 if the result is the one above the level, 1 if
     it is the one below.
     """
 
@@ -56,9 +56,10 @@ class Switches:
         return False
 
     def turns(self, time: Decimal, length: Decimal) -> bool:
-        """Change the result of an operand that would not leave its level; return whether one was.
+        """Change a result if its operand does not move to that side of the level.
 
-        Raise TimedError if it leaves the level with neither result.
+        Return whether one was changed. Raise TimedError if the operand moves to the other side with
+        either result.
         """
         for slot, is_floor, x in self._tape.operands_of_switches():
             level = self._levels.get(slot)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from pyharness.model.scene import Scene
 
-_LEAST = 1e-4  # of the square of the largest unit of errors
+_LEAST = 1e-4  # least square of a unit of errors; the largest unit is 1
 
 
 class Balls(NamedTuple):

@@ -24,8 +24,8 @@ _MANY_FACTORS = 3  # products of this many factors are checked; those of two sho
 # whose factors are 0 here shows in the series.
 _ORDER_A_FACTOR = 4
 _MOST_ORDER = 100
-# A negative value of a root's polynomial is no truncation error if its square has this relative
-# difference from the operand.
+# A negative value of a root's polynomial is no truncation error if its square differs from the
+# operand by at most this part.
 _TRUSTED = Decimal("1e-6")
 
 _ROUGH = Context(prec=9)
@@ -178,7 +178,6 @@ class TapeSeries:
         sine, cosine = self._waves[operand]
         if len(sine) == k:
             slope = self._slope(operand, k)
-            # Both right-hand sides use the coefficients 0 to k - 1.
             terms = product(slope, cosine[::-1]) / k, -product(slope, sine[::-1]) / k
             sine.append(terms[0])
             cosine.append(terms[1])

@@ -245,8 +245,8 @@ class Memory:
 def sizes(seed: str, most: int, progress: Progress = no_progress) -> list[Size]:
     """Return the run times per body (s) for 1, 10, 100, ... up to `most` bodies.
 
-    The bodies have a torque, except for the closed form, which is measured by `solve_many` and, as
-    "prepared", by a prepared solver.
+    The closed form is measured without torque, by `solve_many` and, as "prepared", by a prepared
+    solver. The other methods are measured with a torque.
     """
     free, pushed = draw(seed, most)
     found: list[Size] = []

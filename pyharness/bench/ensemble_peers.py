@@ -172,7 +172,6 @@ def _numpy_rk4(load: EnsembleLoad, setting: float, threads: int) -> Callable[[],
 
 
 def _scipy_loop(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """Return an integration by SciPy's `solve_ivp`, body by body, on one thread."""
     from scipy.integrate import solve_ivp
 
     refuse_rounding("solve_ivp", setting)

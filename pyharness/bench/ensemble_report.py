@@ -20,7 +20,7 @@ _STYLES = {"prepared": "D-.", "closed-form": "o-", "taylor": "s--", "rk4": "^:"}
 
 @dataclass(frozen=True)
 class Ensembles:
-    """The speeds of all solvers; run times by number of bodies, and memory, of our methods."""
+    """The speeds of all solvers, and our methods' run times by number of bodies, and memory."""
 
     rates: Rates
     sizes: Sequence[Size]
@@ -125,7 +125,7 @@ def _record(found: Ensembles) -> dict[str, Any]:
 
 
 def size_picture(sizes: Sequence[Size]) -> Picture:
-    """Draw the time per body (ns) against the number of bodies."""
+    """Return the picture of the time per body (ns) against the number of bodies."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.5, 4.5), dpi=110, layout="constrained")

@@ -316,6 +316,5 @@ def _first_calls(
 
 
 def _at_rounding(errors: Sequence[float | None]) -> bool:
-    """Return whether `errors` no longer decrease because of rounding."""
     known = [error for error in errors if error is not None]
     return len(known) > 3 and min(known[-3:]) >= min(known[:-3]) and min(known) < 1e-10

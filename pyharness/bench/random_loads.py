@@ -39,7 +39,7 @@ KINDS = ("all", *LAWS, *SPEEDS, *BODIES, *_LENGTHS)
 
 
 def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
-    """Return the workload of a seed and a number, from 1.
+    """Return the workload that `seed` and `number`, from 1 on, determine.
 
     The kind of torque changes with the number. A scene is drawn again if its error amplification is
     `MOST_GROWTH` or more, or if the body makes less than 1 or more than 300 revolutions. With

@@ -94,8 +94,8 @@ def eigenvalues(scene: Scene) -> Array:
 def first_step(scene: Scene, listing: Listing) -> Probe:
     """Return the 3 x 3 derivative of the first step at a steady rotation, measured and derived.
 
-    A step is a polynomial of known degree, so its derivative from differences over enough
-    neighbours is exact except for rounding.
+    A step is a polynomial of omega with known degree. Differences over enough neighbours therefore
+    give its derivative exactly, except for rounding.
     """
 
     def stepped(omega: Array) -> Array:
@@ -136,7 +136,7 @@ def later_steps(scene: Scene, listing: Listing) -> Probe:
 def complex_step(listing: Listing, step: int, z: complex) -> Probe:
     """Return the growth factor of a collocation step on x' = z x, measured and derived.
 
-    The step, of 1 s, is number `step` of a run of the Python port.
+    The step, of 1 s, is number `step` of a run of the Python version.
     """
     program = listing.program
     moved = _moved(listing, step)

@@ -157,7 +157,7 @@ def _steps(scene: Scene, time: float) -> int:
 def refusable(tried: MethodRun, truth: Truth, why: str) -> bool:
     """Return whether a method may refuse a scene.
 
-    `closed-form` may refuse a scene without a closed form, `quick` any scene, and a series method a
+    `quick` may refuse any scene; `closed-form`, a scene without a closed form; a series method, a
     scene in which the phase of a torque's wave exceeds 1e8 rad.
     """
     method, scene = tried.method, tried.scene

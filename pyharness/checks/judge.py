@@ -32,7 +32,7 @@ MOST = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """A method's results, at all times or the last, or its refusal."""
+    """A method's results at all times or at the last time, or its refusal."""
 
     omega: Array = field(default_factory=lambda: np.empty((0, 3)))  # shape (n, 3), rad/s
     attitude: Array | None = None  # shape (n, 4), if requested

@@ -51,8 +51,8 @@ START: Quaternion = (0.5, -0.1, 0.7, 0.5)
 # Times (s): one that is long after the end of the cases, and those for prepared solvers.
 _LATER = 3.0
 _ENDS = (1.0, 3.0, -1.0)
-# Methods with a tolerance, and those that propagate the attitude. Methods for weak torques are left
-# out, because the torques of the cases are not weak.
+# Methods with a tolerance, and those that propagate the attitude; without those for weak torques,
+# which no case has.
 _TOLERANT = {x: each for x, each in METHODS.items() if each.finest < 1.0 and x != "reference"}
 _SOLVED = tuple(name for name, each in _TOLERANT.items() if not each.weak_torque)
 _TURNED = tuple(name for name in _SOLVED if METHODS[name].attitude)
@@ -131,7 +131,7 @@ def run_of_solve(method: str, tolerance: float, scene: Scene, times: Sequence[fl
 
 
 def run_of_call(method: str, tolerance: float, scene: Scene, time: float) -> MethodRun:
-    """Return a deferred call of a prepared solver to `time` (s), after another initial omega."""
+    """Return a deferred call of a prepared solver to `time` (s), after one with another omega."""
     candidate = prepared_candidate(method, tolerance, primed=True, attitude=bool(scene.attitude))
     return by_end(method, candidate, tolerance, scene, time)
 
@@ -216,7 +216,7 @@ def in_few_steps(scene: Scene, time: float) -> Scene:
 
 
 def order_if_seen(scene: Scene, truth: Callable[[], Reference], name: Name) -> Check:
-    """Return the check of the order of a fixed-step method, the setting or subject of `name`.
+    """Return the check of the order of the fixed-step method that `name` names.
 
     The order is reported, but not checked, if the scene is too fast or sensitive for 4096 steps, or
     if the torque has a table, because steps across its changes lower the order.
@@ -238,7 +238,6 @@ def judged_order(name: Name, found: Order) -> Check:
 
 
 def _by_ivp(scene: Scene) -> Reference:
-    """Return the solution by `solve_ivp`, with its tolerance (rad/s) as error."""
     tolerance = 1.01 * finest(_IVP, scene, scene.times()[-1])
     run = method_candidate(_IVP, tolerance).rows(scene)
     largest = float(np.abs(run.omega).max())

@@ -126,7 +126,7 @@ def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Ite
 
 
 def refuse_port(command: str) -> None:
-    """Raise InputError that advises `--port` if `command`, no integrator, answers as a port."""
+    """Raise InputError that advises `--port` if the integrator `command` answers as a port."""
     cell = port_cells(PROGRAMS, (1,), ())[0]
     read = partial(read_answer, steps=cell.scene.steps)
     refuse_other(command, "--integrator", "--port", cell.request, read)
@@ -141,7 +141,7 @@ def replay_command(command: str, cell: Cell | None = None) -> str:
 def compared(
     cell: Cell, twin: Trajectory, line: bytes, again: str = "", seconds: float | None = None
 ) -> PortCheck:
-    """Return the check that an answer agrees with `twin`; raise PortError if it is invalid."""
+    """Return the check that an answer agrees with `twin`; raise PortError for an invalid answer."""
     answer = read_answer(line, cell.scene.steps)
     found = differences(twin, answer)
     wanted = _rows(twin)

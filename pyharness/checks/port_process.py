@@ -47,7 +47,10 @@ def split_command(command: str, option: str = "--port") -> list[str]:
 def refuse_other(
     command: str, option: str, instead: str, line: bytes, read: Callable[[bytes], object]
 ) -> None:
-    """Raise InputError that advises the option `instead` if `command` answers its request."""
+    """Raise InputError that advises the option `instead` if `command` answers that one's requests.
+
+    `line` is such a request, and `read` raises PortError for an invalid answer.
+    """
     with contextlib.suppress(PortError), PortProcess(command, _PROBE, option) as process:
         read(process.ask(line))
         raise InputError(f"{option} {command}: answers requests of {instead}; give it to {instead}")

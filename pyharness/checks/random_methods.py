@@ -93,7 +93,7 @@ def may_refuse(tried: MethodRun, truth: Truth, why: str) -> bool:
 
     `auto` may never refuse, `quick` always, and a closed form only near the limits of binary64.
     Other methods may refuse the kinds of scenes in `_MAY_REFUSE`, and scenes whose error
-    amplification exceeds `_CALM`; SciPy's methods also too fine a tolerance.
+    amplification exceeds `_CALM`. SciPy's methods may also refuse a tolerance finer than they meet.
     """
     method, kind = tried.method, tried.scene.name
     if method == "auto":
@@ -179,7 +179,6 @@ def random_attitudes(chosen: Selection) -> Iterator[Attempt]:
 
 
 def _truth_if_known(scene: Scene, times: tuple[float, float], effort: float) -> Truth | None:
-    """Return the true solution; None if the motion is unbounded, too fast or too long."""
     try:
         return reference_truth(scene, times, effort)
     except InputError:

@@ -118,7 +118,7 @@ def _mark(check: Check) -> _Mark:
 def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
     """Return the picture of a trial, with values and limits in a panel for each method.
 
-    Problems are in the order of the trial, by kind. Raise InputError if no check has a value.
+    Raise InputError if no check has a value.
     """
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D

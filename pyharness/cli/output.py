@@ -92,7 +92,6 @@ def check_tree(path: str, mark: str, option: str, kind: str = "edition") -> None
 
 
 def _why_not_anew(folder: Path, mark: str, kind: str) -> str:
-    """Return the reason why a folder may not be replaced, or ""."""
     if Path.cwd().is_relative_to(folder):
         return "is the folder that you are in, or one above it"
     if not os.access(folder.parent, os.W_OK) or os.path.ismount(folder):

@@ -304,7 +304,6 @@ def _refuse(where: str, table: dict[str, Any], chosen: str, keys: Iterable[str])
 
 
 def _checked(where: str, axis: Axis) -> Axis:
-    """Return `axis`; raise InputError if its least or largest value is not allowed."""
     field = number_field(axis.field)
     if axis.how == "sphere":
         return axis

@@ -52,7 +52,7 @@ class Found(NamedTuple):
 def summary(store: Store, asked: ReductionSpec) -> tuple[list[Found], Counter[int]]:
     """Return the statistics of a reduction's components, and the counts of its codes of outcomes.
 
-    One of the two is empty: a reduction yields numbers or codes. Values are read chunk by chunk.
+    One of the two is empty: a reduction yields numbers or codes.
     """
     reduction = REDUCTIONS[asked.reduction]
     labels = reduction.labels or ("",)
@@ -164,7 +164,6 @@ def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
     axis_of = {axis.dimension: axis for axis in reversed(store.sweep.axes)}
     dimensions = store.sweep.dimensions
     ordered = [d for d in dimensions if axis_of[d].count > 1 and not axis_of[d].is_choice]
-    # Random values have no order, and are shown as dots.
     shown = [d for d in ordered if not _is_drawn(axis_of[d])][-2:] or ordered[-1:]
     most = _MOST_PLACES if len(shown) == 2 else _MOST_DOTS
     places = {d: _thinned(axis_of[d].count, most) for d in shown}

@@ -54,7 +54,7 @@ def forecast(sweep: Sweep, path: str, n_missing: int, own: Engine) -> float:
 def seconds_of_files(sweep: Sweep, path: str) -> tuple[float, float]:
     """Return the mean times (s) to write, and to read, the files of a chunk beside `path`.
 
-    Both are 0 if files can't be written; the sweep itself then reports the error.
+    Both are 0 if files can't be written.
     """
     times = []
     try:

@@ -28,7 +28,6 @@ class Switches:
     """
 
     def __init__(self, tape: TapeSeries) -> None:
-        """Begin without results."""
         self._tape, self.results = tape, tape.results
         self._levels: dict[int, int] = {}
         self._turned: set[int] = set()
@@ -56,10 +55,10 @@ class Switches:
         return False
 
     def turns(self, time: Decimal, length: Decimal) -> bool:
-        """Change a result if its operand does not move to that side of the level.
+        """Change the result of an operand that moves to the other side of its level.
 
-        Return whether one was changed. Raise TimedError if the operand moves to the other side with
-        either result.
+        Return whether a result was changed. Raise TimedError if the operand moves to the other side
+        with either result.
         """
         for slot, is_floor, x in self._tape.operands_of_switches():
             level = self._levels.get(slot)

@@ -32,8 +32,8 @@ def free_attitude(scene: Scene, time: float) -> Row:
 
     The sign of the quaternion is continuous in time. The scene must have moments and an attitude.
     On the separatrix, where omega has no period, the motion is integrated until omega is constant
-    to all digits. Raise InputError if the integration takes too many steps, or if the torque
-    depends on the state.
+    to all digits. Raise InputError if the integration would be too long, or if the torque depends
+    on the state.
     """
     checked_scene(scene)
     assert scene.attitude is not None

@@ -108,8 +108,8 @@ class _Task:
     def error(self, omega: Array) -> float:
         """Return the largest error of a body: of omega or, if requested, of the attitude (rad).
 
-        The error of omega is relative to the body's largest component at the start or the end. It
-        is infinite if a component is not finite.
+        The error of omega is relative to the body's largest component at the start or the end. The
+        result is infinite if a component is not finite.
         """
         n = min(len(omega), len(self.ends))
         ends, starts = self.ends[:n], self.sample.omega0[:n]

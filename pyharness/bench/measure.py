@@ -220,7 +220,7 @@ def error_of(end: End, truth: Reference, scale: float = 0.0) -> float | None:
 
 
 def relative_error(omega: Array, truth: Reference, scale: float = 0.0) -> float | None:
-    """Return the error of omega, relative to the larger of `scale` (rad/s) and the true components.
+    """Return the error of omega over `scale` (rad/s) or, if larger, the largest true component.
 
     The result is None if the error is not finite, or if the reference does not reach the end time.
     """

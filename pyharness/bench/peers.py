@@ -23,7 +23,7 @@ from pyharness.model.tape import Functions, Table, evaluate
 from pyharness.model.trajectory import Array
 from pyharness.truth.reference import exact_coefficients
 
-# A torque about the body axes (N m), from time, omega, attitude, sine and cosine.
+# A torque about the body axes (N m), from time, omega, attitude, and the functions sin and cos.
 Formula = Callable[..., Sequence[Any]]
 MOST_STEPS = 10_000_000
 Tableau = tuple[Sequence[Sequence[float]], Sequence[float], Sequence[float]]

@@ -139,7 +139,7 @@ def _in_word(listing: Listing, case: int, word: str | None, name: Name) -> Check
     return name.judged(not found, ", ".join(found), distance(ours, other), 0.0, BITS)
 
 
-_AT_ONCE = 2
+_AT_ONCE = 2  # decks that are compiled and run at once
 _THIN = ("two-term/case-3/original", "four-term/case-7/corrected", "runge-kutta/case-2/original")
 
 

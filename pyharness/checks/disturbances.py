@@ -36,8 +36,8 @@ from pyharness.thesis.programs import PROGRAM_REGISTRY
 # Degree of a step's result as a polynomial of omega; each stage that depends on a previous one
 # doubles the degree.
 _DEGREE = {"two-term": 4, "four-term": 4, "runge-kutta": 16}
-# Roundings along the longest chain of operations in a step, without linear systems: four stages of
-# a rate and a sum, with seven each, and the result.
+# Number of roundings along the longest chain of operations in a step, without linear systems: seven
+# in each of four stages (a rate and a sum), and those of the result.
 _LONGEST = 40.0
 # A derivative is computed from neighbours of omega. This is their largest distance over omega.
 _REACH = 2.0**-2

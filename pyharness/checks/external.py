@@ -44,7 +44,7 @@ _FEWEST_STEPS, _MOST_STEPS = 4, 2**16
 _HALF_ULP = 2.0**-53
 # Two roundings: a number is rounded when it is read, and again when a method uses it.
 _ROUNDING = 2.0 * _HALF_ULP
-_STEP_ASIDE = 2.0**-30
+_STEP_ASIDE = 2.0**-30  # relative change of a number, by which its effect is measured
 # These methods must solve users' problems too: `auto` chooses a suitable method, and `closed-form`
 # evaluates a formula.
 _MAY_NOT_REFUSE = ("auto", "closed-form")

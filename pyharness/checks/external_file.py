@@ -175,7 +175,6 @@ def _value(entry: object, sequence: object) -> Value:
 def _pointing(
     where: str, entry: dict[str, Any], sequence: object, good_to: float
 ) -> Pointing | None:
-    """Return the attitude in a `[[value]]` entry, from a quaternion or Euler angles, or None."""
     given = [key for key in ("attitude", "angles_deg") if key in entry]
     if not given:
         return None

@@ -134,7 +134,6 @@ def _compared(
         return name.judged(False, moved, limit=0.0, basis=_RECORD)
     old, new = _rows(entry), _rows(now)
     away = math.inf
-    # Step, time and TIME must be equal.
     same_times = old.shape == new.shape and np.array_equal(old[:, :3], new[:, :3])
     if same_times and entry["ended"] == now["ended"]:
         scale = float(np.abs(run.omega).max(initial=0.0)) or 1.0

@@ -67,7 +67,7 @@ FORMS = ("closed-form", "auto")
 
 @cache
 def _series(name: str) -> tuple[float, ...]:
-    """Return the coefficients of powers of the step in one step of y' = y**2, y(0) = 1.
+    """Return the result of one step for y' = y**2, y(0) = 1, as coefficients of powers of the step.
 
     This is each of Euler's equations with A = B = C = 1 and equal components.
     """

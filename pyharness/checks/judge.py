@@ -162,7 +162,7 @@ class Truth:
 
 
 def unknown_flow(largest: float) -> Conditioning:
-    """Return an infinite amplification, for closed forms, whose limits do not use it."""
+    """Return a conditioning of infinite amplification, for closed forms, whose limits ignore it."""
     return Conditioning(math.inf, MOST, MOST, MOST, largest)
 
 
@@ -224,7 +224,7 @@ def tolerance_of(tried: MethodRun) -> float:
 
 
 def has_no_form(tried: MethodRun, truth: Truth, why: str) -> bool:
-    """Return whether `closed-form` or `quick` refuses a scene for which its formula fails."""
+    """Return whether `closed-form` or `quick` refused a scene to which its formula can't apply."""
     if tried.method == "quick":
         return why == "quick: refused" and not all(tried.scene.euler_coefficients)
     return tried.method == "closed-form" and closed_form(tried.scene) is None

@@ -211,12 +211,12 @@ def _order_of_method(scene: Scene, method: str, truth: Reference, **limits: Any)
 
 
 def in_few_steps(scene: Scene, time: float) -> Scene:
-    """Return the scene with the coarsest steps to measure orders: `_FEWEST` until `time` (s)."""
+    """Return the scene with `_FEWEST` steps until `time` (s), the coarsest for measuring orders."""
     return replace(scene, step_size=time / _FEWEST, steps=_FEWEST)
 
 
 def order_if_seen(scene: Scene, truth: Callable[[], Reference], name: Name) -> Check:
-    """Return the check of the order of the fixed-step method that `name` names.
+    """Return the check of the order of the fixed-step method in `name`.
 
     The order is reported, but not checked, if the scene is too fast or sensitive for 4096 steps, or
     if the torque has a table, because steps across its changes lower the order.

@@ -60,8 +60,7 @@ def _processes_with(mark: str) -> list[int]:
     """Return the live processes with `mark` in their environment; none without /proc."""
     found = []
     for folder in Path("/proc").glob("[1-9]*"):
-        # The process found may have ended, or belong to another user. An ended process that waits
-        # for its parent has no environment.
+        # The process found may have ended, or belong to another user.
         with contextlib.suppress(OSError):
             if mark.encode() in (folder / "environ").read_bytes().split(b"\0"):
                 found.append(int(folder.name))

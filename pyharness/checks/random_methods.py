@@ -49,8 +49,8 @@ from pyharness.truth.integer_series import integer_series
 
 # A pair of draws has a plain scene and a scene of a kind in `NASTY`. Because the true solution
 # takes long, methods run in only one of 4 pairs, methods in Python or decimal arithmetic in one of
-# 60. Attitudes are checked in one of 20 draws. One of 20 draws has a torque that depends on the
-# state; one of 80 draws also runs the methods in Python under such a torque.
+# 60. Attitudes are checked in one of 20 draws. Torques that depend on the state are checked in one
+# of 20 draws, and methods in Python under such torques in one of 80.
 _EVERY, _EVERY_SLOW, _EVERY_ATTITUDE = 4, 60, 20
 _EVERY_TORQUE, _EVERY_SLOW_TORQUE = 20, 80
 # Factors on the work limit of the reference: for an attitude, and for a torque that depends on the
@@ -133,7 +133,7 @@ TORQUE_POLICY = replace(POLICY, may_refuse=_may_refuse_torque)
 
 
 def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
-    """Yield checks of omega by every entry point; without a true solution, one check of a scene."""
+    """Yield checks of omega by every entry point; without a true solution, a check of the scene."""
     for number in range(chosen.draws):
         if number // 2 % _EVERY or not chosen.may_ask(f"random/{number}"):
             continue
@@ -146,7 +146,6 @@ def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
         try:
             truth = truth_of(drawn)
         except InputError as refusal:
-            # The motion diverges, or is too fast for the true solution.
             may = drawn.scene.name in _MAY_REFUSE
             none = chosen.name_draw(number, "no-truth")
             again = chosen.name_draw(number).replay

@@ -52,7 +52,7 @@ _Stages = tuple[_Stage, _Stage, _Stage, _Stage]
 def schemes(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks of the programs' steps.
 
-    The value is the largest difference of a step from the recomputed step, divided by its bound.
+    The value is the largest difference of a step from the recomputed step, over its rounding bound.
     """
     for case in cases(chosen, (7,)):
         compare = partial(_compare_steps, case_scene(case))

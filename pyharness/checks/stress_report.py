@@ -226,7 +226,7 @@ _OF_METHODS: dict[str, dict[str, Any]] = {
 
 
 def length_picture(found: Sequence["Drift"]) -> Picture:
-    """Return the errors of energy and phase against the number of steps, for each motion."""
+    """Return the picture of errors of energy and phase against the number of steps."""
     from matplotlib.figure import Figure
 
     from pyharness.checks.theory.brouwer import LAWS

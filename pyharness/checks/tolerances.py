@@ -50,7 +50,7 @@ def finest(name: str, scene: Scene, time: float) -> float:
 
 
 def finest_and_middling(name: str, scene: Scene, time: float) -> list[float]:
-    """Return a method's finest tolerance, and 1e-6 if that is coarser; slow methods: only 1e-6."""
+    """Return a method's finest tolerance, and 1e-6 if coarser; for a slow method only 1e-6."""
     if name in _ONLY_MIDDLING:
         return [MIDDLING]
     least = finest(name, scene, time)

@@ -27,8 +27,6 @@ LINE = "pyharness: interrupted\n"
 
 
 class _Interruption:
-    """The number of interrupts, whether their line was printed, and the signal handlers."""
-
     def __init__(self) -> None:
         self.count = 0
         self.is_reported = False

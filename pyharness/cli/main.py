@@ -9,8 +9,7 @@ from pyharness.cli import say
 from pyharness.cli.interruption import came, report
 from pyharness.model.errors import InputError, NotBuiltError, unknown
 
-# The verbs in the order of the overview. Each is a module of pyharness.cli.verbs, imported when
-# used.
+# The verbs in the order of the overview. Each is a module of pyharness.cli.verbs.
 _GROUPS = {
     "for everyone": {
         "compare": "compare original and corrected programs with the true solution",

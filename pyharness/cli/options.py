@@ -75,7 +75,7 @@ _WORTH_SAYING = 60.0  # run time (s) above which a forecast is printed
 
 
 class Cost(NamedTuple):
-    """Time and memory of a random draw, on one core of 2026, and the largest number of draws."""
+    """Time and memory of a random draw, on a processor core of 2026, and the most draws."""
 
     what: str  # plural noun for the draws, as in "random scenes"
     seconds: float  # run time (s) of a draw
@@ -85,8 +85,7 @@ class Cost(NamedTuple):
 
 # A draw of `verify` makes nearly three checks, which stay in memory until the report.
 CHECKS = Cost("random draws", 0.035, 2e3, 1_000_000)
-# On each random scene of `bench`, the reference is computed, and every solver runs with all its
-# settings.
+# `bench` computes the reference of each random scene, and runs every solver with all its settings.
 SCENES = Cost("random scenes", 8.0, 1e5, 10_000)
 
 

@@ -43,8 +43,7 @@ class Field:
     whole: bool = False
 
 
-# Prefix of the constants of a torque's expressions, as in `torque.constants.k`, whose units depend
-# on the expressions.
+# Prefix of the constants of a torque's expressions, as in `torque.constants.k`.
 CONSTANTS = "torque.constants."
 INERTIA = "body.inertia."
 ELEMENTS = {f"{i + 1}{j + 1}": (i, j) for i, j in INERTIA_ELEMENTS}

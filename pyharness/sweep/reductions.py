@@ -28,11 +28,11 @@ RANKS = ("least", "middle", "largest")
 class Reduction:
     """A quantity that a sweep can store for each scene, and its computation.
 
-    For a batch of n scenes and the parameters, `compute` returns n values, or n rows with a value
-    for each of `labels`, whose dimension in the store is `dimension`. `only` is `program` or
-    `method` if the quantity exists for programs or methods alone. `needs` lists requirements of the
-    scene: `moments`, `no torque` or `attitude`. `parameters` has the defaults. If the values are
-    codes of outcomes, `flags` has their meanings.
+    `compute` takes a batch of n scenes and the parameters. It returns n values, or n rows with a
+    value for each of `labels`; `dimension` names this dimension in the store. `only` is `program`
+    or `method` if the quantity exists for programs or methods alone. `needs` lists requirements of
+    the scene: `moments`, `no torque` or `attitude`. `parameters` has the defaults. If the values
+    are codes of outcomes, `flags` has their meanings.
     """
 
     title: str

@@ -28,7 +28,7 @@ _ENOUGH = 0.2  # s; a sample that took longer is usually large enough
 # measured too if it has at most the fraction `_PART` of all scenes and takes at most `_LONGEST`.
 _PART = 0.01
 _LONGEST = 60.0  # longest expected time (s) of such a sample
-# Fewest values sampled along a dimension in which all scenes of a batch are equal.
+# Fewest values sampled along a dimension whose value all scenes of a batch share.
 _PLACES = 5
 _FILES = 20  # most chunks solved, or written and read, for a measurement
 
@@ -130,7 +130,7 @@ def seconds_per_scene(sweep: Sweep) -> float:
 def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
     """Return the indices of sampled scenes, changed so that many share a batch.
 
-    Along dimensions in which all scenes of a batch are equal, only five distinct indices remain, or
+    Along dimensions whose value all scenes of a batch share, only five distinct indices remain, or
     more if the batches of a chunk are small. The batches of the sample are then about as large as
     those of a chunk.
     """

@@ -51,6 +51,7 @@ def taylor_series(
     norm of the scene's quaternion. `order` is the degree of the series, which high powers in the
     torque may increase. `tolerance` is local and relative. `effort` is a factor on a work limit of
     some ten seconds; None means a limit of 100 000 steps, fewer if the torque depends on the state.
+    `start` replaces the initial state of the scene.
     """
     equations, limit = _Equations(scene, coefficients, velocity), _Limit(scene, effort)
     tape = equations.tape
@@ -61,7 +62,8 @@ def taylor_series(
     at_end = [equations]
     switches = Switches(tape) if tape is not None and tape.has_switches else None
     if is_recorded:
-        # Sums that cancel may be rounded to 0, as beside a saturated tanh.
+        # The last equations show the effect of rounding: their state and the terms of their sums
+        # are changed a little, because sums that cancel may be 0, as beside a saturated tanh.
         changes = Decimal(0), Decimal(10) ** (4 - getcontext().prec)
         results = {} if switches is None else switches.results
         at_end = [_Equations(scene, coefficients, velocity, each, results) for each in changes]
@@ -309,7 +311,6 @@ class _Equations:
         """
         series = [[x] for x in state]
         torque = self._torque_series(time, order, series, forward)
-        # Taylor coefficients of a changing inertia around `time`.
         elements = [] if self._changing is None else self._changing.elements
         inertia = [[_moved(each, time) for each in row] for row in elements]
         momentum: list[Row] = [[], [], []]

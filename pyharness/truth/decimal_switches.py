@@ -11,7 +11,8 @@ from pyharness.model.errors import SLIDING, TimedError
 from pyharness.truth.decimal_functions import Row, value_at
 from pyharness.truth.tape_series import TapeSeries
 
-# In a step, each of the last two terms of an operand's series may be this part of all terms.
+# In a step, an operand's series counts as converged if its last two terms are at most this part of
+# the sum of all.
 _SMALL = Decimal("1e-8")
 _ZERO = Decimal("1e-20")  # part of the terms that counts as rounding error
 _IMAGINARY = 1e-4  # largest imaginary part of a real root, over the step
@@ -79,7 +80,7 @@ class Switches:
         return False
 
     def end(self, length: Decimal) -> Decimal:
-        """Return the step (s), shortened to resolve all operands and to end at the first root."""
+        """Return the step (s), shortened until operands' series converge, or to the first root."""
         while any(self._is_unresolved(x, length) for *_, x in self._tape.operands_of_switches()):
             length *= Decimal("0.75")
         roots = []

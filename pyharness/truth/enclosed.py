@@ -23,8 +23,8 @@ class Enclosure:
     """Balls that contain the solution of one scene; quantities that were not requested are None.
 
     The attitude is a unit quaternion, scalar first. The transition matrix has, row by row, the
-    derivatives of omega and of the quaternion, before its normalisation, with respect to omega at
-    time 0.
+    derivatives of omega and of the quaternion with respect to omega at time 0, before the
+    quaternion is normalised.
     """
 
     time: tuple[float, ...]  # s

@@ -1,8 +1,8 @@
 """Proved enclosures: balls (intervals, given by middle and radius) that contain the solution.
 
-Torque-free motion is proved in closed form (`enclosure_free`), torques of time alone by Taylor
-steps in integers (`certificate`), and all others by Taylor steps in balls (`enclosure_steps`). The
-first and the last need python-flint.
+Torque-free motion is proved in closed form (`enclosure_free`), motion under torques of time alone
+by Taylor steps in integers (`certificate`), and all other motion by Taylor steps in balls
+(`enclosure_steps`). The closed form and the steps in balls need python-flint.
 """
 
 from collections.abc import Sequence

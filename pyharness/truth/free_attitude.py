@@ -1,9 +1,9 @@
 """Attitude of a torque-free body at any time in decimals, to check other methods.
 
 In each period of omega the body rotates about the angular momentum by the same angle, so that
-Taylor series integrate only one period. It is divided into segments that start from the omega of
-`elliptic.py`, because near the separatrix errors of omega grow exponentially. No code is shared
-with the closed form that this module checks.
+Taylor series integrate only one period. Near the separatrix errors of omega grow exponentially. The
+period is therefore divided into segments, each of which starts from the omega of `elliptic.py`. No
+code is shared with the closed form that this module checks.
 """
 
 import decimal

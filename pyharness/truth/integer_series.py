@@ -60,7 +60,7 @@ def integer_series(scene: Scene, times: Sequence[float]) -> Path:
 
 
 def _guess(scene: Scene, span: Fraction) -> Fraction:
-    """Return a guess of the largest omega (rad/s) until `span` (s): initial, or by the torque."""
+    """Return a guess of the largest component of omega (rad/s) until `span` (s)."""
     law = scene.body_torque
     found = [abs(Fraction(w)) for w in scene.omega]
     for axis, moment in enumerate(scene.moments or (1.0, 1.0, 1.0)):

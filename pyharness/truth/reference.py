@@ -84,7 +84,7 @@ def reference(
         scene.changing.check(times)
         if isinstance(scene.changing, InertiaFunction):
             scene = with_constant_body(scene)
-        # A tape has amplitudes of one frequency as a sum that is rounded to binary64.
+        # The law's tape rounds the sum of the amplitudes of one frequency to binary64.
         if isinstance(scene.torque, TorqueLaw) and scene.torque.in_space:
             scene = replace(scene, torque=of_law(scene.torque))
     _check_torque(scene)

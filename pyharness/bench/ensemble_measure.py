@@ -1,4 +1,4 @@
-"""Measurement of ensembles: speed at a target error, time per body against bodies, memory.
+"""Measurements of many bodies at once: speed at a target error, time by number of bodies, memory.
 
 Each contender uses the coarsest setting whose error on a sample is at most the target. Calls are
 interleaved in several rounds, and the shortest time counts, because other work of the machine can

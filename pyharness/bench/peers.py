@@ -190,7 +190,6 @@ def heyoka_equations(scene: Scene, formula: Formula | None = None) -> list[tuple
             "heyoka can't evaluate an opaque torque; allowed: a torque that can be recorded"
         )
     else:
-        # Without attitude, the None are not read.
         inputs = [heyoka.time, *state, *[None] * (7 - len(state))]
         found = evaluate(system_of(scene, attitude=False), inputs, heyoka_functions())
     found += quaternion_rates((x, y, z), q) if q else ()

@@ -1,7 +1,7 @@
 """Tolerances at which the checks run each method, and limits on its work.
 
-A work limit, a number of evaluations of the right-hand side, determines which tolerances are
-affordable; it bounds no error.
+A work limit is a number of evaluations of the right-hand side. It determines which tolerances are
+affordable, and bounds no error.
 """
 
 import math

@@ -29,9 +29,9 @@ def enclose_free(
     """Return balls that contain omega (rad/s) without torque at each of `times` (s).
 
     With `attitude`, four more balls contain the unit quaternion from body to space, scalar first
-    and continuous in time. Radii are at most 10**-`digits`; for omega in rad/s, times the largest
-    initial component if that exceeds 1 rad/s. The motion must be bounded; an attitude needs
-    moments. Raise InputError if 20 000 bits do not suffice.
+    and continuous in time. Their radii are at most 10**-`digits`. A radius of omega is at most
+    10**-`digits` rad/s, times the largest initial component if that exceeds 1 rad/s. The motion
+    must be bounded; an attitude needs moments. Raise InputError if 20 000 bits do not suffice.
     """
     scale = max(Fraction(1), *(abs(Fraction(w)) for w in scene.omega))
     bits = min(64 + math.ceil(digits * math.log2(10)), _MOST_BITS)

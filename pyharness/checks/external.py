@@ -240,9 +240,9 @@ def _program(problem: Problem, value: Value, program: str) -> _Result | None:
     """Return omega by a corrected program at the time of `value`, and a bound on its error.
 
     The step is halved until the estimated error is below a tenth of the published accuracy, or
-    below the rounding error, half a unit in the last place for each step. The estimate is twice the
-    change of the result by the last halving, divided by 2**order - 1. Return None if the
-    collocation matrix is singular even for the longest step.
+    below the rounding error, which is taken as half a unit in the last place for each step. The
+    estimate is twice the change of the result by the last halving, divided by 2**order - 1. Return
+    None if the collocation matrix is singular even for the longest step.
     """
     scene, time = problem.scene, float(value.time)
     finest_print = min(figure.accuracy for figure in value.omega if figure is not None)

@@ -67,7 +67,7 @@ FORMS = ("closed-form", "auto")
 
 @cache
 def _series(name: str) -> tuple[float, ...]:
-    """Return the result of one step for y' = y**2, y(0) = 1, as coefficients of powers of the step.
+    """Return a method's step for y' = y**2, y(0) = 1, as coefficients of powers of the step size.
 
     This is each of Euler's equations with A = B = C = 1 and equal components.
     """

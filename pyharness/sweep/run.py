@@ -155,7 +155,7 @@ _MOST_CHUNKS = 1_000_000
 
 @dataclass(frozen=True)
 class Outcome:
-    """The chunks that one run of a sweep computed, in `seconds`.
+    """The outcome of one run of a sweep, whose computation took `seconds` (s).
 
     `estimate` is None if no chunk was missing. `before` counts the chunks of earlier runs,
     `computed` the chunks of this run, and `repaired` those of this run that had been damaged.

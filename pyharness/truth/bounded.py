@@ -228,7 +228,7 @@ class _Statement(NamedTuple):
         return omega, attitude
 
     def _digits(self) -> int | None:
-        """Return the digits that make balls small against the estimate; None if more than 60."""
+        """Return how many digits make balls small against the estimate; None if more than 60."""
         largest = max(1.0, *(abs(float(x)) for row in self.omega for x in row))
         if not (0.0 < self.claimed < math.inf):
             # Omega is 0 at all times, or there is no estimate.

@@ -24,8 +24,8 @@ class Switches:
     """The results of the switches of a tape, in `results` by slot.
 
     A switch changes where its operand crosses a level: 0, or a whole number for a floor. `_levels`
-    has the slots whose operands are at a level: -1 if the result is the one above the level, 1 if
-    it is the one below.
+    has the slots whose operands are at a level: -1 if the switch has its result above the level, 1
+    if it has its result below.
     """
 
     def __init__(self, tape: TapeSeries) -> None:
@@ -35,7 +35,7 @@ class Switches:
         self._next: dict[int, int] = {}
 
     def settle(self) -> bool:
-        """Set the results by the values of the operands; return whether a result changed."""
+        """Correct the first result that contradicts its operand; return whether there was one."""
         for slot, is_floor, x in self._tape.operands_of_switches():
             level = x[0].to_integral_value() if is_floor else Decimal(0)
             if abs(x[0] - level) <= _ZERO * (1 + abs(x[0])):

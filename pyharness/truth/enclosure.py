@@ -39,8 +39,8 @@ def enclose(
     """Return balls that contain the solution of a scene at requested times.
 
     `times` (s) have one sign and lead away from 0; the first may be 0. A radius of omega is at most
-    10**-digits rad/s, times the largest component of omega if that exceeds 1 rad/s; for a closed
-    form, of the initial omega. `velocity` requests balls of the translational velocity (m/s),
+    10**-digits rad/s, times the largest component of omega if that exceeds 1 rad/s; a closed form
+    takes the initial omega instead. `velocity` requests balls of the translational velocity (m/s),
     `transition` balls of the transition matrix. The attitude is enclosed if the scene has one, the
     rotational energy if it has moments. `progress` receives the completed percentage of the time,
     100, and the time as text. `effort` is a factor on the limit of steps.

@@ -167,7 +167,6 @@ def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
 
 
 def _places(marks: Sequence[_Mark]) -> dict[tuple[str, str], float]:
-    """Return each problem's horizontal position, leaving space for the name of its kind."""
     names = dict.fromkeys((mark.kind, mark.circumstance) for mark in marks)
     places, place = {}, 0.0
     for kind in dict.fromkeys(kind for kind, _ in names):

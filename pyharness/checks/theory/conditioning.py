@@ -123,9 +123,9 @@ def sampled(
 ) -> tuple[Array, _Sample]:
     """Return equally spaced times up to `time` (s), between which the state changes little.
 
-    `sample` returns the largest rate (1/s) at given times, and results; the results at the returned
-    times are returned too. The first attempt has `fewest` intervals. Raise InputError if more than
-    `most` intervals are needed.
+    `sample` takes times, and returns the largest rate (1/s) at them and results. Return its results
+    at the returned times too. The first attempt has `fewest` intervals. Raise InputError if more
+    than `most` intervals are needed.
     """
     count = fewest
     while True:

@@ -123,7 +123,7 @@ def with_attitudes(loads: list[EnsembleLoad], seed: str) -> list[EnsembleLoad]:
 
 
 def own_ensembles() -> list[EnsembleContender]:
-    """Return our contenders."""
+    """Return our contenders for many bodies."""
     one, closed = EnsembleContender, _make_own("closed-form")
     return [
         one("closed-form", "none", closed, torque_free=True, attitude=True),

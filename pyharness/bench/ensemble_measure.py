@@ -1,4 +1,4 @@
-"""Measurement of ensembles: speed at a target error, time per body against bodies, memory.
+"""Measurements of many bodies at once: speed at a target error, time by number of bodies, memory.
 
 Each contender uses the coarsest setting whose error on a sample is at most the target. Calls are
 interleaved in several rounds, and the shortest time counts, because other work of the machine can
@@ -37,9 +37,8 @@ from pyharness.model.trajectory import Array
 TARGETS = (1e-6, 1e-12)
 STEPS = 300  # number of RK4 steps, where the rate is in steps per second
 ROUNDS = 9
-# Durations of a call (s). The number of bodies is increased after a call shorter than `_CALL`. It
-# is also increased after a call shorter than `_LONG_CALL` if the last increase raised the bodies
-# per second by more than half.
+# Durations of a call (s). The number of bodies is increased after a call shorter than `_CALL`, or
+# shorter than `_LONG_CALL` if the last increase raised the bodies per second by more than half.
 _CALL, _LONG_CALL = 0.03, 0.5
 SLOW = 0.3  # s; calls slower than this are timed in fewer rounds
 _BATCH = 0.02  # s; duration of the calls in a round
@@ -51,7 +50,7 @@ _GROWTH_ROUNDS = 5
 
 @dataclass(frozen=True)
 class Rate:
-    """The speed of one contender, with a number of threads, on one task."""
+    """The speed of one contender on one task, with a number of threads."""
 
     load: str
     target: float | None  # None where the steps were prescribed
@@ -107,9 +106,9 @@ class _Task:
         return self.target is not None or each.setting == "steps"
 
     def error(self, omega: Array) -> float:
-        """Return the largest error of omega, or of attitudes as an angle (rad), among the bodies.
+        """Return the largest error of a body: of omega or, if requested, of the attitude (rad).
 
-        That of omega is relative to the body's largest component at the start or the end. The
+        The error of omega is relative to the body's largest component at the start or the end. The
         result is infinite if a component is not finite.
         """
         n = min(len(omega), len(self.ends))
@@ -142,7 +141,7 @@ def measure_ensembles(
     progress: Progress = no_progress,
     least: int = 64,
 ) -> Rates:
-    """Measure the speed of all contenders on all loads, at all target errors.
+    """Return the measured speed of each contender on each load, at each target error.
 
     On the last load, RK4 contenders also run `STEPS` steps. `seed`, with which the loads were
     drawn, is only recorded. A call solves at least `least` bodies, or all if the load has fewer.
@@ -244,10 +243,10 @@ class Memory:
 
 
 def sizes(seed: str, most: int, progress: Progress = no_progress) -> list[Size]:
-    """Measure the run time per body for 1, 10, 100, ... up to `most` bodies.
+    """Return the run times per body (s) for 1, 10, 100, ... up to `most` bodies.
 
-    The bodies have a torque, except for the closed form, which is measured by `solve_many` and, as
-    "prepared", by a prepared solver.
+    The closed form is measured without torque, by `solve_many` and, as "prepared", by a prepared
+    solver. The other methods are measured with a torque.
     """
     free, pushed = draw(seed, most)
     found: list[Size] = []
@@ -273,7 +272,7 @@ def _prepared(load: EnsembleLoad) -> Callable[[], object]:
 
 
 def memory(bodies: int) -> list[Memory]:
-    """Measure the memory of a call for each of our methods.
+    """Return the memory that a call of each of our methods takes.
 
     Each method runs in a new process, because peak memory never decreases.
     """

@@ -132,7 +132,6 @@ def _batches(rows: Array, size: int) -> Array:
 
 
 def _numpy_rk4(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """Return an integration by RK4 on NumPy arrays, with a column for each body."""
     a, b, c = coefficients()
     starts, torques = load.omega0.T.copy(), load.acceleration.T.copy()
     found = np.empty_like(load.omega0)
@@ -172,7 +171,6 @@ def _numpy_rk4(load: EnsembleLoad, setting: float, threads: int) -> Callable[[],
 
 
 def _scipy_loop(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """Return an integration by SciPy's `solve_ivp`, body by body, on one thread."""
     from scipy.integrate import solve_ivp
 
     refuse_rounding("solve_ivp", setting)

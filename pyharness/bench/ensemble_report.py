@@ -20,7 +20,7 @@ _STYLES = {"prepared": "D-.", "closed-form": "o-", "taylor": "s--", "rk4": "^:"}
 
 @dataclass(frozen=True)
 class Ensembles:
-    """The speeds of all solvers; run times by number of bodies, and memory, of our methods."""
+    """The speeds of all solvers, and our methods' run times by number of bodies, and memory."""
 
     rates: Rates
     sizes: Sequence[Size]
@@ -36,7 +36,7 @@ def ensemble_report(found: Ensembles, packages: Iterable[str], command: str) -> 
 
 
 def ours_over(rows: Sequence[Rate], row: Rate) -> float | None:
-    """Return our fastest speed with as many threads over the speed in `row`; None without ours."""
+    """Return our fastest speed with as many threads over that of `row`; None without ours."""
     rates = [each.rate for each in rows if each.method in _STYLES and each.threads == row.threads]
     return max(rates) / row.rate if rates else None
 
@@ -125,7 +125,7 @@ def _record(found: Ensembles) -> dict[str, Any]:
 
 
 def size_picture(sizes: Sequence[Size]) -> Picture:
-    """Draw the time per body (ns) against the number of bodies."""
+    """Return the picture of the time per body (ns) against the number of bodies."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.5, 4.5), dpi=110, layout="constrained")

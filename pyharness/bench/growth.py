@@ -24,8 +24,9 @@ class Growth:
     """The Taylor method's error at one time, and the effect of rounding that time."""
 
     time: float  # s
-    # Both relative to the largest angular velocity: the largest difference from the closed form,
-    # from `_STARTS` initial states of the same motion; and the change by one rounding of the time.
+    # Relative to the largest omega: `error` is the largest difference from the closed form, from
+    # `_STARTS` initial states of the same motion; `conditioning` is the change by one rounding of
+    # the time.
     error: float
     conditioning: float
     steps: int  # number of steps of one integration

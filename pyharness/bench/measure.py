@@ -57,7 +57,8 @@ class Workload:
     label: str
     scene: Scene
     horizon: float  # end time T, s
-    # Only for scenes that are not cases: kinds, solution, error amplification, and revolutions.
+    # Only for scenes that are not cases: kinds, solution, error amplification, and number of
+    # revolutions.
     kinds: tuple[str, ...] = ()
     truth: Reference | None = None
     growth: float = 0.0
@@ -73,10 +74,10 @@ class Workload:
 
     @property
     def group(self) -> str:
-        """Return the name of the workload's group; mean ratios are those of a group.
+        """Return the name of the workload's group, over which ratios are averaged.
 
-        Groups differ in the end time; for 3 s, and with attitudes, also in whether there is a
-        torque.
+        A group has one end time. At 3 s, or if attitudes are requested, workloads with and without
+        torque are separate groups.
         """
         if self.horizon != HORIZON and self.scene.attitude is None:
             return f"T = {self.horizon:g}"
@@ -219,7 +220,7 @@ def error_of(end: End, truth: Reference, scale: float = 0.0) -> float | None:
 
 
 def relative_error(omega: Array, truth: Reference, scale: float = 0.0) -> float | None:
-    """Return the error of omega, relative to the larger of `scale` (rad/s) and the true components.
+    """Return the error of omega over `scale` (rad/s) or, if larger, the largest true component.
 
     The result is None if the error is not finite, or if the reference does not reach the end time.
     """
@@ -315,6 +316,5 @@ def _first_calls(
 
 
 def _at_rounding(errors: Sequence[float | None]) -> bool:
-    """Return whether `errors` no longer decrease because of rounding."""
     known = [error for error in errors if error is not None]
     return len(known) > 3 and min(known[-3:]) >= min(known[:-3]) and min(known) < 1e-10

@@ -1,7 +1,7 @@
 """Third-party integrators for `bench`, set up for speed as their documentation recommends.
 
-In the source of the Runge-Kutta methods that numba compiles, the right-hand sides contain the
-scene's numbers, and loops over stages are unrolled.
+numba compiles a Runge-Kutta method for each scene: the right-hand sides contain the scene's
+numbers, and the loop over stages is unrolled.
 """
 
 import warnings
@@ -23,7 +23,7 @@ from pyharness.model.tape import Functions, Table, evaluate
 from pyharness.model.trajectory import Array
 from pyharness.truth.reference import exact_coefficients
 
-# A torque about the body axes (N m), from time, omega, attitude, sine and cosine.
+# A torque about the body axes (N m), from time, omega, attitude, and the functions sin and cos.
 Formula = Callable[..., Sequence[Any]]
 MOST_STEPS = 10_000_000
 Tableau = tuple[Sequence[Sequence[float]], Sequence[float], Sequence[float]]
@@ -47,7 +47,7 @@ def peers() -> list[SceneContender]:
 
     return [
         adaptive("heyoka", "heyoka", heyoka_maker),
-        # Derivatives by the initial state, from which our error amplification comes too.
+        # With the derivatives by the initial state, which our error amplification needs too.
         adaptive("heyoka-variational", "heyoka", partial(heyoka_maker, variational=True)),
         fixed("rk4", 4),
         fixed("dop8", 8),
@@ -190,7 +190,6 @@ def heyoka_equations(scene: Scene, formula: Formula | None = None) -> list[tuple
             "heyoka can't evaluate an opaque torque; allowed: a torque that can be recorded"
         )
     else:
-        # Without attitude, the None are not read.
         inputs = [heyoka.time, *state, *[None] * (7 - len(state))]
         found = evaluate(system_of(scene, attitude=False), inputs, heyoka_functions())
     found += quaternion_rates((x, y, z), q) if q else ()

@@ -28,7 +28,7 @@ _SLOPES = (2, 4, 8)
 
 
 def bench_picture(finding: Finding, data: Table) -> Picture:
-    """Draw error against run time and number of right-hand sides, a row for each workload."""
+    """Return the picture of errors against run time and evaluations, a row for each workload."""
     from matplotlib.figure import Figure
 
     count = len(finding.workloads)
@@ -111,7 +111,6 @@ def draw_slopes(axes: "Axes") -> None:
         end = min(begin * (high / begin) ** 0.7, begin * 10.0 ** (6.0 / order))
         last = 0.5 * (end / begin) ** -order
         axes.plot([begin, end], [0.5, last], color="#909090", linewidth=1.0, zorder=0)
-        # A background makes the label legible if a curve crosses it.
         axes.annotate(
             f"order {order}", (end, last), (0, -2), textcoords="offset points", color="#505050",
             fontsize=8, ha="center", va="top", zorder=5,
@@ -121,7 +120,7 @@ def draw_slopes(axes: "Axes") -> None:
 
 
 def growth_picture(found: "Mapping[int, Sequence[Growth]]") -> Picture:
-    """Draw, for each case, the Taylor method's error and the effect of rounding the time."""
+    """Return the picture of the Taylor method's error and the effect of rounding the time."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(4.5 * len(found), 4.0), dpi=110, layout="constrained")

@@ -1,8 +1,8 @@
 """Random scenes of several kinds, on which no method was tuned.
 
 Torques and frequencies scale with the initial angular velocity, so that they affect slow and fast
-bodies alike. A seed and a number determine a scene. The second reference (`integer_series`)
-computes its motion, on which it depends whether the scene is accepted or drawn again.
+bodies alike. A seed and a number determine a scene. Its motion, by the second reference
+(`integer_series`), determines whether the scene is accepted or drawn again.
 """
 
 import math
@@ -39,7 +39,7 @@ KINDS = ("all", *LAWS, *SPEEDS, *BODIES, *_LENGTHS)
 
 
 def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
-    """Return the workload of a seed and a number, from 1.
+    """Return the workload that `seed` and `number`, from 1 on, determine.
 
     The kind of torque changes with the number. A scene is drawn again if its error amplification is
     `MOST_GROWTH` or more, or if the body makes less than 1 or more than 300 revolutions. With

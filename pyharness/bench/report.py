@@ -99,7 +99,6 @@ def _random(finding: Finding) -> bool:
 
 
 def _spread_data(finding: Finding) -> Table:
-    # The quartiles are the last field of a Spread.
     rows = [[*fields, *quartiles] for *fields, quartiles in map(astuple, spreads(finding, KINDS))]
     names = "method kind target scenes reached mean smallest lower_quartile median upper_quartile"
     return numbers(names, rows)

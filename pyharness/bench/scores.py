@@ -1,4 +1,4 @@
-"""Scores: times to reach target errors, and ratios of the time of a baseline contender to them."""
+"""Scores: contenders' times to reach target errors, and a baseline's times divided by them."""
 
 import math
 from collections.abc import Sequence

@@ -1,12 +1,12 @@
-"""Checks that the Fortran port of each program and its twin agree bit for bit.
+"""Checks that the Fortran port of each program and its Python twin agree bit for bit.
 
-The twin is the Python version. A cell is a combination of a program, a case of Table 1 of the
-thesis, defects and readings. The cells are also checked in our arithmetic of machine words, which
-has the mantissa length and the rounding of a machine, such as the 48 bits of the CDC.
+A cell is a combination of a program, a case of Table 1 of the thesis, defects and readings. The
+cells are also checked in our arithmetic of machine words. It has the length and the rounding of a
+machine's numbers, such as the 48 bits of the CDC.
 
-A deck, compiled from the author's cards, shares no code with port and twin. Its TAPE5, the file of
-all steps, is compared with the port bit for bit, its printed page as text. After an overflow the
-port ends its run; the deck continues, but must not produce finite omega.
+A deck is compiled from the author's cards, and shares no code with port and twin. Its TAPE5, the
+file of all steps, must equal the port's rows bit for bit; its printed page must equal the port's.
+After an overflow the port ends its run. The deck continues, but must not produce finite omega.
 """
 
 from collections.abc import Iterator, Sequence
@@ -36,8 +36,8 @@ from pyharness.thesis.programs import BINARY64, PROGRAM_REGISTRY, run_program
 from pyharness.thesis.vectors import answers
 from pyharness.thesis.word import WORDS
 
-# Evaluations of the right-hand sides in a step: at the start and each collocation point, or at four
-# stages. The step that overflows counts too.
+# Evaluations of the right-hand sides in a step. Collocation evaluates them at the start and at each
+# collocation point. The step that overflows counts too.
 _EVALUATIONS = {"two-term": 3, "four-term": 5, "runge-kutta": 4}
 
 
@@ -73,10 +73,9 @@ def _of_draw(seed: str, number: int, name: Name) -> Check:
 def _agreement(
     listing: Listing, scene: Scene, is_listed: bool, options: Sequence[Any], name: Name
 ) -> Check:
-    """Return the check that Fortran and Python agree or, if `is_listed` as different, still differ.
+    """Return the check that Fortran and Python agree, or differ if `is_listed` as a divergence.
 
-    `options` are the constant of the stop test (1/s), and
-    whether the test may end the run.
+    `options` has the constant of the stop test (1/s), and whether the test may end the run.
     """
     run = PROGRAM_REGISTRY[listing.program].run
     compiled, twin = (run(scene, listing, language, *options) for language in ("fortran", "python"))
@@ -104,10 +103,10 @@ _VECTORS = Basis(
 def words(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks of our arithmetic of machine words, bit for bit.
 
-    Test vectors are CDC instructions with expected results. In each cell, our arithmetic with 53
-    bits must agree with floats; for each other word, the compiled program must agree with its
-    Python version. If `chosen.only` is empty, only some listings are checked: against floats those
-    with at most one change, in other words the original and the corrected one.
+    The first check compares CDC instructions with their expected results. In each cell, our
+    arithmetic with 53 bits must agree with floats. For every other word, the compiled program must
+    agree with its Python version. If `chosen.only` is empty, only the original and the corrected
+    listing are checked; against floats also listings with a single defect or reading.
     """
     yield Attempt(Name("words", "vectors"), _vectors)
     for listing, case in all_cells():
@@ -129,7 +128,7 @@ def _vectors(name: Name) -> Check:
 
 
 def _in_word(listing: Listing, case: int, word: str | None, name: Name) -> Check:
-    """Return the check of the Python version in `word` against Fortran; if None, against floats."""
+    """Return the check of Python in `word` against Fortran; if `word` is None, against floats."""
     scene = case_scene(case)
     ours = in_word.run(scene, listing, WORDS[word or BINARY64])
     if word is None:
@@ -140,12 +139,12 @@ def _in_word(listing: Listing, case: int, word: str | None, name: Name) -> Check
     return name.judged(not found, ", ".join(found), distance(ours, other), 0.0, BITS)
 
 
-_AT_ONCE = 2
+_AT_ONCE = 2  # decks that are compiled and run at once
 _THIN = ("two-term/case-3/original", "four-term/case-7/corrected", "runge-kutta/case-2/original")
 
 
 def listings(program: str) -> list[Listing]:
-    """Return the original and the corrected listing, and both with each single defect changed."""
+    """Return the original and corrected listings, and both with one defect or reading changed."""
     names = frozenset(switches(program))
     found = [Listing.original(program), Listing.corrected(program)]
     found += [Listing(program, frozenset([name])) for name in switches(program)]

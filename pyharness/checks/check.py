@@ -35,10 +35,10 @@ BITS = Basis(
 
 @dataclass(frozen=True)
 class Name:
-    """The name of a check, whose id joins the parts by slashes, as in ``cells/two-term``.
+    """The name of a check. Its id joins the parts by slashes, as in ``cells/two-term``.
 
     `suite` is a kind of checks of `verify`, or a trial of `stress`. `subject` is a program or
-    method, `circumstance` names the problem (`scene` holds it, if it is one), `setting` is a
+    method. `circumstance` names the problem; if this is a scene, `scene` holds it. `setting` is a
     tolerance, step size or listing, and `quantity` the compared number. `command` (``verify`` or
     ``stress``), the id and `options` form the command that repeats the check.
     """
@@ -106,8 +106,8 @@ class Check:
     basis: Basis | None  # why the limit has this value
     note: str = ""  # fault or observation, in a few words
     again: str = ""  # command that repeats the check, if not the name's
-    # Returns the error bound of the reference, if one was used, in the unit of the value. It is
-    # computed when first reported.
+    # Returns the error bound of the reference solution in the unit of `value`, or None without
+    # one. It is called only when the check is reported.
     reference_bound: Callable[[], ErrorBound | None] | None = field(
         default=None, compare=False, repr=False
     )
@@ -152,7 +152,7 @@ _OF_ANY = len(fields(Check))
 
 @dataclass(frozen=True)
 class Sample(Check):
-    """A check in a random scene; reports group such checks by its three fields."""
+    """A check in a random scene; reports group such checks by the three fields below."""
 
     entrance: str = ""  # call that solved the scene, as in ``solve-taylor``
     tolerance: float = math.nan
@@ -210,8 +210,8 @@ def run_suites(
 ) -> Iterator[Check]:
     """Yield the requested checks of all suites (kinds of checks).
 
-    An exception becomes a failed check, except NotBuiltError and, in the suites `of_the_user`,
-    which test a user's input, InputError; these two are raised.
+    An exception becomes a failed check. Only NotBuiltError is raised, and InputError in the suites
+    `of_the_user`, which read files of the user.
     """
     for suite, attempts in suites.items():
         raised = (NotBuiltError, InputError) if suite in of_the_user else (NotBuiltError,)
@@ -228,7 +228,7 @@ def requested_suites(suites: Iterable[str], only: Sequence[str]) -> list[str]:
 
 
 def severity(check: Check) -> tuple[bool, float]:
-    """Return a sort key: passed before failed checks, each by the ratio of value to limit."""
+    """Return a sort key: passed before failed checks, then by the ratio of value to limit."""
     if check.value is None or check.limit is None or check.value == check.limit == 0.0:
         return not check.passed, 0.0
     ratio = abs(check.value) / check.limit if check.limit else math.inf

@@ -1,8 +1,8 @@
 """Amplification of perturbations by the programs, and step sizes at which runs diverge.
 
-The amplification by a step is measured in a run, and derived exactly in `theory.amplification`;
-limits therefore allow for rounding only. Linear stability predicts the step sizes of divergence. J
-is the Jacobian of Euler's equations (13-15 of the thesis).
+The amplification by a step is measured in a run, and derived exactly in `theory.amplification`. The
+two may therefore differ by rounding errors only. The step sizes of divergence are compared with
+those that linear stability predicts. J is the Jacobian of Euler's equations (13-15 of the thesis).
 """
 
 import math
@@ -36,14 +36,14 @@ from pyharness.thesis.programs import PROGRAM_REGISTRY
 # Degree of a step's result as a polynomial of omega; each stage that depends on a previous one
 # doubles the degree.
 _DEGREE = {"two-term": 4, "four-term": 4, "runge-kutta": 16}
-# Roundings along the longest chain of operations in a step, without linear systems: four stages of
-# a rate and a sum, with seven each, and the result.
+# Number of roundings along the longest chain of operations in a step, without linear systems: seven
+# in each of four stages (a rate and a sum), and those of the result.
 _LONGEST = 40.0
-# Largest distance, divided by omega, of the neighbours from which a derivative is computed.
+# A derivative is computed from neighbours of omega. This is their largest distance over omega.
 _REACH = 2.0**-2
 _GROWTH_STEPS = 64
-# Bounds of the sum of absolute weights for any collocation points. The weights are largest, 2, -1
-# or 4, -6, 4, -1, where rates at points far beyond the step are extrapolated to its beginning.
+# Bounds on the sum of the rates' absolute weights, for any collocation points. The sum is largest
+# for points far beyond the step, with the weights 2, -1 or 4, -6, 4, -1.
 _WEIGHTS = {"two-term": 3.0, "four-term": 15.0}
 
 ROUNDED = Basis(
@@ -94,8 +94,8 @@ def eigenvalues(scene: Scene) -> Array:
 def first_step(scene: Scene, listing: Listing) -> Probe:
     """Return the 3 x 3 derivative of the first step at a steady rotation, measured and derived.
 
-    A step is a polynomial of known degree, so its derivative from differences over enough
-    neighbours is exact except for rounding.
+    A step is a polynomial of omega with known degree. Differences over enough neighbours therefore
+    give its derivative exactly, except for rounding.
     """
 
     def stepped(omega: Array) -> Array:
@@ -136,7 +136,7 @@ def later_steps(scene: Scene, listing: Listing) -> Probe:
 def complex_step(listing: Listing, step: int, z: complex) -> Probe:
     """Return the growth factor of a collocation step on x' = z x, measured and derived.
 
-    The step, of 1 s, is number `step` of a run of the Python port.
+    The step, of 1 s, is number `step` of a run of the Python version.
     """
     program = listing.program
     moved = _moved(listing, step)
@@ -157,9 +157,9 @@ def complex_step(listing: Listing, step: int, z: complex) -> Probe:
 def observed_boundary(listing: Listing, direction: complex) -> Probe:
     """Return the distance of z from 0 at which perturbations begin to grow, measured and derived.
 
-    z, the step size times an eigenvalue of J, is bisected along `direction`, -1 or 1j, over runs of
-    a spinning top. The change of omega from step to step is measured instead of omega, because with
-    the defect `base-not-restored` a constant part of omega might hide the growth.
+    z is the step size times an eigenvalue of J. The distance is bisected along `direction`, -1 or
+    1j, in runs of a spinning top. With the defect `base-not-restored` a constant part of omega
+    might hide the growth; the change of omega from step to step is then measured instead.
     """
     matrix = amplification(listing)
     expected, slope = boundary(matrix, direction)
@@ -280,10 +280,11 @@ DOUBLING = Basis(
 def divergence(
     scene: Scene, time: float, matrix: Amplification, runner: Runner, smallest: float
 ) -> tuple[float, float, float]:
-    """Return two step sizes (s) of divergence, and a bound on their relative difference.
+    """Return measured and predicted step size (s) of divergence, and a bound on their difference.
 
-    The body spins about axis 3, which is stable, for `time` (s). The first step size is that of
-    `smallest_divergent`; with the second, by linear theory, the wobble about axis 3 doubles.
+    The bound is relative to the predicted step size. The body spins for `time` (s) about axis 3,
+    which is stable. `smallest_divergent` measures the first step size. With the second, linear
+    theory predicts that the wobble about axis 3 doubles.
     """
     found = smallest_divergent(scene, time, runner, smallest)
     a, b, c = scene.euler_coefficients
@@ -331,7 +332,7 @@ def smallest_divergent(scene: Scene, time: float, runner: Runner, smallest: floa
 def _doubling(
     matrix: Amplification, rate: float, time: float, smallest: float, missed: float = 0.0
 ) -> float:
-    """Return the smallest step (s) with which, by theory, a wobble grows by 2 exp(`missed`).
+    """Return the smallest step (s) with which, by theory, a wobble grows 2 exp(`missed`) times.
 
     `missed` allows for a peak between two steps; `rate` is the angular frequency (1/s) of the
     wobble.

@@ -1,7 +1,7 @@
 """Checks of every method against published results that were not computed here.
 
-The limit is the sum of three parts: the accuracy of the published number, the method's error, and
-the effect of rounding the problem's numbers to binary64.
+The limit is the sum of three parts: the accuracy of the published number, a bound on the method's
+error, and the effect of rounding the problem's numbers to binary64.
 """
 
 import math
@@ -44,8 +44,9 @@ _FEWEST_STEPS, _MOST_STEPS = 4, 2**16
 _HALF_ULP = 2.0**-53
 # Two roundings: a number is rounded when it is read, and again when a method uses it.
 _ROUNDING = 2.0 * _HALF_ULP
-_STEP_ASIDE = 2.0**-30
-# `auto` chooses a suitable method, and `closed-form` evaluates a formula.
+_STEP_ASIDE = 2.0**-30  # relative change of a number, by which its effect is measured
+# These methods must solve users' problems too: `auto` chooses a suitable method, and `closed-form`
+# evaluates a formula.
 _MAY_NOT_REFUSE = ("auto", "closed-form")
 
 _PUBLISHED = Basis(
@@ -88,8 +89,8 @@ def _triples(triple: Triple | None, part: float) -> Iterator[Triple]:
 def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> Iterator[Check]:
     """Yield checks of each method that accepts a problem: ``external/<problem>/<time>/<method>``.
 
-    Value (the error) and limit, in the problem's unit, are those of the component of omega with the
-    largest ratio of the two.
+    Value is the error of a component of omega, in the problem's unit. Of the three components, the
+    one with the largest ratio of value to limit is reported.
     """
     for problem in problems:
         # Values are always solved together, so that repeating one check gives the same bits.
@@ -121,7 +122,7 @@ def _names(
 
 
 def _without(problem: Problem, name: Name, refusal: str, value: Value) -> Check:
-    """Return the check of a method without result; only a user's problem may be refused."""
+    """Return the check of a method without a result; only a user's problem may be refused."""
     given = problem.path is not None and name.subject not in _MAY_NOT_REFUSE
     if refusal:
         return name.judged(given, f"{REFUSED}{refusal}")
@@ -219,7 +220,7 @@ def _as_far_as_solved(
 
 
 def _results(problem: Problem, method: str, values: Sequence[Value]) -> list[_Result | None]:
-    """Return omega and its error bound (rad/s) at each value; None for a singular program."""
+    """Return omega and its error bound (rad/s) at each value; None if a matrix is singular."""
     if method in PROGRAMS:
         return [_program(problem, value, method) for value in values]
     scene, times = problem.scene, [float(value.time) for value in values]
@@ -239,9 +240,9 @@ def _program(problem: Problem, value: Value, program: str) -> _Result | None:
     """Return omega by a corrected program at the time of `value`, and a bound on its error.
 
     The step is halved until the estimated error is below a tenth of the published accuracy, or
-    below the rounding error, half a unit in the last place for each step. The estimate is twice the
-    change of the result by the last halving, divided by 2**order - 1. Return None if the
-    collocation matrix is singular even for the longest step.
+    below the rounding error, which is taken as half a unit in the last place for each step. The
+    estimate is twice the change of the result by the last halving, divided by 2**order - 1. Return
+    None if the collocation matrix is singular even for the longest step.
     """
     scene, time = problem.scene, float(value.time)
     finest_print = min(figure.accuracy for figure in value.omega if figure is not None)
@@ -254,7 +255,6 @@ def _program(problem: Problem, value: Value, program: str) -> _Result | None:
         if rows.ier is not None and rows.ier.any():
             # LEQT1F finds the matrices of tiny steps singular; the program then has order 1.
             break
-        # With too long steps a run may overflow.
         ended = rows.ended
         omega = rows.omega[-1] if ended == "complete" else None
         if omega is not None and before is not None:

@@ -175,7 +175,6 @@ def _value(entry: object, sequence: object) -> Value:
 def _pointing(
     where: str, entry: dict[str, Any], sequence: object, good_to: float
 ) -> Pointing | None:
-    """Return the attitude in a `[[value]]` entry, from a quaternion or Euler angles, or None."""
     given = [key for key in ("attitude", "angles_deg") if key in entry]
     if not given:
         return None
@@ -185,7 +184,7 @@ def _pointing(
     count, prints = {"attitude": 4, "angles_deg": 3}[key], entry[key]
     if not isinstance(prints, list) or len(prints) != count:
         raise InputError(f"{where}: {key} must be a list of {count} texts")
-    # Beside an omega, `good_to` is the accuracy of omega and not of the attitude.
+    # If an omega is given too, `good_to` is its accuracy and not that of the attitude.
     alone = 0.0 if "omega" in entry else good_to
     figures = [figure(f"{where}: {key}", text, alone) for text in prints]
     values = [float(each.value) for each in figures]

@@ -93,8 +93,8 @@ def golden(chosen: Selection) -> Iterator[Attempt]:
 
     Methods with a tolerance must agree with the record within twice the tolerance, because
     processors and compilers round differently. Programs and all other methods must agree bit for
-    bit or, if another mathematical library computes the torque's sines and cosines, within the
-    amplified rounding errors.
+    bit. If another mathematical library computes the torque's sines and cosines, they must agree
+    within the amplified rounding errors.
     """
     if not chosen.record.is_dir():
         return
@@ -134,7 +134,6 @@ def _compared(
         return name.judged(False, moved, limit=0.0, basis=_RECORD)
     old, new = _rows(entry), _rows(now)
     away = math.inf
-    # Step, time and TIME must be equal.
     same_times = old.shape == new.shape and np.array_equal(old[:, :3], new[:, :3])
     if same_times and entry["ended"] == now["ended"]:
         scale = float(np.abs(run.omega).max(initial=0.0)) or 1.0
@@ -166,7 +165,7 @@ def read_record(folder: Path) -> dict[str, dict[str, Any]]:
 def update(folder: Path) -> tuple[dict[str, bytes], list[str]]:
     """Return the files of a new golden record, by name, and its differences from the old record."""
     known: dict[str, dict[str, Any]] = {}
-    # If the old record is damaged, every trajectory is new.
+    # Beside a damaged old record, every trajectory counts as new.
     with suppress(InputError):
         known = read_record(folder) if folder.is_dir() else {}
     entries = {entry["command"]: entry for file in known.values() for entry in file["trajectory"]}

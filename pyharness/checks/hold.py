@@ -1,8 +1,9 @@
 """Checks of methods against the true solution of a scene, within bounds derived beforehand.
 
-Errors of the programs of the thesis are reported without a bound. The `flow` of a scene is its
-error amplification and rounding. `auto`, `quick` and all methods without a tolerance run as
-prepared solvers, which return the refusal of a scene; the other methods raise InputError.
+Errors of the programs of the thesis are reported without a bound. The `flow` of a scene holds its
+error amplification and a bound on rounding errors. `auto`, `quick` and all methods without a
+tolerance run as prepared solvers. These report a refused scene in their result; the other methods
+raise InputError.
 """
 
 import math
@@ -66,7 +67,7 @@ FORMS = ("closed-form", "auto")
 
 @cache
 def _series(name: str) -> tuple[float, ...]:
-    """Return the coefficients of powers of the step in one step of y' = y**2, y(0) = 1.
+    """Return a method's step for y' = y**2, y(0) = 1, as coefficients of powers of the step size.
 
     This is each of Euler's equations with A = B = C = 1 and equal components.
     """
@@ -122,10 +123,11 @@ def check_methods(
     """Yield deferred checks of each method's error at `time` (s) in the scene of `name`.
 
     By default, the limit is the sum of the amplified tolerance, the amplified rounding error, and
-    the error of the true solution. For a fixed step without torque, a bound from the order replaces
-    the tolerance. There is no limit if neither tolerance nor bound is known, or if the sum leaves
-    fewer than two digits of omega. Without torque, energy and momentum always have a limit, because
-    their errors are not amplified. A method fails if it refuses a scene that it must solve.
+    the error of the true solution. For methods with a fixed step, without torque, a bound from the
+    order replaces the tolerance. There is no limit if neither tolerance nor bound is known, or if
+    the sum leaves fewer than two digits of omega. Without torque, energy and momentum always have
+    a limit, because their errors are not amplified. Refusing a scene is a failure, unless
+    `refusable` permits it.
     """
     scene = scene_of(name)
     known = cache(partial(truth, scene, time))
@@ -155,7 +157,7 @@ def _steps(scene: Scene, time: float) -> int:
 def refusable(tried: MethodRun, truth: Truth, why: str) -> bool:
     """Return whether a method may refuse a scene.
 
-    `closed-form` may refuse a scene without a closed form, `quick` any scene, and a series method a
+    `quick` may refuse any scene; `closed-form`, a scene without a closed form; a series method, a
     scene in which the phase of a torque's wave exceeds 1e8 rad.
     """
     method, scene = tried.method, tried.scene

@@ -32,7 +32,7 @@ MOST = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """A method's results, at all times or the last, or its refusal."""
+    """A method's results at all times or at the last time, or its refusal."""
 
     omega: Array = field(default_factory=lambda: np.empty((0, 3)))  # shape (n, 3), rad/s
     attitude: Array | None = None  # shape (n, 4), if requested
@@ -71,7 +71,7 @@ class MethodRun:
 
 
 def by_rows(method: str, tolerance: float, scene: Scene, times: Sequence[float]) -> MethodRun:
-    """Return a deferred run of a method by `solve` at all `times` (s), with any attitude."""
+    """Return a deferred run of a method by `solve` at all `times` (s)."""
     candidate = method_candidate(method, tolerance)
 
     def ask() -> Answer:
@@ -162,7 +162,7 @@ class Truth:
 
 
 def unknown_flow(largest: float) -> Conditioning:
-    """Return an infinite amplification, for closed forms, whose limits do not use it."""
+    """Return a conditioning of infinite amplification, for closed forms, whose limits ignore it."""
     return Conditioning(math.inf, MOST, MOST, MOST, largest)
 
 
@@ -198,7 +198,10 @@ class Policy:
 
 
 def allowed(truth: Truth, made: float, growth: float, steps: float = 0.0) -> float:
-    """Return the limit: the steps' error `made` times `growth`, rounding and the truth's error."""
+    """Return the limit: the steps' error `made` times `growth`, rounding, and the truth's error.
+
+    `steps` is the number of uncompensated roundings of omega.
+    """
     if truth.attitude is not None:
         return truth.flow.angle_limit(made * growth, truth.end) + truth.angle_error
     return replace(truth.flow, amplification=growth).limit(made, steps) + truth.relative_error
@@ -221,7 +224,7 @@ def tolerance_of(tried: MethodRun) -> float:
 
 
 def has_no_form(tried: MethodRun, truth: Truth, why: str) -> bool:
-    """Return whether `closed-form` or `quick` refuses a scene for which its formula fails."""
+    """Return whether `closed-form` or `quick` refused a scene to which its formula can't apply."""
     if tried.method == "quick":
         return why == "quick: refused" and not all(tried.scene.euler_coefficients)
     return tried.method == "closed-form" and closed_form(tried.scene) is None

@@ -28,8 +28,8 @@ _RANDOM = (random_programs, random_methods, random_attitudes, random_torques)
 KINDS: dict[str, Callable[[Selection], Attempts]] = {
     # Fortran against the Python twin: all bits of the trajectory, the counters, and the stop.
     "cells": cells,
-    # Machine words: test vectors of the CDC, binary64 against the processor, and compiled programs
-    # against twins in other words.
+    # Arithmetic of machine words: test vectors of the CDC; our binary64 against the processor's;
+    # for the other words, compiled programs against their twins.
     "words": words,
     # The decks, compiled from the author's cards, against the Fortran port: TAPE5 and the page.
     "decks": decks,
@@ -37,20 +37,20 @@ KINDS: dict[str, Callable[[Selection], Attempts]] = {
     "schemes": schemes,
     # Step and reason of the Runge-Kutta program's stop, against the formula of its test.
     "stops": stops,
-    # Against the reference, within the requested tolerance.
+    # Omega against the reference, within the requested tolerance.
     "methods": methods,
     "prepared": prepared,
-    # Against the reference, in the cases and by prepared solvers.
+    # The attitude against the reference, by `solve` and by prepared solvers.
     "attitudes": attitudes,
-    # Corrected programs against `solve_ivp`, fixed-step methods against the reference, as the step
-    # is halved.
+    # Orders, from errors as the step is halved: corrected programs against `solve_ivp`, fixed-step
+    # methods against the reference.
     "orders": orders,
-    # In scenes drawn from a seed, half of them of the difficult kinds in `NASTY`; methods also
-    # under torques that depend on omega or attitude.
+    # Programs and methods in scenes drawn from a seed, half of them of the difficult kinds in
+    # `NASTY`. Methods also under torques that depend on omega or attitude.
     "random": lambda chosen: chain.from_iterable(each(chosen) for each in _RANDOM),
-    # Against published results that were not computed here.
+    # Programs and methods against published results that were not computed here.
     "external": _external,
-    # Against trajectories of an earlier run.
+    # Programs and methods against trajectories of an earlier run.
     "golden": golden,
 }
 # These kinds read files that the user may specify.

@@ -1,11 +1,11 @@
 """Checks of methods against the high-precision reference in the cases of Table 1.
 
-Limits are tolerances; those of omega are relative to the largest omega, those of attitudes angles
-(rad).
+The limit of an error is the requested tolerance. Errors of omega are relative to the largest omega,
+errors of the attitude are angles (rad).
 
-An order is the power of the step size with which errors decrease. To measure orders, omega of the
-programs is compared with `solve_ivp`; the programs' translational velocity and the methods with a
-fixed step are compared with the reference.
+An order is the power of the step size to which errors are proportional. To measure orders, omega of
+the programs is compared with `solve_ivp`. The programs' translational velocity and the methods with
+a fixed step are compared with the reference.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -51,8 +51,8 @@ START: Quaternion = (0.5, -0.1, 0.7, 0.5)
 # Times (s): one that is long after the end of the cases, and those for prepared solvers.
 _LATER = 3.0
 _ENDS = (1.0, 3.0, -1.0)
-# Methods with a tolerance, and those that propagate the attitude. The torques of the cases are not
-# weak.
+# Methods with a tolerance, and those that propagate the attitude; without those for weak torques,
+# which no case has.
 _TOLERANT = {x: each for x, each in METHODS.items() if each.finest < 1.0 and x != "reference"}
 _SOLVED = tuple(name for name, each in _TOLERANT.items() if not each.weak_torque)
 _TURNED = tuple(name for name in _SOLVED if METHODS[name].attitude)
@@ -131,7 +131,7 @@ def run_of_solve(method: str, tolerance: float, scene: Scene, times: Sequence[fl
 
 
 def run_of_call(method: str, tolerance: float, scene: Scene, time: float) -> MethodRun:
-    """Return a deferred call of a prepared solver to `time` (s), after another initial omega."""
+    """Return a deferred call of a prepared solver to `time` (s), after one with another omega."""
     candidate = prepared_candidate(method, tolerance, primed=True, attitude=bool(scene.attitude))
     return by_end(method, candidate, tolerance, scene, time)
 
@@ -155,8 +155,8 @@ def _same_steps(scene: Scene, name: Name) -> Check:
 
 # The method of solve_ivp that serves as true solution, at its finest tolerance.
 _IVP = "dop853"
-# Number of successive halvings that must show the order, and the accepted deficit of the last
-# order; .006 occurs.
+# Number of successive halvings of the step that must show the order, and how much the last measured
+# order may be too low.
 _PAIRS = 4
 _ORDER_SLACK = 0.2
 _SLACK = Basis(
@@ -211,12 +211,12 @@ def _order_of_method(scene: Scene, method: str, truth: Reference, **limits: Any)
 
 
 def in_few_steps(scene: Scene, time: float) -> Scene:
-    """Return the scene with the coarsest steps to measure orders: `_FEWEST` until `time` (s)."""
+    """Return the scene with `_FEWEST` steps until `time` (s), the coarsest for measuring orders."""
     return replace(scene, step_size=time / _FEWEST, steps=_FEWEST)
 
 
 def order_if_seen(scene: Scene, truth: Callable[[], Reference], name: Name) -> Check:
-    """Return the check of the order of a fixed-step method, the setting or subject of `name`.
+    """Return the check of the order of the fixed-step method in `name`.
 
     The order is reported, but not checked, if the scene is too fast or sensitive for 4096 steps, or
     if the torque has a table, because steps across its changes lower the order.
@@ -231,14 +231,13 @@ def order_if_seen(scene: Scene, truth: Callable[[], Reference], name: Name) -> C
 
 
 def judged_order(name: Name, found: Order) -> Check:
-    """Return the check that an order is at most `_ORDER_SLACK` too low, or errors only rounding."""
+    """Return the check that an order is at most .2 too low, or all errors are rounding errors."""
     missing = None if found.value is None else found.due - found.value
     passed = found.state in ("as due", "rounding") and (missing or 0.0) <= _ORDER_SLACK
     return name.judged(passed, str(found), missing, _ORDER_SLACK, _SLACK)
 
 
 def _by_ivp(scene: Scene) -> Reference:
-    """Return the solution by `solve_ivp`, with its tolerance (rad/s) as error."""
     tolerance = 1.01 * finest(_IVP, scene, scene.times()[-1])
     run = method_candidate(_IVP, tolerance).rows(scene)
     largest = float(np.abs(run.omega).max())

@@ -126,7 +126,7 @@ def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Ite
 
 
 def refuse_port(command: str) -> None:
-    """Raise InputError that advises `--port` if `command`, no integrator, answers as a port."""
+    """Raise InputError that advises `--port` if the integrator `command` answers as a port."""
     cell = port_cells(PROGRAMS, (1,), ())[0]
     read = partial(read_answer, steps=cell.scene.steps)
     refuse_other(command, "--integrator", "--port", cell.request, read)
@@ -141,7 +141,7 @@ def replay_command(command: str, cell: Cell | None = None) -> str:
 def compared(
     cell: Cell, twin: Trajectory, line: bytes, again: str = "", seconds: float | None = None
 ) -> PortCheck:
-    """Return the check that an answer agrees with `twin`; raise PortError if it is invalid."""
+    """Return the check that an answer agrees with `twin`; raise PortError for an invalid answer."""
     answer = read_answer(line, cell.scene.steps)
     found = differences(twin, answer)
     wanted = _rows(twin)
@@ -171,7 +171,10 @@ def differences(twin: Trajectory, answer: Answer) -> list[str]:
 
 
 def _difference(wanted: Array, given: Array) -> dict[str, Any] | None:
-    """Return the values in the first step that differs, in hexadecimal; JSON has no inf and nan."""
+    """Return the values in the first step that differs, or None.
+
+    They are in hexadecimal, because JSON has no inf and nan.
+    """
     for step, (due, row) in enumerate(zip(wanted, given, strict=False), 1):
         if ulps(due, row):
             values = []
@@ -206,7 +209,7 @@ _TIMES = (
 
 
 def port_report(command: str, checks: Sequence[PortCheck], asked: int, seed: str) -> Report:
-    """Return the report of at least one check of a port."""
+    """Return the report of the checks of a port, of which there is at least one."""
     title = [f"{command}: against the twins, bit for bit"]
     title += [f"seed of the random scenes: {seed}"] if seed else []
     if checks[-1].value is None:

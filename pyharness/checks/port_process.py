@@ -47,7 +47,10 @@ def split_command(command: str, option: str = "--port") -> list[str]:
 def refuse_other(
     command: str, option: str, instead: str, line: bytes, read: Callable[[bytes], object]
 ) -> None:
-    """Raise InputError that advises the option `instead` if `command` answers its request."""
+    """Raise InputError that advises the option `instead` if `command` answers that one's requests.
+
+    `line` is such a request, and `read` raises PortError for an invalid answer.
+    """
     with contextlib.suppress(PortError), PortProcess(command, _PROBE, option) as process:
         read(process.ask(line))
         raise InputError(f"{option} {command}: answers requests of {instead}; give it to {instead}")
@@ -57,8 +60,7 @@ def _processes_with(mark: str) -> list[int]:
     """Return the live processes with `mark` in their environment; none without /proc."""
     found = []
     for folder in Path("/proc").glob("[1-9]*"):
-        # The process found may have ended, or belong to another user. An ended process that waits
-        # for its parent has no environment.
+        # The process found may have ended, or belong to another user.
         with contextlib.suppress(OSError):
             if mark.encode() in (folder / "environ").read_bytes().split(b"\0"):
                 found.append(int(folder.name))
@@ -101,7 +103,7 @@ class PortProcess:
 
     def __exit__(self, *error: object) -> None:
         """End the port's process and all its child processes."""
-        # An empty group is not found, which macOS reports as PermissionError.
+        # All processes may have ended; macOS then raises PermissionError.
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(self._process.pid, signal.SIGKILL)
         # A process may have left the group, and may be starting another.

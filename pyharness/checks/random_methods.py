@@ -49,8 +49,8 @@ from pyharness.truth.integer_series import integer_series
 
 # A pair of draws has a plain scene and a scene of a kind in `NASTY`. Because the true solution
 # takes long, methods run in only one of 4 pairs, methods in Python or decimal arithmetic in one of
-# 60. Attitudes are checked in one of 20 draws. One of 20 draws has a torque that depends on the
-# state; one of 80 draws also runs the methods in Python under such a torque.
+# 60. Attitudes are checked in one of 20 draws. Torques that depend on the state are checked in one
+# of 20 draws, and methods in Python under such torques in one of 80.
 _EVERY, _EVERY_SLOW, _EVERY_ATTITUDE = 4, 60, 20
 _EVERY_TORQUE, _EVERY_SLOW_TORQUE = 20, 80
 # Factors on the work limit of the reference: for an attitude, and for a torque that depends on the
@@ -64,7 +64,7 @@ CAMPAIGN = Basis(
 )
 """Basis of the limits in random scenes."""
 _CALM = 10.0  # error amplification below which a series has no reason to refuse
-# Scenes of these kinds may diverge, or be too fast for any true solution and any series.
+# Motions in scenes of these kinds may diverge, or be too fast for a true solution or a series.
 _MAY_REFUSE = ("extreme", "coefficients", "violent torque")
 # Below this tolerance, methods in Python or decimal arithmetic take too long.
 _FINE = 1e-9
@@ -93,7 +93,7 @@ def may_refuse(tried: MethodRun, truth: Truth, why: str) -> bool:
 
     `auto` may never refuse, `quick` always, and a closed form only near the limits of binary64.
     Other methods may refuse the kinds of scenes in `_MAY_REFUSE`, and scenes whose error
-    amplification exceeds `_CALM`; SciPy's methods also too fine a tolerance.
+    amplification exceeds `_CALM`. SciPy's methods may also refuse a tolerance finer than they meet.
     """
     method, kind = tried.method, tried.scene.name
     if method == "auto":
@@ -133,7 +133,7 @@ TORQUE_POLICY = replace(POLICY, may_refuse=_may_refuse_torque)
 
 
 def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
-    """Yield checks of omega by every entry point or, without a true solution, one of the scene."""
+    """Yield checks of omega by every entry point; without a true solution, a check of the scene."""
     for number in range(chosen.draws):
         if number // 2 % _EVERY or not chosen.may_ask(f"random/{number}"):
             continue
@@ -146,7 +146,6 @@ def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
         try:
             truth = truth_of(drawn)
         except InputError as refusal:
-            # The motion diverges, or is too fast for the true solution.
             may = drawn.scene.name in _MAY_REFUSE
             none = chosen.name_draw(number, "no-truth")
             again = chosen.name_draw(number).replay
@@ -157,7 +156,7 @@ def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
 
 
 def random_attitudes(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of attitudes, if the true attitude is known despite rounding."""
+    """Yield deferred checks of attitudes, in scenes whose true attitude is known."""
     for number in range(0, chosen.draws, _EVERY_ATTITUDE):
         if not chosen.may_ask(f"random/{number}"):
             continue
@@ -179,7 +178,6 @@ def random_attitudes(chosen: Selection) -> Iterator[Attempt]:
 
 
 def _truth_if_known(scene: Scene, times: tuple[float, float], effort: float) -> Truth | None:
-    """Return the true solution; None if the motion is unbounded, too fast or too long."""
     try:
         return reference_truth(scene, times, effort)
     except InputError:
@@ -232,7 +230,7 @@ def sample(tried: Callable[[], MethodRun], truth: Truth, policy: Policy, name: N
 
 
 def random_torques(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of omega and attitude, if the true solution is known."""
+    """Yield deferred checks under torques that depend on the state, if the solution is known."""
     for number in range(0, chosen.draws, _EVERY_TORQUE):
         if not chosen.may_ask(f"random/{number}"):
             continue

@@ -65,7 +65,7 @@ def summary_page(
 
 
 def _code(text: str) -> str:
-    """Return a text as Markdown code, which prevents links or tags from a port."""
+    """Return a text as Markdown code, so that a port's text can't contain links or tags."""
     return f"`{text.replace('`', chr(39))}`"
 
 

@@ -5,8 +5,8 @@ programs is therefore recomputed from the program's previous state; only roundin
 
 The stop test of the Runge-Kutta program is equation 19 of the thesis. A run stops if within a step
 the change of K (right-hand side), divided by the change of U (state), exceeds the stop constant.
-These quotients are recomputed too, and the program is run with constants just below and above each
-new maximum.
+These quotients are recomputed too, and the program is run with stop constants just below and above
+each new maximum of the quotients.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -52,7 +52,7 @@ _Stages = tuple[_Stage, _Stage, _Stage, _Stage]
 def schemes(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks of the programs' steps.
 
-    The value is the largest ratio of a step's difference from the recomputed step to its bound.
+    The value is the largest difference of a step from the recomputed step, over its rounding bound.
     """
     for case in cases(chosen, (7,)):
         compare = partial(_compare_steps, case_scene(case))
@@ -104,7 +104,7 @@ def _scheme(name: str, scene: Scene, run: Trajectory) -> tuple[Array, Array]:
         # The programs integrate the polynomial through the rates at the collocation points.
         weights = np.linalg.solve(matrix.T, 1.0 / powers)
         points = [_stage(scene, part, first.state + part * h * first.rate) for part in parts]
-        # Of the programs' matrix, with which they solve for the coefficients of t, t**2, ...
+        # The programs solve for the coefficients of t, t**2, ... with this matrix.
         condition = float(np.linalg.cond(powers * matrix, np.inf))
     else:
         points = _stages(scene, run)
@@ -158,8 +158,8 @@ class _Quotients:
 def stops(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks of the stops, for every combination of the stop test's defects.
 
-    The value is the largest ratio of the difference of two computations of a quotient to its
-    rounding bound.
+    The value is the largest difference of a quotient from the recomputed one, divided by the bound
+    on its rounding error.
     """
     ways = tuple(name for name in names_of("defect", _PROGRAM) if name.startswith("lipschitz"))
     for case in cases(chosen, (3,)):

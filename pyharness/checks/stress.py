@@ -8,8 +8,7 @@ from importlib import import_module
 from pyharness.checks.check import Attempts, Check, Name, run_suites, severity
 from pyharness.model.listing import PROGRAMS, Listing
 
-# A trial is in the module of its name in pyharness.checks.trials, except these; it is loaded when
-# requested.
+# Each trial is in the module of pyharness.checks.trials that has its name, except these two.
 _ELSEWHERE = {"near-symmetry": "separatrix", "shapes": "separatrix"}
 TRIALS = (
     *("separatrix", "near-symmetry", "shapes", "scales", "torque", "length", "step-size"),
@@ -53,7 +52,7 @@ def stress(only: Sequence[str] = (), trials: Mapping[str, Trial] | None = None) 
 
 
 def worst(checks: Iterable[Check]) -> dict[str, Check]:
-    """Return the worst check with a limit and a scene, by ``trial/method``."""
+    """Return, by ``trial/method``, the worst check that has a limit and a scene."""
     found: dict[str, Check] = {}
     for check in checks:
         if check.name.scene is None or check.limit is None:

@@ -118,7 +118,7 @@ def _mark(check: Check) -> _Mark:
 def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
     """Return the picture of a trial, with values and limits in a panel for each method.
 
-    Problems are in the order of the trial, by kind. Raise InputError if no check has a value.
+    Raise InputError if no check has a value.
     """
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
@@ -140,7 +140,7 @@ def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
         _panel(axes, name, [mark for mark in marks if mark.method == name], places)
     for axes in grid.flat[len(methods) :]:
         axes.set_visible(False)
-    # Without the name of the kind.
+    # The name of the kind, omitted here, is above its problems.
     labels = [name[len(kind) :].lstrip("-") or name for kind, name in places]
     for axes in grid[-1]:
         axes.set_xticks(list(places.values()), labels, rotation=90)
@@ -167,7 +167,6 @@ def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
 
 
 def _places(marks: Sequence[_Mark]) -> dict[tuple[str, str], float]:
-    """Return each problem's horizontal position, leaving space for the name of its kind."""
     names = dict.fromkeys((mark.kind, mark.circumstance) for mark in marks)
     places, place = {}, 0.0
     for kind in dict.fromkeys(kind for kind, _ in names):
@@ -201,7 +200,7 @@ def _panel(
             at = [places[kind, mark.circumstance] for mark in own]
             axes.plot(at, [_inside(mark.check.limit) for mark in own], **line)
     axes.set_yscale("log")
-    # The names of the kinds are below.
+    # The pad leaves space for the names of the kinds.
     axes.set_title(name, fontsize=9, loc="left", fontweight="bold", pad=14)
     axes.grid(visible=True, axis="y", linewidth=0.3)
     axes.tick_params(labelsize=7)
@@ -226,7 +225,7 @@ _OF_METHODS: dict[str, dict[str, Any]] = {
 
 
 def length_picture(found: Sequence["Drift"]) -> Picture:
-    """Return the errors of energy and phase against the number of steps, for each motion."""
+    """Return the picture of errors of energy and phase against the number of steps."""
     from matplotlib.figure import Figure
 
     from pyharness.checks.theory.brouwer import LAWS
@@ -268,7 +267,7 @@ def length_picture(found: Sequence["Drift"]) -> Picture:
     return Picture(figure, numbers("motion method what steps error limit starts", rows))
 
 
-# Distinct without colour.
+# Styles that differ without colour too.
 _OF_REGIONS: tuple[dict[str, Any], ...] = (
     {"color": "#000000", "linestyle": "solid", "linewidth": 2.2},
     {"color": "#1040a0", "linestyle": (0, (1, 1.2)), "linewidth": 2.2},

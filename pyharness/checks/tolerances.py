@@ -1,7 +1,7 @@
 """Tolerances at which the checks run each method, and limits on its work.
 
-A work limit, a number of evaluations of the right-hand side, determines which tolerances are
-affordable; it bounds no error.
+A work limit is a number of evaluations of the right-hand side. It determines which tolerances are
+affordable, and bounds no error.
 """
 
 import math
@@ -50,7 +50,7 @@ def finest(name: str, scene: Scene, time: float) -> float:
 
 
 def finest_and_middling(name: str, scene: Scene, time: float) -> list[float]:
-    """Return a method's finest tolerance, and 1e-6 if that is coarser; slow methods: only 1e-6."""
+    """Return a method's finest tolerance, and 1e-6 if coarser; for a slow method only 1e-6."""
     if name in _ONLY_MIDDLING:
         return [MIDDLING]
     least = finest(name, scene, time)

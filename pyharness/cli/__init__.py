@@ -6,8 +6,7 @@ from typing import Any, TextIO
 
 from pyharness.model.errors import printable
 
-# Not escaped, because they separate lines, columns and pages. TAPE6, a printer page of the
-# programs, may contain a form feed.
+# `shown` does not escape these characters, which separate lines, columns and printed pages.
 _LAYOUT = "\n\t\f"
 _bar: Any = None  # None if no progress bar is shown
 
@@ -46,7 +45,7 @@ class _Terminal:
 
 
 def progress(done: int, total: int, what: str) -> None:
-    """Show the completed part of the work, its current part, and the remaining time."""
+    """Show on a terminal that `done` of `total` parts are complete; `what` is the current part."""
     global _bar
     if not sys.stderr.isatty():
         return

@@ -124,9 +124,10 @@ def show_self_test(
     refuse: Callable[[], None] = lambda: None,
     **extra: Any,
 ) -> int:
-    """Write the report of a self-test: `count` planted faults after a control without fault.
+    """Write the report of a self-test; return 0 if every outcome passes, else 1.
 
-    Return 0 if every outcome passes, else 1. Call `refuse` if the control fails.
+    `outcomes` has a control without fault, then `count` planted faults. Call `refuse` if the
+    control fails.
     """
     found = []
     for each in outcomes:

@@ -1,8 +1,8 @@
 """Interruption: Ctrl-C ends a command at any time, with a one-line message and exit status 130.
 
-KeyboardInterrupt can be raised between any two instructions. An import may replace it, and a
-finalizer or a callback may drop it. The signal is therefore recorded, and a dropped exception is
-raised again.
+Python may lose a KeyboardInterrupt: an import may replace it by another exception, and a finalizer
+or a callback may drop it. This module therefore records the signal, and raises a dropped exception
+again.
 """
 
 import atexit
@@ -20,15 +20,13 @@ from typing import Any
 from pyharness.cli import end_progress, say
 
 _AGAIN = 0.25  # time (s) after which a dropped interrupt is raised again
-_MOST = 3  # number of interrupts by the user after which the process ends at once
+_MOST = 3  # the interrupt with this number ends the process at once
 _PATIENCE = 2.0  # longest time (s) of the cleanup at the end of an interrupted process
 CODE = 130
 LINE = "pyharness: interrupted\n"
 
 
 class _Interruption:
-    """The number of interrupts, whether their line was printed, and the signal handlers."""
-
     def __init__(self) -> None:
         self.count = 0
         self.is_reported = False
@@ -42,7 +40,10 @@ class _Interruption:
             os._exit(CODE)
 
     def interrupt(self, number: int, frame: FrameType | None) -> None:
-        """Raise KeyboardInterrupt, repeatedly in case it is dropped; the third ends the process."""
+        """Raise KeyboardInterrupt; at the user's third interrupt, end the process at once.
+
+        A timer raises the exception again until the interrupt is reported.
+        """
         self.count += 1
         if self.count >= _MOST:
             self.leave_at_once()
@@ -110,14 +111,14 @@ def report() -> int:
 
 
 def leave(code: int) -> None:
-    """Remove temporary files and end the process.
+    """Remove temporary files and end the process with exit status `code`.
 
-    Python's own exit would wait for threads and free all memory; on Ctrl-C it would drop the
-    interrupt, or end by the signal instead of with status 130. After an interrupt, child processes
-    are ended, and cleanup is limited to two seconds.
+    Python's own exit would wait for threads and free all memory. On Ctrl-C it would ignore the
+    interrupt, or end by the signal instead of with status 130. If `code` is 130, child processes
+    are ended first, and cleanup takes at most two seconds.
     """
     if code == CODE:
-        # The interrupt was reported; messages of ending threads and finalizers are suppressed.
+        # Messages of ending threads and finalizers would follow the report of the interrupt.
         with contextlib.suppress(OSError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
         if "multiprocessing" in sys.modules:

@@ -9,8 +9,7 @@ from pyharness.cli import say
 from pyharness.cli.interruption import came, report
 from pyharness.model.errors import InputError, NotBuiltError, unknown
 
-# The verbs in the order of the overview. Each is a module of pyharness.cli.verbs, imported when
-# used.
+# The verbs in the order of the overview. Each is a module of pyharness.cli.verbs.
 _GROUPS = {
     "for everyone": {
         "compare": "compare original and corrected programs with the true solution",
@@ -52,7 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     - 0 for expected results;
     - 1 for an unexpected result, such as a failed check;
     - 2 for wrong usage or input;
-    - 3 without the Fortran extension;
+    - 3 if the Fortran extension is missing;
     - 130 after an interrupt.
     """
     # Garbage collection during the imports takes 4 % of the time of a command and frees nothing.
@@ -160,7 +159,7 @@ def _leave_stdout() -> None:
 
 def _complain(message: str, code: int) -> int:
     if came():
-        # Code since the interrupt may have replaced KeyboardInterrupt by another exception.
+        # The interrupted code may have replaced KeyboardInterrupt by another exception.
         return report()
     line = " ".join(message.split())
     say(f"pyharness: {line}\n")

@@ -25,8 +25,7 @@ from pyharness.model.values import parsed_float, parsed_whole
 FORMATS = ("table", "json", "csv", "markdown")
 # Part of the usage of verbs that require one of two options.
 ONE_SCENE = "(--case N | --scene FILE)"
-# Options that several verbs share, with help texts. A placeholder after the name, as N in "--case
-# N", means that the option takes a value.
+# A placeholder after an option's name, as N in "--case N", means that the option takes a value.
 BODY = {
     "--case N": "Use this case of Table 1 of the thesis, 1 to 7, as the scene: body, initial "
     "state, torque and steps. Give this or --scene.",
@@ -76,7 +75,7 @@ _WORTH_SAYING = 60.0  # run time (s) above which a forecast is printed
 
 
 class Cost(NamedTuple):
-    """Time and memory of a random draw, on one core of 2026, and the largest number of draws."""
+    """Time and memory of a random draw, on a processor core of 2026, and the most draws."""
 
     what: str  # plural noun for the draws, as in "random scenes"
     seconds: float  # run time (s) of a draw
@@ -86,8 +85,7 @@ class Cost(NamedTuple):
 
 # A draw of `verify` makes nearly three checks, which stay in memory until the report.
 CHECKS = Cost("random draws", 0.035, 2e3, 1_000_000)
-# On each random scene of `bench`, the reference is computed, and every solver runs with all its
-# settings.
+# `bench` computes the reference of each random scene, and runs every solver with all its settings.
 SCENES = Cost("random scenes", 8.0, 1e5, 10_000)
 
 
@@ -146,9 +144,9 @@ def check_known(what: str, name: str | None, allowed: Sequence[str]) -> None:
 
 
 def chosen_names(text: str | None, what: str, allowed: Sequence[str]) -> list[str]:
-    """Return the names in --only, beginnings of ids, as in ``cells/two-term``.
+    """Return the names in --only; each is the beginning of check ids, as in ``cells/two-term``.
 
-    Raise InputError if the part before the first slash is not in `allowed`.
+    Raise InputError if the part of a name before the first slash is not in `allowed`.
     """
     only = names(text)
     for each in only:
@@ -158,11 +156,11 @@ def chosen_names(text: str | None, what: str, allowed: Sequence[str]) -> list[st
 
 
 def chosen_scene(options: argparse.Namespace, **allowed: bool) -> Scene:
-    """Return the scene of --case or --scene, with --omega, --step-size and --steps.
+    """Return the scene of --case or --scene, changed by --omega, --step-size and --steps.
 
-    Warn of impossible moments and of a normalised attitude. Raise InputError for a full inertia
-    matrix, a torque about the axes of space or dependent on the state, or a changing inertia,
-    unless a flag in `allowed` (those of `checked_scene`) accepts it.
+    Warn of impossible moments, and of an attitude that was normalised. Raise InputError unless
+    exactly one of --case and --scene is given, and for a scene that `checked_scene` refuses with
+    the flags `allowed`.
     """
     if (options.case is None) == (options.scene is None):
         raise InputError("give either --case N (1 to 7) or --scene FILE")
@@ -235,7 +233,7 @@ def listing_text(listing: Listing) -> str:
 
 
 def chosen_stops(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the stop test's limit (1/s; default 500, as on the cards), and whether to test."""
+    """Return the arguments `lipschitz` (limit of the stop test, 1/s) and `may_stop` of a run."""
     if options.program not in (None, "runge-kutta"):
         refuse(options, f"--program {options.program}", ("lipschitz", "no_stop"))
     if options.no_stop:
@@ -370,7 +368,7 @@ def check_outputs(options: argparse.Namespace) -> None:
 
 
 def without_out(options: argparse.Namespace) -> argparse.Namespace:
-    """Return the options without --out, which names a folder, so that the report is printed."""
+    """Return the options without --out, for verbs whose --out names a folder."""
     return argparse.Namespace(**{**vars(options), "out": None})
 
 

@@ -1,6 +1,6 @@
 """Functions that write output folders, completely or not at all.
 
-Messages name `option`, with which the user gave the path. Verbs call the checks before any
+Error messages name `option`, by which the user gave the path. Verbs call the checks before any
 computation.
 """
 
@@ -19,7 +19,7 @@ _LARGEST_MARK = 1 << 24  # bytes of the file that lists the files written by a v
 
 
 def check_folder(path: str, names: Iterable[str], option: str) -> None:
-    """Raise InputError if the files can't be written in the folder, which may be new."""
+    """Raise InputError if files `names` can't be written in the folder `path`, which may be new."""
     folder = Path(path)
     if not path or "\0" in path or os.path.lexists(folder):
         if not path or "\0" in path or not folder.is_dir():
@@ -78,7 +78,7 @@ def check_tree(path: str, mark: str, option: str, kind: str = "edition") -> None
     new, _ = _beside(folder)
     try:
         reason = _why_not_anew(folder, mark, kind)
-        # As in `_why_not_made`, permissions alone do not show whether this is possible.
+        # Permissions alone do not show whether a folder can be made.
         if not reason:
             new.mkdir()
             try:
@@ -92,7 +92,6 @@ def check_tree(path: str, mark: str, option: str, kind: str = "edition") -> None
 
 
 def _why_not_anew(folder: Path, mark: str, kind: str) -> str:
-    """Return the reason why a folder may not be replaced, or ""."""
     if Path.cwd().is_relative_to(folder):
         return "is the folder that you are in, or one above it"
     if not os.access(folder.parent, os.W_OK) or os.path.ismount(folder):

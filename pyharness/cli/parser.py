@@ -105,8 +105,7 @@ class Parser(argparse.ArgumentParser):
     def _joined(self, arguments: Sequence[str]) -> list[str]:
         """Return the arguments with negative numbers joined to their options, as in --x=-1.
 
-        Argparse would parse such numbers as options. Old names of options are replaced by the new
-        ones.
+        Argparse would take such numbers for options. Old names of options are replaced by new ones.
         """
         result: list[str] = []
         for argument in arguments:

@@ -43,8 +43,7 @@ class Field:
     whole: bool = False
 
 
-# Prefix of the constants of a torque's expressions, as in `torque.constants.k`, whose units depend
-# on the expressions.
+# Prefix of the constants of a torque's expressions, as in `torque.constants.k`.
 CONSTANTS = "torque.constants."
 INERTIA = "body.inertia."
 ELEMENTS = {f"{i + 1}{j + 1}": (i, j) for i, j in INERTIA_ELEMENTS}
@@ -304,7 +303,6 @@ def _refuse(where: str, table: dict[str, Any], chosen: str, keys: Iterable[str])
 
 
 def _checked(where: str, axis: Axis) -> Axis:
-    """Return `axis`; raise InputError if its least or its largest value is not allowed."""
     field = number_field(axis.field)
     if axis.how == "sphere":
         return axis

@@ -1,7 +1,6 @@
 """Batches: scenes of a sweep that are solved in one call with the same settings.
 
-The n scenes of a batch share all fields of one scene except those in `own`, which maps each to its
-n values.
+The n scenes of a batch differ only in the fields of `own`, which maps each field to its n values.
 """
 
 import tomllib
@@ -41,9 +40,9 @@ def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
 
 
 def solve_points(sweep: Sweep, where: list[Indices]) -> Arrays:
-    """Solve the scenes that `where` selects by an array of indices for each dimension.
+    """Return the reductions of the scenes at `where`, an array of indices for each dimension.
 
-    The first dimension of the results runs over the scenes.
+    The first dimension of each result runs over the scenes.
     """
     n = len(where[0])
     found = {asked.name: empty(asked, n) for asked in sweep.reductions}
@@ -134,7 +133,7 @@ def _components(
 
 
 def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
-    """Return "moments", "inertia" or "coefficients", and n values (kg m2 or 1), None if fixed."""
+    """Return "moments", "inertia" or "coefficients", and their n values (kg m2 or 1) or None."""
     if scene.coefficients is not None:
         return "coefficients", _components("body.coefficients", scene.coefficients, own, n)
     if scene.inertia is not None:
@@ -148,8 +147,8 @@ def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
     if "body.square.1" in own or "body.square.2" in own:
         middle = own.get("body.square.1", np.ones(n))
         least = own.get("body.square.2", np.ones(n))
-        # The integrals of x^2, y^2 and z^2 over the mass determine the moments of a real body; here
-        # in units of the largest.
+        # The moments of a real body are sums of the integrals of x^2, y^2 and z^2 over its mass,
+        # which are here in units of the largest.
         x2, y2, z2 = np.ones(n), middle, middle * least
         size = max(scene.moments) / (x2 + y2)
         return "moments", np.stack([(y2 + z2) * size, (x2 + z2) * size, (x2 + y2) * size], axis=1)
@@ -253,7 +252,10 @@ def follows_body(scene: Scene) -> bool:
 def with_numbers(
     scene: Scene, constants: Mapping[str, float], values: Sequence[Any] | None
 ) -> Scene:
-    """Return the scene with other constants of its torque's expressions, or of its body."""
+    """Return the scene with other `constants` of its torque's expressions, and another body.
+
+    `values` are the moments, inertia or coefficients of the body, or None for the scene's own.
+    """
     data: dict[str, Any] = tomllib.loads(scene_text(scene))
     if constants:
         data["torque"]["constants"].update(constants)
@@ -262,8 +264,7 @@ def with_numbers(
         data["body"] = {body_of(scene)[0]: list(values)}
         for table, term in zip(data["torque"]["terms"], _terms(scene.torque), strict=True):
             if _is_of_body(dict(term), scene):
-                # Without its own inertia, the reader gives the term the inertia of the table
-                # [body].
+                # The reader then gives the term the inertia of the table [body].
                 del table["inertia"]
     return scene_of(data, scene.name)
 

@@ -29,7 +29,7 @@ from pyharness.sweep.sweep import Arrays, Sweep
 EXECUTORS = ("here", "processes", "dask")
 Results = Generator[tuple[int, Arrays], None, None]
 
-# After so many deaths of processes in a row, without a completed chunk between, the sweep ends.
+# The sweep ends after so many deaths of processes without a completed chunk between them.
 _ATTEMPTS = 3
 _AHEAD = 2  # chunks submitted for each process, so that no process waits for the disk
 _ANSWER = 4.0  # time (s) in which a scheduler must answer and have a worker
@@ -147,10 +147,7 @@ def deaf_children() -> Iterator[None]:
 
 
 def end_with_parent() -> None:
-    """Start a thread that ends this process as soon as its parent process ends.
-
-    No thread is started if `multiprocessing` knows no parent process.
-    """
+    """Start a thread that ends this process as soon as its parent process, if any, ends."""
     parent = multiprocessing.parent_process()
     if parent is None:
         return
@@ -261,7 +258,6 @@ def _by_client(client: Any, sweep: Sweep, chunks: list[int]) -> Results:
             chunk_of[future.key] = chunk
             running.add(future)
 
-    # More chunks than workers, so that none is idle.
     for _ in range(_AHEAD * max(1, n_threads)):
         submit()
     for future in running:

@@ -28,11 +28,11 @@ RANKS = ("least", "middle", "largest")
 class Reduction:
     """A quantity that a sweep can store for each scene, and its computation.
 
-    For a batch of n scenes and the parameters, `compute` returns n values, or n rows with a value
-    for each of `labels`, whose dimension in the store is `dimension`. `only` is `program` or
-    `method` if the quantity exists for programs or methods alone. `needs` lists requirements of the
-    scene: `moments`, `no torque` or `attitude`. `parameters` has the defaults. If the values are
-    codes of outcomes, `flags` has their meanings.
+    `compute` takes a batch of n scenes and the parameters. It returns n values, or n rows with a
+    value for each of `labels`; `dimension` names this dimension in the store. `only` is `program`
+    or `method` if the quantity exists for programs or methods alone. `needs` lists requirements of
+    the scene: `moments`, `no torque` or `attitude`. `parameters` has the defaults. If the values
+    are codes of outcomes, `flags` has their meanings.
     """
 
     title: str
@@ -169,7 +169,7 @@ def _tilts(batch: Batch, given: Mapping[str, Any]) -> Array:
 
 
 def _tilt_squares(batch: Batch, given: Mapping[str, Any]) -> tuple[Array, Array]:
-    """Return squared cosine and squared sine of half the angle of an axis from its initial one."""
+    """Return squared cosine and sine of half the angle between an axis and its first direction."""
     squares = batch.attitudes(given["samples"]) ** 2
     is_own = _is_own(batch, given, len(squares))[:, None, :]
     along = squares[:, :, 0] + np.where(is_own, squares[:, :, 1:], 0.0).sum(axis=2)

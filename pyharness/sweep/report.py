@@ -52,7 +52,7 @@ class Found(NamedTuple):
 def summary(store: Store, asked: ReductionSpec) -> tuple[list[Found], Counter[int]]:
     """Return the statistics of a reduction's components, and the counts of its codes of outcomes.
 
-    One of the two is empty: a reduction yields numbers or codes. Values are read chunk by chunk.
+    One of the two is empty: a reduction yields numbers or codes.
     """
     reduction = REDUCTIONS[asked.reduction]
     labels = reduction.labels or ("",)
@@ -155,16 +155,15 @@ def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
 def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
     """Return the picture of a reduction.
 
-    Consider the dimensions with several values that are numbers and not random. The picture is a
-    map over the last two of them, a line if there is only one, and dots over a random dimension if
-    there is none.
+    Its form depends on the dimensions that have several numbers which are not random. With two or
+    more, the picture is a map over the last two; with one, a line. With none, it shows dots over a
+    random dimension.
     """
     from matplotlib.figure import Figure
 
     axis_of = {axis.dimension: axis for axis in reversed(store.sweep.axes)}
     dimensions = store.sweep.dimensions
     ordered = [d for d in dimensions if axis_of[d].count > 1 and not axis_of[d].is_choice]
-    # Random values have no order, and are shown as dots.
     shown = [d for d in ordered if not _is_drawn(axis_of[d])][-2:] or ordered[-1:]
     most = _MOST_PLACES if len(shown) == 2 else _MOST_DOTS
     places = {d: _thinned(axis_of[d].count, most) for d in shown}

@@ -24,11 +24,11 @@ from pyharness.sweep.sweep import Arrays, Indices, Sweep, spread
 # Scenes in the samples, evenly spread over the grid; the smallest sample is measured first.
 _SAMPLES = (8, 256, 2048, 8192)
 _ENOUGH = 0.2  # s; a sample that took longer is usually large enough
-# The next larger sample is measured anyway if it has at most the fraction `_PART` of all scenes and
-# takes at most `_LONGEST`: a small sample includes too much of a batch's constant cost.
+# In a small sample, the constant cost of a batch weighs too much. The next larger one is therefore
+# measured too if it has at most the fraction `_PART` of all scenes and takes at most `_LONGEST`.
 _PART = 0.01
 _LONGEST = 60.0  # longest expected time (s) of such a sample
-# Fewest values sampled along a dimension in which all scenes of a batch are equal.
+# Fewest values sampled along a dimension whose value all scenes of a batch share.
 _PLACES = 5
 _FILES = 20  # most chunks solved, or written and read, for a measurement
 
@@ -54,7 +54,7 @@ def forecast(sweep: Sweep, path: str, n_missing: int, own: Engine) -> float:
 def seconds_of_files(sweep: Sweep, path: str) -> tuple[float, float]:
     """Return the mean times (s) to write, and to read, the files of a chunk beside `path`.
 
-    Both are 0 if files can't be written; the sweep itself then reports the error.
+    Both are 0 if files can't be written.
     """
     times = []
     try:
@@ -100,7 +100,7 @@ def seconds_per_chunk(sweep: Sweep) -> float:
     seconds = scenes * seconds_per_scene(sweep)
     if seconds > _ENOUGH:
         return seconds
-    # Only whole chunks show the constant cost of a chunk, which matters if they are fast.
+    # Only whole chunks show the constant cost of a chunk.
     begin = time.perf_counter()
     count = min(_FILES, sweep.n_chunks)
     for i in range(count):
@@ -130,7 +130,7 @@ def seconds_per_scene(sweep: Sweep) -> float:
 def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
     """Return the indices of sampled scenes, changed so that many share a batch.
 
-    Along dimensions in which all scenes of a batch are equal, only five distinct indices remain, or
+    Along dimensions whose value all scenes of a batch share, only five distinct indices remain, or
     more if the batches of a chunk are small. The batches of the sample are then about as large as
     those of a chunk.
     """
@@ -155,7 +155,7 @@ _MOST_CHUNKS = 1_000_000
 
 @dataclass(frozen=True)
 class Outcome:
-    """The chunks that one run of a sweep computed, in `seconds`.
+    """The outcome of one run of a sweep, whose computation took `seconds` (s).
 
     `estimate` is None if no chunk was missing. `before` counts the chunks of earlier runs,
     `computed` the chunks of this run, and `repaired` those of this run that had been damaged.
@@ -245,8 +245,7 @@ def swept(
     check_size(sweep, path, workers or 1, 0 if is_there else sweep.n_chunks)
     with contextlib.ExitStack() as stack:
         try:
-            # Started first, so that a scheduler that does not answer is reported before any file is
-            # written.
+            # Started first: if a scheduler does not answer, no file is written.
             with engine(executor, workers, address) as own:
                 store = stack.enter_context(opened(sweep, path, repair))
                 with progress_of(progress, "chunks") as report:

@@ -201,7 +201,7 @@ def check_store(sweep: Sweep, path: str) -> bool:
         raise InputError(
             f"--out '{path}': is not empty, and is not the store of a sweep; give a new name"
         )
-    # Two files state the identity; damage to one is detected when the store is opened.
+    # Two files state the identity; `opened` detects damage to either.
     if any(type(each.schema) is int and each == ours for each in known):
         return True
     found = known[0]

@@ -88,7 +88,6 @@ def _digest(folder: Path, name: str, limit: int) -> str:
 
 @contextlib.contextmanager
 def _opened(folder: Path, name: str, limit: int) -> Iterator[int]:
-    """Yield the descriptor of a file; raise DamageError if missing, irregular or above `limit`."""
     handle = None
     try:
         # Without O_NONBLOCK, opening a pipe waits for a writer.

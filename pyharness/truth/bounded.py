@@ -26,7 +26,7 @@ PROVED, ESTIMATED = "proved", "estimated"
 _INTEGER_WORK, _BALL_WORK = 0.01, 0.0075
 _MOST_TIMES = 30  # for the prover in ball arithmetic, which needs a step for each time
 _SPARE_DIGITS = 2  # by which a ball is smaller than the estimated error
-_DIGITS, _MOST_DIGITS = 20, 60  # decimal digits of a proof: without an estimate; at most
+_DIGITS, _MOST_DIGITS = 20, 60  # decimal digits of a proof without an estimate, and at most
 _ROUNDED_UP = 1.0 + 2.0**-49  # exceeds the rounding errors of a few operations
 
 Row = Sequence[float | Fraction]
@@ -129,9 +129,9 @@ def error_bound(
     `claimed` (rad/s) and `claimed_angle` (rad) are the estimates, returned where nothing is proved.
 
     The bound of omega is proved, even without python-flint, if the scene can have a certificate.
-    With python-flint, that of the attitude is proved in torque-free motion; and both bounds under
-    any recorded torque if `any_torque`. The work limit of a proof is about half a second times
-    `effort`.
+    With python-flint, the bound of the attitude is proved in torque-free motion. With python-flint
+    and `any_torque`, both bounds are proved under any recorded torque. The work limit of a proof is
+    about half a second times `effort`.
     """
     rows = _exact(omega, remainder)
     order = sorted(range(len(times)), key=lambda k: abs(times[k]))
@@ -228,7 +228,7 @@ class _Statement(NamedTuple):
         return omega, attitude
 
     def _digits(self) -> int | None:
-        """Return the digits that make balls small against the estimate; None if more than 60."""
+        """Return how many digits make balls small against the estimate; None if more than 60."""
         largest = max(1.0, *(abs(float(x)) for row in self.omega for x in row))
         if not (0.0 < self.claimed < math.inf):
             # Omega is 0 at all times, or there is no estimate.
@@ -260,10 +260,11 @@ def _extreme_angles(
 ) -> tuple[float, float]:
     """Return the least and the largest error (rad) that the quaternions `rows` may have.
 
-    The error is twice the angle between the lines of the quaternions `rows` and of the true ones.
-    For the sine s of the angle between a row and the middle of its ball, arcsin(s) < s (1 + s**2)
-    if s <= 1/2. Four components of at most the radius r have a norm of at most 2 r, so that middle
-    and true line differ by at most arcsin(2 r) < 4 r.
+    The error is twice the angle between the lines of a row and of the true quaternion. This angle
+    is at most the sum of two. The first, between the row and the middle of its ball, has the sine
+    s; if s <= 1/2, it is less than s (1 + s**2). The second, between the middle and the true
+    quaternion, is at most arcsin(2 r) < 4 r, as each of four components differs by at most the
+    radius r.
     """
     least = most = 0.0
     for row, (middle, radius) in zip(rows, found, strict=True):

@@ -1,7 +1,7 @@
 """Proofs by Taylor steps in integer arithmetic, and their certificates.
 
-Steps are bounded as in `certificate_checker`, which verifies each step and ball (interval) of a
-certificate without trusting this module.
+The error of a step is bounded as in `certificate_checker`, which verifies each step and ball
+(interval) of a certificate without trusting this module.
 """
 
 import math
@@ -29,15 +29,15 @@ from pyharness.truth.certificate_checker import (
 from pyharness.truth.enclosed import Balls, Enclosure, largest_radius, row_of, scales_of
 from pyharness.truth.reference import check_order
 
-_TUBE_BITS = 30  # a tube is at least 2**-30 of the solution thick
+_TUBE_BITS = 30  # the radius of a tube is at least 2**-30 of the solution
 _GUARD_BITS = 16
 _LENGTH_BITS = 20
 _SHARE_BITS = 20  # the last terms are at most 2**-20 of the radius, or what the digits allow
 _TOLERATED = 3  # bits by which the last terms may exceed this limit
 _MOST_STEPS = 20_000  # some five to thirty seconds
 _MOST_ATTEMPTS = 6
-# After the fraction _EARLY of the time, the growth of the radius is extrapolated; _MORE is added to
-# the further digits that it needs.
+# After the fraction _EARLY of the time, the growth of the radius is extrapolated to the end. If
+# digits will be missing, the proof begins again with these and _MORE.
 _EARLY, _MORE = 0.05, 1.5
 _WORDS = "Taylor steps in integer arithmetic"
 
@@ -60,7 +60,7 @@ class _AmplifiedError(Exception):
 
 
 def has_certificate(scene: Scene) -> bool:
-    """Return whether moments are constant and the torque is a law about the body axes."""
+    """Return whether a scene has constant moments, and a torque law about the body's axes."""
     constant = scene.changing is None and scene.inertia is None
     return constant and isinstance(scene.torque, TorqueLaw) and not scene.torque.in_space
 

@@ -13,10 +13,7 @@ Row = list[Decimal]
 
 
 def sine_cosine(angle: Decimal) -> tuple[Decimal, Decimal]:
-    """Return the sine and the cosine of an angle (rad) of any size.
-
-    The angle is reduced modulo 2 pi and halved eight times before the power series.
-    """
+    """Return the sine and the cosine of an angle (rad) of any size."""
     with decimal.localcontext() as context:
         context.prec += 12 + max(0, angle.adjusted())
         angle = angle.remainder_near(2 * pi(context.prec))

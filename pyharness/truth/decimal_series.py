@@ -1,7 +1,7 @@
 """Omega, velocity and attitude by Taylor series of equations 13-15 in decimal arithmetic.
 
-The argument `coefficients` is A, B, C, but in functions of Taylor series the coefficients of each
-unknown.
+In `taylor_series` and `_Equations`, `coefficients` are A, B and C; in all other functions, the
+Taylor coefficients of each unknown.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,8 +26,8 @@ _ORDINARY_STEPS = 20_000
 # exceeded, even if the motion becomes slower by the factor _PACE_SLACK.
 _FIRST_STEPS = 100
 _PACE_SLACK = 3.0
-# Largest defect of a series: the difference between the rates and its derivative at the end of a
-# step, times the step, over the local tolerance. A series that has converged has a smaller defect.
+# Largest defect of a series that has converged, over the local tolerance. The defect is the step
+# times the difference between the series' derivative and the rates at the end of the step.
 _MOST_DEFECT = 64
 _NEARLY_1 = 1 - Decimal("1e-26")  # a relative change of thousands of rounding errors
 # Least growth of the number of steps, as a power of time, that the forecast extrapolates.
@@ -51,6 +51,7 @@ def taylor_series(
     norm of the scene's quaternion. `order` is the degree of the series, which high powers in the
     torque may increase. `tolerance` is local and relative. `effort` is a factor on a work limit of
     some ten seconds; None means a limit of 100 000 steps, fewer if the torque depends on the state.
+    `start` replaces the initial state of the scene.
     """
     equations, limit = _Equations(scene, coefficients, velocity), _Limit(scene, effort)
     tape = equations.tape
@@ -61,7 +62,8 @@ def taylor_series(
     at_end = [equations]
     switches = Switches(tape) if tape is not None and tape.has_switches else None
     if is_recorded:
-        # Sums that cancel may be rounded to 0, as beside a saturated tanh.
+        # The last equations show the effect of rounding: their state and the terms of their sums
+        # are changed a little, because sums that cancel may be 0, as beside a saturated tanh.
         changes = Decimal(0), Decimal(10) ** (4 - getcontext().prec)
         results = {} if switches is None else switches.results
         at_end = [_Equations(scene, coefficients, velocity, each, results) for each in changes]
@@ -309,7 +311,6 @@ class _Equations:
         """
         series = [[x] for x in state]
         torque = self._torque_series(time, order, series, forward)
-        # Taylor coefficients of a changing inertia around `time`.
         elements = [] if self._changing is None else self._changing.elements
         inertia = [[_moved(each, time) for each in row] for row in elements]
         momentum: list[Row] = [[], [], []]

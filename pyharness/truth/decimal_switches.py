@@ -11,7 +11,8 @@ from pyharness.model.errors import SLIDING, TimedError
 from pyharness.truth.decimal_functions import Row, value_at
 from pyharness.truth.tape_series import TapeSeries
 
-# Largest last terms of an operand in a step, over the sum of all.
+# In a step, an operand's series counts as converged if its last two terms are at most this part of
+# the sum of all.
 _SMALL = Decimal("1e-8")
 _ZERO = Decimal("1e-20")  # part of the terms that counts as rounding error
 _IMAGINARY = 1e-4  # largest imaginary part of a real root, over the step
@@ -22,20 +23,19 @@ _TOGETHER = Decimal("1e-15")  # relative difference of roots that count as one
 class Switches:
     """The results of the switches of a tape, in `results` by slot.
 
-    A switch changes where its operand crosses a level: 0, or a whole number for a floor. While an
-    operand is at a level, `_levels` has by slot -1 if the result is the one above the level, 1 if
-    it is the one below.
+    A switch changes where its operand crosses a level: 0, or a whole number for a floor. `_levels`
+    has the slots whose operands are at a level: -1 if the switch has its result above the level, 1
+    if it has its result below.
     """
 
     def __init__(self, tape: TapeSeries) -> None:
-        """Begin without results."""
         self._tape, self.results = tape, tape.results
         self._levels: dict[int, int] = {}
         self._turned: set[int] = set()
         self._next: dict[int, int] = {}
 
     def settle(self) -> bool:
-        """Set the results by the values of the operands; return whether a result changed."""
+        """Correct the first result that contradicts its operand; return whether there was one."""
         for slot, is_floor, x in self._tape.operands_of_switches():
             level = x[0].to_integral_value() if is_floor else Decimal(0)
             if abs(x[0] - level) <= _ZERO * (1 + abs(x[0])):
@@ -56,9 +56,10 @@ class Switches:
         return False
 
     def turns(self, time: Decimal, length: Decimal) -> bool:
-        """Change the result of an operand that would not leave its level; return whether one was.
+        """Change the result of an operand that moves to the other side of its level.
 
-        Raise TimedError if it leaves the level with neither result.
+        Return whether a result was changed. Raise TimedError if the operand moves to the other side
+        with either result.
         """
         for slot, is_floor, x in self._tape.operands_of_switches():
             level = self._levels.get(slot)
@@ -79,7 +80,7 @@ class Switches:
         return False
 
     def end(self, length: Decimal) -> Decimal:
-        """Return the step (s), shortened to resolve all operands and to end at the first root."""
+        """Return the step (s), shortened until operands' series converge, or to the first root."""
         while any(self._is_unresolved(x, length) for *_, x in self._tape.operands_of_switches()):
             length *= Decimal("0.75")
         roots = []

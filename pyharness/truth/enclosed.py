@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from pyharness.model.scene import Scene
 
-_LEAST = 1e-4  # of the square of the largest unit of errors
+_LEAST = 1e-4  # least square of a unit of errors; the largest unit is 1
 
 
 class Balls(NamedTuple):
@@ -23,8 +23,8 @@ class Enclosure:
     """Balls that contain the solution of one scene; quantities that were not requested are None.
 
     The attitude is a unit quaternion, scalar first. The transition matrix has, row by row, the
-    derivatives of omega and of the quaternion, before its normalisation, with respect to omega at
-    time 0.
+    derivatives of omega and of the quaternion with respect to omega at time 0, before the
+    quaternion is normalised.
     """
 
     time: tuple[float, ...]  # s
@@ -105,7 +105,7 @@ def largest_radius(omega: Sequence[Balls], digits: int) -> Fraction:
 
 
 def _digits(radius: Fraction) -> int:
-    """Return the digits after the point with which rounding adds little to a radius."""
+    """Return how many digits after the point are enough that rounding adds little to a radius."""
     if not radius:
         return 40
     excess = radius.denominator.bit_length() - radius.numerator.bit_length()
@@ -123,8 +123,8 @@ def scales_of(coefficients: Sequence[Fraction]) -> list[float]:
     """Return the units in which proofs measure errors of the components of omega, at most 1.
 
     They are the square roots of abs(A), abs(B) and abs(C), divided by the largest of these, but at
-    least 0.01. If this limit does not apply, the logarithmic norm is 0 for rotations about the axes
-    of the largest and the smallest moment.
+    least 0.01. If none is raised to 0.01, the logarithmic norm is 0 for rotations about the axes of
+    the largest and the smallest moment.
     """
     sizes = [abs(x) for x in coefficients]
     largest = max(sizes) or Fraction(1)

@@ -1,8 +1,8 @@
 """Proved enclosures: balls (intervals, given by middle and radius) that contain the solution.
 
-Torque-free motion is proved in closed form (`enclosure_free`), torques of time alone by Taylor
-steps in integers (`certificate`), and all others by Taylor steps in balls (`enclosure_steps`). The
-first and the last need python-flint.
+Torque-free motion is proved in closed form (`enclosure_free`), motion under torques of time alone
+by Taylor steps in integers (`certificate`), and all other motion by Taylor steps in balls
+(`enclosure_steps`). The closed form and the steps in balls need python-flint.
 """
 
 from collections.abc import Sequence
@@ -39,11 +39,11 @@ def enclose(
     """Return balls that contain the solution of a scene at requested times.
 
     `times` (s) have one sign and lead away from 0; the first may be 0. A radius of omega is at most
-    10**-digits rad/s, times the largest component of omega (for a closed form, of the initial
-    omega) if that exceeds 1 rad/s. `velocity` requests balls of the translational velocity (m/s),
-    `transition` those of the transition matrix. The attitude is enclosed if the scene has one, the
-    rotational energy if it has moments. `progress` receives the percentage of the time that is
-    done, 100, and the time as text. `effort` is a factor on the limit of steps.
+    10**-digits rad/s, times the largest component of omega if that exceeds 1 rad/s; a closed form
+    takes the initial omega instead. `velocity` requests balls of the translational velocity (m/s),
+    `transition` balls of the transition matrix. The attitude is enclosed if the scene has one, the
+    rotational energy if it has moments. `progress` receives the completed percentage of the time,
+    100, and the time as text. `effort` is a factor on the limit of steps.
 
     Raise InputError if the times are not in order, python-flint is missing, the torque is opaque,
     the solution can't be enclosed up to the last time, or the limit is exceeded.

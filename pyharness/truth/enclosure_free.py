@@ -29,9 +29,9 @@ def enclose_free(
     """Return balls that contain omega (rad/s) without torque at each of `times` (s).
 
     With `attitude`, four more balls contain the unit quaternion from body to space, scalar first
-    and continuous in time. Radii are at most 10**-`digits`; for omega in rad/s, times the largest
-    initial component if that exceeds 1 rad/s. The motion must be bounded; an attitude needs
-    moments. Raise InputError if 20 000 bits do not suffice.
+    and continuous in time. Their radii are at most 10**-`digits`. A radius of omega is at most
+    10**-`digits` rad/s, times the largest initial component if that exceeds 1 rad/s. The motion
+    must be bounded; an attitude needs moments. Raise InputError if 20 000 bits do not suffice.
     """
     scale = max(Fraction(1), *(abs(Fraction(w)) for w in scene.omega))
     bits = min(64 + math.ceil(digits * math.log2(10)), _MOST_BITS)
@@ -93,10 +93,10 @@ def omega_on_ellipse(axis: int, a: list[Fraction], w: list[Fraction], t: Fractio
 class Orbit:
     """A torque-free motion that is not steady, with nonzero coefficients.
 
-    Omega about the three `axes` is `sizes` (rad/s) times cn(u), sn(u) and dn(u), where u = `start`
-    + `rate` t, with `rate` in 1/s; see DLMF Table 22.13.1. `m` is k**2, with the modulus k, and
-    `square` the square of the size that multiplies dn. On the separatrix m = 1; cn and dn are then
-    sech, and sn is tanh.
+    Omega about the three `axes` is `sizes` (rad/s) times cn(u), sn(u) and dn(u), see DLMF Table
+    22.13.1. Here u = `start` + `rate` t, with `rate` in 1/s. `m` is k**2, with the modulus k;
+    `square` is the square of the size that multiplies dn. On the separatrix m = 1; cn and dn are
+    then sech, and sn is tanh.
     """
 
     def __init__(self, a: list[Fraction], w: list[Fraction]) -> None:
@@ -164,9 +164,9 @@ def carlson(x: Fraction, y: Fraction, z: Fraction) -> arb:
 class _Attitude:
     """The attitude along an orbit.
 
-    Let e be the direction of the axis of dn and n that of the angular momentum L, both in the body,
-    and T the kinetic energy. Then n e = c dn(u) with c > 0. The attitude is the product of a
-    constant rotation, the rotation by psi about e, and the smallest rotation from n to e.
+    Let e be the direction of the axis of dn, and n the direction of the angular momentum L, both
+    in the body. Then n e = c dn(u) with c > 0. The attitude is the product of a constant rotation,
+    the rotation by psi about e, and the smallest rotation from n to e. T is the kinetic energy.
 
     Euler's equations give psi' = (2 T/|L| + omega e)/(1 + n e). Like dn, psi' has the periods 2K
     and 4iK' in complex u. Its poles, where dn(u) = -1/c, are at u = 2iK' + iy and 2iK' - iy; the

@@ -1,9 +1,9 @@
 """Attitude of a torque-free body at any time in decimals, to check other methods.
 
 In each period of omega the body rotates about the angular momentum by the same angle, so that
-Taylor series integrate only one period. It is divided into segments that start from the omega of
-`elliptic.py`, because near the separatrix errors of omega grow exponentially. No code is shared
-with the closed form that this module checks.
+Taylor series integrate only one period. Near the separatrix errors of omega grow exponentially. The
+period is therefore divided into segments, each of which starts from the omega of `elliptic.py`. No
+code is shared with the closed form that this module checks.
 """
 
 import decimal
@@ -32,8 +32,8 @@ def free_attitude(scene: Scene, time: float) -> Row:
 
     The sign of the quaternion is continuous in time. The scene must have moments and an attitude.
     On the separatrix, where omega has no period, the motion is integrated until omega is constant
-    to all digits. Raise InputError if the integration takes too many steps, or if the torque
-    depends on the state.
+    to all digits. Raise InputError if the integration would be too long, or if the torque depends
+    on the state.
     """
     checked_scene(scene)
     assert scene.attitude is not None

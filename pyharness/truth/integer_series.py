@@ -60,7 +60,7 @@ def integer_series(scene: Scene, times: Sequence[float]) -> Path:
 
 
 def _guess(scene: Scene, span: Fraction) -> Fraction:
-    """Return a guess of the largest omega (rad/s) until `span` (s): initial, or by the torque."""
+    """Return a guess of the largest component of omega (rad/s) until `span` (s)."""
     law = scene.body_torque
     found = [abs(Fraction(w)) for w in scene.omega]
     for axis, moment in enumerate(scene.moments or (1.0, 1.0, 1.0)):
@@ -159,8 +159,9 @@ class _Equations:
         self._rate = [_fixed(Fraction(x) * p * span) for x, p in zip(law.rate, push, strict=True)]
         # The waves of one frequency have two unknowns, a sine and a cosine. If the angle at the
         # last time is below 1 rad, the sine is divided by this angle, so that a sine of large
-        # amplitude has all its digits. An entry has the factors of cosine and sine in each other's
-        # derivative, and by axis their factors in the torque over moment.
+        # amplitude has all its digits. An entry has four parts: the factors of the cosine in the
+        # sine's derivative and of the sine in the cosine's, and by axis the factors of sine and of
+        # cosine in torque over moment.
         self._waves = []
         for frequency in {abs(f) for _, f in law.sines + law.cosines}:
             angle = Fraction(frequency) * span

@@ -75,16 +75,16 @@ def reference(
     A `precise` series has an error of at most 1e-25 before rounding, unless errors are amplified
     too much. Attitudes are always computed by the series.
 
-    `effort` is a factor on a work limit of some ten seconds, forecast from the first steps; None
-    means 100 000 steps. A torque that depends on the state must be recorded; the rows end before
-    the torque becomes singular. Raise InputError if the times are not in order, a changing moment
-    reaches 0, or the series is impossible or too long.
+    `effort` is a factor on a work limit of some ten seconds; the first steps show whether it will
+    be exceeded. None means a limit of 100 000 steps. A torque that depends on the state must be
+    recorded; the rows end before the torque becomes singular. Raise InputError if the times are
+    not in order, a changing moment reaches 0, or the series is impossible or too long.
     """
     if scene.changing is not None:
         scene.changing.check(times)
         if isinstance(scene.changing, InertiaFunction):
             scene = with_constant_body(scene)
-        # A tape has amplitudes of one frequency as a sum that is rounded to binary64.
+        # The law's tape rounds the sum of the amplitudes of one frequency to binary64.
         if isinstance(scene.torque, TorqueLaw) and scene.torque.in_space:
             scene = replace(scene, torque=of_law(scene.torque))
     _check_torque(scene)

@@ -19,13 +19,13 @@ _LARGEST_ANGLE = Decimal("1e308")
 _INVISIBLE = 400
 # Largest ratio of a step to the distance of a divisor's zero.
 _WITHIN_CIRCLE = Decimal("0.9")
-_MANY_FACTORS = 3  # products of this many factors are checked; those of two show in any series
+_MANY_FACTORS = 3  # products of so many factors are checked; products of two show in any series
 # The order is at least this multiple of the number of factors, up to _MOST_ORDER, so that a product
-# whose factors are 0 here shows in the series.
+# shows in the series although its factors are 0 at the centre.
 _ORDER_A_FACTOR = 4
 _MOST_ORDER = 100
-# A negative value of a root's polynomial is no truncation error if its square has this relative
-# difference from the operand.
+# A negative value of a root's polynomial is no truncation error if its square differs from the
+# operand by at most this part.
 _TRUSTED = Decimal("1e-6")
 
 _ROUGH = Context(prec=9)
@@ -66,7 +66,8 @@ class TapeSeries:
     ) -> None:
         """Store the operations, with terms of sums multiplied by 1 plus or minus `change`.
 
-        `results` has the results of switches by slot; the caller changes them.
+        A `change` shows the effect of rounding. `results` has the results of switches by slot; the
+        caller changes them.
         """
         self.results = {} if results is None else results
         self._tape = tape
@@ -92,8 +93,9 @@ class TapeSeries:
     ) -> None:
         """Begin an expansion around `time` (s).
 
-        The caller extends `omega` and `attitude` (perhaps empty), the Taylor coefficients of the
-        unknowns. At a break of a table the later piece is expanded if `forward`, else the earlier.
+        `omega` and `attitude`, which may be empty, are the Taylor coefficients of the unknowns; the
+        caller extends them. At a break of a table the later piece is expanded if `forward`, else
+        the earlier.
         """
         self._order = 0
         self._tables = {
@@ -178,7 +180,6 @@ class TapeSeries:
         sine, cosine = self._waves[operand]
         if len(sine) == k:
             slope = self._slope(operand, k)
-            # Both right-hand sides use the coefficients 0 to k - 1.
             terms = product(slope, cosine[::-1]) / k, -product(slope, sine[::-1]) / k
             sine.append(terms[0])
             cosine.append(terms[1])
@@ -253,7 +254,7 @@ class TapeSeries:
         return 2 * order > self._order and size > least
 
     def _largest_change(self, operation: Operation) -> Decimal | None:
-        """Return the limit of the change of an operation's last operand in a step, None if none."""
+        """Return how much an operation's last operand may change in a step; None without limit."""
         if operation.kind not in ("exp", "tanh", "quotient"):
             return None
         x = self._slots[operation.operands[-1]][0]

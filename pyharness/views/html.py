@@ -39,7 +39,7 @@ def _cell(tag: str, text: str, left: bool, link: str | None = None) -> str:
 def _write_section(section: Section) -> Iterator[str]:
     """Yield the HTML elements of a section.
 
-    Successive lines form one `pre` element, successive labelled paragraphs (Field) one `dl`
+    Successive lines form one `pre` element; successive labelled paragraphs (Field), one `dl`
     element.
     """
     grouped: Any = groupby(section, type)

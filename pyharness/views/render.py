@@ -1,7 +1,4 @@
-"""Reports in every output format: text, CSV, Markdown, JSON, JUnit XML, and HTML.
-
-In text, paragraphs are wrapped at 100 columns, and tables are aligned.
-"""
+"""Reports in every output format: text, CSV, Markdown, JSON, JUnit XML, and HTML."""
 
 import io
 import math

@@ -37,8 +37,7 @@ class Accuracy:
 def accuracy(scene: Scene, trajectory: Trajectory, truth: Reference) -> Accuracy:
     """Return the errors of a trajectory against `truth`, and the drifts of conserved quantities.
 
-    Errors are compared up to the end of the shorter of the two, and are infinite if there are no
-    rows.
+    Errors are compared up to the last time that both have, and are infinite without rows.
     """
     n = min(len(trajectory.time), len(truth.time))
     with np.errstate(all="ignore"):
@@ -94,7 +93,7 @@ def distance(first: Trajectory, second: Trajectory) -> float:
 
 
 def differences(first: Trajectory, second: Trajectory) -> list[str]:
-    """Return the names of the counts and endings that differ or, if these agree, of the arrays."""
+    """Return the names of counts and endings that differ or, if these agree, of unequal arrays."""
     names = {"steps": "steps", "evaluations": "evaluations", "ended": "ending", "stop": "stop"}
     found = [told for name, told in names.items() if getattr(first, name) != getattr(second, name)]
     if found:
@@ -119,7 +118,7 @@ def _rows(trajectory: Trajectory, name: str) -> Array:
 def ulps(x: Array | float, y: Array | float) -> float:
     """Return the largest distance, counted in floats, between corresponding elements.
 
-    The distance of two NaNs is 0, that of a NaN and a number infinite.
+    The distance is 0 between two NaNs, and infinite between a NaN and a number.
     """
     both_nan = np.isnan(x) & np.isnan(y)
     one_nan = np.isnan(x) ^ np.isnan(y)

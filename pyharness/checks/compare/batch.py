@@ -1,4 +1,4 @@
-"""Batches of scenes; arrays have the quantities in which the scenes differ."""
+"""Batches of scenes, with arrays of the quantities in which the scenes differ."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace

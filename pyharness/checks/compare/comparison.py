@@ -257,7 +257,6 @@ def _with_methods(
     word: str = BINARY64,
     are_run: bool = True,
 ) -> Comparison:
-    """Return the comparison of programs and methods."""
     if are_run:
         import scipy.integrate  # noqa: F401  (not to be timed with the first method)
 

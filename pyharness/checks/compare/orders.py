@@ -19,7 +19,7 @@ from pyharness.model.trajectory import Array
 from pyharness.thesis.programs import Program
 from pyharness.truth.reference import Reference
 
-# Accepted deficit of a measured order.
+# How much a measured order may be below the theoretical one.
 ORDER_SLACK = 0.5
 # Conditions for a measurement. Halving the step must change the result by less than
 # `_SMALL_CHANGE`, relative to the largest value. In a step the phases of the body's motion and of
@@ -82,7 +82,7 @@ class _SingularError(Exception):
 def measured_order(
     scene: Scene, program: Program, listing: Listing, truth: Reference, pairs: int = 2
 ) -> Order:
-    """Measure the order with which omega of a compiled program converges to `truth`.
+    """Return the measured order with which omega of a compiled program converges to `truth`.
 
     The state is `sensitive` if the error may be amplified rounding. A program that does not
     converge has the state `misses` if a textbook method of the same order converges.
@@ -117,7 +117,7 @@ def order_of(
     pairs: int = 2,
     most_steps: int | None = None,
 ) -> Order:
-    """Measure the order of a numerical solution by halving the step size.
+    """Return the order of a numerical solution, measured by halving the step size.
 
     `solution` returns `quantity` after each step, shape (n, 3), with fewer rows after an overflow.
     The measurement ends when the orders from `pairs` consecutive halvings are all at least `due` -
@@ -209,7 +209,7 @@ def _is_grown_rounding(scene: Scene, found: Order) -> bool:
 
 
 def _may_be_singular(program: str, step_size: float) -> bool:
-    """Return whether a collocation program's matrix overflows or has a condition number of 1e15."""
+    """Return whether a collocation matrix overflows or has a condition number above 1e15."""
     from pyharness.checks.theory.collocation_matrices import PARTS
 
     if program not in PARTS:

@@ -27,9 +27,9 @@ def seconds(
 ) -> list[float]:
     """Return the time of one call of each function in `runs` (s), measured in several rounds.
 
-    In each round a function is called for about `length` seconds. The first call is not counted; if
-    it takes at least `slow` seconds, there are only three rounds, and if five times as long only
-    one. `statistic` combines the times of the rounds.
+    In each round a function is called for about `length` seconds. The first call is not counted. If
+    it takes at least `slow` seconds, there are only three rounds; if it takes five times as long,
+    only one. `statistic` combines the times of the rounds.
     """
     clocks = [perf_counter] * len(runs) if clocks is None else clocks
     timed = list(zip(runs, clocks, strict=True))

@@ -35,7 +35,7 @@ class Fault:
     """A fault of an integrator: its name, a sentence on it, and its changes.
 
     The function `scene` returns the scene whose motion the faulty integrator computes, or None if
-    the fault has no effect; `times` returns the times (s) of its states, from the requested ones
+    the fault has no effect. `times` returns the times (s) of its states, from the requested times
     and the step size (s). `state` then changes the states; its second argument is the right scene.
     If `of_step`, the faulty states approach the true ones as the step decreases.
     """

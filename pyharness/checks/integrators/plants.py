@@ -83,7 +83,7 @@ def _held(asked: dict[str, Any]) -> None:
 
 
 def _turned_start(asked: dict[str, Any]) -> None:
-    """Rotate the initial angular momentum about a body axis by h rad, h the step size (s)."""
+    """Rotate the initial angular momentum about a body axis, by the step size (s) in rad."""
     moments, h = np.array(asked["moments"]), asked["step_size"]
     vector = moments * np.array(asked["omega"])
     across = np.cross(_STEP_AXIS, vector)
@@ -188,7 +188,7 @@ def self_test(command: str, chosen: Sequence[Problem], due: float = 1.0) -> Iter
     """
 
     def judge(plant: IntegratorPlant | None = None) -> tuple[Verdict, list[str], int]:
-        """Return results with a fault, names of the recognised ones, and the number of failures."""
+        """Return results with a planted fault, the recognised faults, and the count of failures."""
         found = Verdict(command)
         for problem in chosen:
             asking = with_plant(ask, plant, problem.scene) if plant else ask

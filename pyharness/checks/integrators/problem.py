@@ -43,7 +43,7 @@ _BETWEEN = 8.0  # time (s) from a row to the next
 _ROWS, _FEWEST, _FEWEST_COARSE = 64, 16, 4
 # Levels of the largest step size (1/32 s) and tolerance (1e-6) of the long motion.
 _FIRST = {"step_size": 4, "tolerance": 3}
-_MARGIN, _WITHOUT_ATTITUDE = 16.0, 64.0  # the attitude has the larger error
+_MARGIN, _WITHOUT_ATTITUDE = 16.0, 64.0  # smaller with an attitude, which has a larger error
 _TOTAL = 3.0  # largest sum of the limits of all rows: errors of explicit methods may grow
 _MOST = 0.9  # a larger limit would pass a body that stops
 
@@ -196,7 +196,7 @@ def convergence(
     order = None
     if seen:
         last = seen[-1]
-        # The last ones alone show an error that ceases to decrease.
+        # The last settings alone show an error that ceases to decrease.
         firsts = {0, max(0, last - _LATE)} if overall else {last - 1}
         known = [k for k in firsts if math.isfinite(errors[k])]
         powers = [_power(errors[k] / errors[last], settings[k] / settings[last]) for k in known]

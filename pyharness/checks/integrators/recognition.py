@@ -11,8 +11,8 @@ from pyharness.checks.compare.orders import ORDER_SLACK
 from pyharness.checks.integrators.faults import FAULTS, OUTPUTS, Fault, State
 from pyharness.checks.integrators.problem import Judged, convergence, drift_of, errors_between
 
-# A fault is recognised if it explains all of the error except this part, and if the rest decreases
-# at least with this power of the step size or tolerance.
+# A fault is recognised if it explains the error except for the part `_UNEXPLAINED`, and if the rest
+# decreases at least with the power `_FALLS` of the step size or tolerance.
 _UNEXPLAINED = 0.1
 _FALLS = 1.0 - ORDER_SLACK
 _OF_MOTIONS = 1e-10  # errors of the motions of faults

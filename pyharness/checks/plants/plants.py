@@ -176,7 +176,7 @@ def _shifted(
 
 
 def _wrong_card(size: float) -> AbstractContextManager[Any]:
-    """Exchange the flags of two defects in the compiled programs."""
+    """Return a context in which the compiled programs exchange the flags of two defects."""
     known = [entry["flag"] for entry in flagged() if entry["kind"] != "reading"]
     flags = Listing.flags.fget  # type: ignore[attr-defined]
 
@@ -291,7 +291,7 @@ def outcome(plant: Plant, chosen: Selection) -> Outcome:
 
 
 def _failed(chosen: Selection) -> tuple[Counter[str], str]:
-    """Return numbers of failed checks by kind, and a note with one id, if possible not golden."""
+    """Return the numbers of failed checks by kind, and a note with the id of one of them."""
     names = [check.id for check in verify(chosen) if not check.passed]
     failed = Counter(name.partition("/")[0] for name in names)
     example = min(names, key=lambda name: name.startswith(_NOT_ENOUGH), default="")

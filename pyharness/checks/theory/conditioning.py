@@ -54,8 +54,8 @@ class Conditioning:
     """The sensitivity of omega at the end of a motion to errors during it.
 
     `limit` and `angle_limit` add rounding errors to `made`, the sum of the errors allowed in the
-    steps (relative, or rad). `limit` amplifies `made`, and is at most 2, because components up to
-    `largest` differ by no more. Its argument `steps` is the number of roundings of omega, 0 with
+    steps (relative, or rad). `limit` amplifies `made`. It returns at most 2, because components up
+    to `largest` differ by no more; its argument `steps` is the number of roundings of omega, 0 with
     compensated summation. `angle_limit` assumes the largest rounding error of omega at all times.
     """
 
@@ -123,9 +123,9 @@ def sampled(
 ) -> tuple[Array, _Sample]:
     """Return equally spaced times up to `time` (s), between which the state changes little.
 
-    `sample` returns the largest rate (1/s) at given times, and results; the results at the returned
-    times are returned too. The first attempt has `fewest` intervals. Raise InputError if more than
-    `most` intervals are needed.
+    `sample` takes times, and returns the largest rate (1/s) at them and results. Return its results
+    at the returned times too. The first attempt has `fewest` intervals. Raise InputError if more
+    than `most` intervals are needed.
     """
     count = fewest
     while True:

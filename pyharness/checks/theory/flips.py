@@ -28,8 +28,8 @@ def flip_times(moments: ArrayLike, omega0: ArrayLike) -> Array:
     i1, i2, i3 = np.take_along_axis(bodies, order, axis=1).T
     w1, w2, w3 = np.abs(np.take_along_axis(omega, order, axis=1)).T
     s1, s2, s3 = (i3 - i2) / i1, (i3 - i1) / i2, (i2 - i1) / i3
-    # Omega circles the axis, 1 or 3, with the larger rate; if they are equal, the motion is on the
-    # separatrix and never returns.
+    # Omega circles the axis, 1 or 3, with the larger rate. If the rates are equal, the motion is on
+    # the separatrix and never returns.
     about1, about3 = np.sqrt(s2 * s3) * w1, np.sqrt(s1 * s2) * w3
     upper = np.hypot(np.sqrt(s1 * s3) * w2, np.maximum(about1, about3))
     lower = np.sqrt(np.abs(about1 - about3)) * np.sqrt(about1 + about3)

@@ -130,10 +130,10 @@ _POINTS = 181
 
 
 def rotations_picture(scene: Scene) -> Picture:
-    """Return the polhodes of a scene with moments, beside the growth rates of all bodies.
+    """Return the picture of a scene's polhodes and of the growth rates of all bodies.
 
-    The right panel shows the growth rate about the middle axis, divided by the spin, and marks the
-    cases of Table 1.
+    The scene must have moments. The right panel shows the growth rate about the middle axis,
+    divided by the spin, and marks the cases of Table 1.
     """
     from matplotlib.figure import Figure
 

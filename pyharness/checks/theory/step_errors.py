@@ -59,7 +59,7 @@ class Path:
 class Forecast:
     """Predicted final errors of a fixed-step run, relative to the largest omega."""
 
-    truncation: float  # expected truncation error of the component with the largest one
+    truncation: float  # expected truncation error, the largest of any component
     # Bound of truncation and rounding together; infinite for too large steps.
     bound: float
     rounding: float  # bound of the rounding error

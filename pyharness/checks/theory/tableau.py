@@ -1,9 +1,9 @@
 """Weighted residual methods as Runge-Kutta tableaux, for any step size.
 
 The methods are collocation, subdomain, Galerkin and least squares, with the trial function omega(0)
-+ c1 t + ... + cn t**n. The methods make the derivative of this function a projection of the
-right-hand side f along the step on the polynomials of degree n - 1. The projection is computed on
-the unit interval s = t / h in the well-conditioned basis of Legendre polynomials.
++ c1 t + ... + cn t**n. Each method projects the right-hand side f along the step on the polynomials
+of degree n - 1; the projection is the derivative of the trial function. It is computed on the unit
+interval s = t / h in the well-conditioned basis of Legendre polynomials.
 """
 
 from dataclasses import dataclass

@@ -77,9 +77,9 @@ def _faster(factor: float, *bitwise: str) -> Symmetry:
     return Symmetry(lambda s: scaled(s, factor), factor, lambda omega: omega / factor, bitwise)
 
 
-# Methods whose mantissas a power of two does not change: ours compare only quantities of the same
-# unit. SciPy compares different units for its first step; LEQT1F's implicit row scaling compares
-# powers of the step size.
+# Scaling by a power of two changes no mantissa in these methods, which compare only quantities of
+# the same unit. SciPy compares different units for its first step; LEQT1F's implicit row scaling
+# compares powers of the step size.
 _POWERS_OF_TWO = (*OURS, *_PREPARED, *FIXED_STEP, "runge-kutta")
 SYMMETRIES = {
     # These methods form products of the next two axes in this order; others process the axes in a

@@ -70,9 +70,9 @@ class Integrator:
     """A method whose error growth is measured, with bounds on the errors of its steps.
 
     `run` returns omega, shape (n, 3), and the number of steps until each time; `noise` bounds the
-    errors of a step of given size (s). In revolutions, `revolutions` is the length of the longest
-    run from the first initial condition, `others` of that from each other one. `preference` tells
-    whether rounding errors are biased.
+    errors of a step of given size (s). `revolutions` is the length, in revolutions, of the longest
+    run from the first initial condition; `others` is that from each other initial condition.
+    `preference` tells whether rounding errors are biased.
     """
 
     run: Runner

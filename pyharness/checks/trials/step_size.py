@@ -27,7 +27,7 @@ from pyharness.truth.reference import reference
 CASES = (2, 3, 4, 5, 6)
 TIME = 1.0
 SMALLEST = 1e-6
-# In `TIME`, half a decade apart.
+# Numbers of steps in `TIME` (s), half a decade apart.
 COUNTS = tuple(round(10.0 ** (k / 2.0)) for k in range(13))
 # Time (s) of a further search for divergence, down to a step size (s) without it.
 _LONG, _SMALLEST_LONG = 100.0, 2e-3

@@ -50,7 +50,9 @@ def refuse_other(
     """Raise InputError that advises the option `instead` if `command` answers its request."""
     with contextlib.suppress(PortError), PortProcess(command, _PROBE, option) as process:
         read(process.ask(line))
-        raise InputError(f"{option} {command}: answers requests of {instead}; give it to {instead}")
+        raise InputError(
+            f"{option} {command}: the command answers requests of {instead}; use {instead}"
+        )
 
 
 def _processes_with(mark: str) -> list[int]:

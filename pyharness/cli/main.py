@@ -37,7 +37,7 @@ _GROUPS = {
     "checks and publication": {
         "verify": "check our programs and methods, your port of the programs, or your integrator",
         "stress": "test every method in extreme scenes against bounds from theory",
-        "bench": "measure run times and errors of our integrators and third-party ones",
+        "bench": "measure run times and errors of our solvers and of third-party solvers",
         "edition": "write the annotated programs as a web site or as plain data",
     },
 }
@@ -147,6 +147,7 @@ def _complete() -> int:
 def _overview() -> str:
     lines = ["usage: pyharness VERB [options]", "       pyharness help VERB"]
     lines.append("       pyharness help json VERB    the fields of --format json")
+    lines += ["", "Rotation of rigid bodies, and three FORTRAN programs of a thesis of 1982."]
     for title, verbs in _GROUPS.items():
         lines += ["", f"{title}:", *(f"  {verb:10s}{about}" for verb, about in verbs.items())]
     lines += ["", "example:", "  pyharness compare --case 3"]

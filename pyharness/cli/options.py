@@ -61,9 +61,9 @@ _EFFORT = (
 EFFORT = {"--effort F": _EFFORT.format(" (30 for a program of the thesis)")}
 EFFORT_WITHOUT_PROGRAMS = {"--effort F": _EFFORT.format("")}
 STRICT = {
-    "--strict": "Exit with status 1 also if amplified rounding errors may exceed the tolerance, "
-    "not only if Fortran and Python differ, if a corrected program misses its order of "
-    "convergence, or if a method of --method misses its tolerance or ends early."
+    "--strict": "Exit with status 1 also if amplified rounding errors may exceed the tolerance. "
+    "Without --strict, the status is 1 only if Fortran and Python differ, a corrected program "
+    "misses its order of convergence, or a method of --method misses its tolerance or ends early."
 }
 ALSO = {
     "--also FILE,...": "Write the result to these files too, each in the format of its ending: "
@@ -179,7 +179,7 @@ def chosen_scene(options: argparse.Namespace, **allowed: bool) -> Scene:
     warn_of_attitude(scene)
     scene = checked_scene(replace(scene, **changes), **allowed)
     if scene.is_impossible:
-        warn("no rigid body has these moments, one exceeds the sum of the others; run all the same")
+        warn("no rigid body has these moments: one exceeds the sum of the others")
     return scene
 
 
@@ -221,7 +221,7 @@ def tell_inactive(options: argparse.Namespace, listings: Iterable[Listing]) -> N
     asked = {*names(options.reading), *names(options.conjecture)} - {"none"}
     active = {name for listing in listings for name in listing.active}
     for name in sorted(asked - active - set(names(options.fix))):
-        warn(f"no corrected statement depends on '{name}'; --keep {name} keeps it uncorrected")
+        warn(f"'{name}' has no effect on corrected statements; --keep {name} leaves it active")
 
 
 def listing_text(listing: Listing) -> str:

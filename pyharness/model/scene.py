@@ -266,7 +266,9 @@ class Scene:
                 given = inertia_function(place, given)
             if isinstance(given, Changing) and self.changing is None:
                 if given.place != place:
-                    raise InputError(f"[body] {place}: this is {given.place}; write {given.place}=")
+                    raise InputError(
+                        f"[body] {place}: the value belongs to {given.place}; write {given.place}="
+                    )
                 self._set("changing", given)
                 self._set(place, None)
         if self.changing is None:

@@ -22,6 +22,7 @@ _Named = TypeVar("_Named", bound=Contender)
 _LONGEST = 1e3
 _BODIES, _MOST_BODIES, _MOST_GROWN = 100_000, 1_000_000, 10_000_000
 _TERM_BODIES = 1000
+_OPTION_OF = {"method": "--method", "peer": "--peers"}
 OPTIONS = {
     "--case N": "Measure only this case of Table 1 of the thesis, 1 to 7 (default: Cases 2 to 7, "
     "with --attitude also Case 1).",
@@ -111,10 +112,7 @@ def _present(
         )
     contenders = [*methods, *(each for each in others if each.is_installed)]
     if not contenders:
-        raise InputError(
-            "bench: no method and no third-party package is chosen; give at least one, with "
-            "--method or --peers"
-        )
+        raise InputError("bench: no solver is chosen; give at least one, with --method or --peers")
     return contenders, missing
 
 
@@ -150,7 +148,8 @@ def chosen(
     lacking = [each.name for each in found if not each.attitude]
     if attitude and lacking and text is not None:
         able = ", ".join(each.name for each in contenders if each.attitude)
-        raise InputError(f"--{what}s: {lacking[0]} does not compute attitudes; allowed: {able}")
+        option = _OPTION_OF[what]
+        raise InputError(f"{option}: {lacking[0]} does not compute attitudes; allowed: {able}")
     return found
 
 
@@ -255,5 +254,5 @@ def named(contenders: Sequence[_Named], text: str | None, what: str) -> list[_Na
     allowed = [*(each.name for each in contenders), *packages]
     for name in names:
         if name not in allowed:
-            raise unknown(what, name, [*allowed, "none"], f"--{what}s")
+            raise unknown(what, name, [*allowed, "none"], _OPTION_OF[what])
     return [each for each in contenders if not names or {each.name, each.package} & {*names}]

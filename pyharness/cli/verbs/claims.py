@@ -47,10 +47,10 @@ def run(options: argparse.Namespace) -> int:
         shared.check_known("format", options.format, ("table", "json"))
     if options.atlas is not None:
         return _atlas(options)
-    shared.refuse(options, "the ledger; give --atlas", ("sweep",))
+    shared.refuse(options, "the verdicts; give --atlas", ("sweep",))
     if options.evidence:
         return _evidence(options)
-    shared.refuse(options, "the ledger; give --evidence", ("plot",))
+    shared.refuse(options, "the verdicts; give --evidence", ("plot",))
     shared.check_known("word", options.word, WORD_NAMES)
     chosen = claims() if options.explain is None else [claim(options.explain)]
     shared.check_outputs(options)

@@ -40,8 +40,8 @@ def run(options: argparse.Namespace) -> int:
     dialect = options.dialect or DIALECTS[0]
     if dialect == "1982" and (case == 7 or listing.has("do-variable")):
         shared.warn(
-            "the torque of Case 7 and what becomes of a DO variable are on no card; --dialect "
-            "gfortran has both, ftn the torque"
+            "no card has the torque of Case 7 or the value of a DO variable after its loop; "
+            "--dialect gfortran supplies both, --dialect ftn the torque"
         )
     terms = None if options.terms is None else shared.whole(options.terms, "--terms")
     text = deck_text(listing, scene, dialect, terms)

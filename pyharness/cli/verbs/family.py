@@ -39,7 +39,7 @@ def run(options: argparse.Namespace) -> int:
     """
     if options.lost:
         return _lost(options)
-    shared.refuse(options, "the family; give --lost", ("word",))
+    shared.refuse(options, "the measurement of orders; give --lost", ("word",))
     if options.case is None and options.scene is None:
         options.case = _DEFAULT_CASE
     scene = shared.chosen_scene(options)

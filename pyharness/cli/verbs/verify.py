@@ -19,7 +19,7 @@ _OF_THE_CHECKS = ("only", "seed", "draws", "external", "self_test", "update", "r
 _ABOUT = {
     "cells": "Fortran programs against Python",
     "words": "other floating-point formats",
-    "decks": "the compiled cards",
+    "decks": "programs compiled from cards",
     "schemes": "single steps of the programs",
     "stops": "the stop test of the Runge-Kutta program",
     "methods": "errors of omega",
@@ -83,13 +83,13 @@ def run(options: argparse.Namespace) -> int:
         from pyharness.cli.command_checks import check_integrator
 
         return check_integrator(options)
-    shared.refuse(options, "the checks; give --integrator", ("order", "plot"))
+    shared.refuse(options, "our own checks; give --integrator", ("order", "plot"))
     if options.port is not None:
         from pyharness.cli.command_checks import check_port
 
         return check_port(options, *_programs_and_cases(options))
-    shared.refuse(options, "the checks; give --listing-output or --port", ("program", "case"))
-    shared.refuse(options, "the checks; give --port or --integrator", ("cell",))
+    shared.refuse(options, "our own checks; give --listing-output or --port", ("program", "case"))
+    shared.refuse(options, "our own checks; give --port or --integrator", ("cell",))
     chosen = _selection(options)
     shared.check_outputs(options)
     if options.update:
@@ -107,11 +107,13 @@ def run(options: argparse.Namespace) -> int:
     if not checks:
         if chosen.may_ask("decks") and compiler() is None:
             raise InputError(
-                "the check needs gfortran to compile decks, and there is none on the PATH; "
-                "install it"
+                "the check needs gfortran to compile decks; install it, or put it on the PATH"
             )
         if not chosen.record.is_dir() and chosen.may_ask("golden"):
-            raise InputError("there is no golden record here; give --record DIR, or a checkout")
+            raise InputError(
+                "there are no stored trajectories (golden) here; give --record DIR, or run in a "
+                "source checkout"
+            )
         asked = f"--only {options.only}" if options.only else "--draws 0"
         raise InputError(f"{asked}: there is no such check; allowed: {', '.join(KINDS)}")
     drawn = samples(checks, ROUNDING) if options.draws is not None else []
@@ -179,7 +181,7 @@ def _selection(options: argparse.Namespace) -> Selection:
 def _title(chosen: Selection) -> list[str]:
     title = [f"seed of the random draws: {chosen.seed}"] if chosen.may_ask("random") else []
     if chosen.may_ask("golden") and not chosen.record.is_dir():
-        title.append("there is no golden record here (it is in the checkout): not compared")
+        title.append("golden: not run, as no stored trajectories are here (see --record)")
     return title
 
 
@@ -190,7 +192,10 @@ def _unjudged(chosen: Selection, checks: list[Check]) -> list[str]:
     count = sum(check.passed and check.value is None for check in checks)
     if chosen.problems is None or not count:
         return []
-    return [f"{count} of {len(checks)} judge nothing: too much for the method (--format json: why)"]
+    return [
+        f"{count} of {len(checks)} checks have no verdict, because the method can't solve the "
+        "problem (--format json has the reason)"
+    ]
 
 
 def _update(record: Path) -> int:
@@ -198,7 +203,9 @@ def _update(record: Path) -> int:
     from pyharness.cli.output import check_folder, write_folder
 
     if not record.parent.is_dir():
-        raise InputError("there is no golden record here to update; give --record DIR")
+        raise InputError(
+            "there are no stored trajectories (golden) here to update; give --record DIR"
+        )
     check_folder(str(record), (), "--record")
     files, news = update(record)
     write_folder(str(record), files, "--record")

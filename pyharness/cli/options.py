@@ -51,7 +51,8 @@ LISTING = {
     "program (names: `pyharness defects --kind conjecture`; none: no assumption). Default: "
     "torque-held, which evaluates a varying torque once in each step.",
     "--lipschitz L": "Stop the Runge-Kutta program when, within a step, a derivative changes by "
-    "more than L times the change of its variable; L in 1/s, above 0 (default 500, as printed).",
+    "more than L times the change of its variable; L in 1/s, above 0 (default 500, as in the "
+    "thesis).",
     "--no-stop": "Omit the stop test of --lipschitz.",
 }
 _EFFORT = (
@@ -101,7 +102,7 @@ def outputs(formats: Sequence[str] = FORMATS, plot: str = "the results") -> dict
         "--plot FILE": f"Write a picture of {plot} to this file (.png, .svg or .pdf), and the "
         "plotted numbers to a .csv file of the same name."
     }
-    out = {"--out FILE": "Write the result to this file instead of standard output."}
+    out = {"--out FILE": "File for the result (default: standard output)."}
     return {**form, **(picture if plot else {}), **out}
 
 

@@ -19,7 +19,8 @@ OPTIONS = {
     **shared.LISTING,
     "--listing L": "Version of the programs: original, or corrected, without defects (faults of "
     "their author); default: both.",
-    "--program P": f"Compare only this program: {', '.join(PROGRAMS)} (default: all three).",
+    "--program P": f"Compare only this program: {', '.join(PROGRAMS)} (default: all three). The "
+    "first two use collocation.",
     "--method M,...": "Compare these methods instead of the programs, such as auto,taylor,dop853 "
     "(all names: docs/reference/methods.md). The torque may then depend on omega or attitude.",
     "--word W": f"Floating-point arithmetic of the programs: {', '.join(WORD_NAMES)} (default "

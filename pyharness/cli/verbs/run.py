@@ -28,7 +28,8 @@ PROGRAM_FORMATS = ("printer", "tape5")
 FORMATS = (*shared.FORMATS, *PROGRAM_FORMATS)
 OPTIONS = {
     **shared.SCENE,
-    "--program P": f"Run this program of the thesis: {', '.join(PROGRAMS)}.",
+    "--program P": f"Run this program of the thesis: {', '.join(PROGRAMS)}. The first two use "
+    "collocation.",
     "--implementation I": "Language of the program: fortran (default with --word binary64) or "
     "python (default with any other --word).",
     "--word W": f"Floating-point arithmetic of the program: {', '.join(WORD_NAMES)} (default "

@@ -146,7 +146,7 @@ def _complete() -> int:
 
 def _overview() -> str:
     lines = ["usage: pyharness VERB [options]", "       pyharness help VERB"]
-    lines.append("       pyharness help json VERB    the fields of --format json")
+    lines.append("       pyharness help json VERB    explains the fields of --format json")
     lines += ["", "Rotation of rigid bodies, and three FORTRAN programs of a thesis of 1982."]
     for title, verbs in _GROUPS.items():
         lines += ["", f"{title}:", *(f"  {verb:10s}{about}" for verb, about in verbs.items())]

@@ -180,7 +180,7 @@ def chosen_scene(options: argparse.Namespace, **allowed: bool) -> Scene:
     warn_of_attitude(scene)
     scene = checked_scene(replace(scene, **changes), **allowed)
     if scene.is_impossible:
-        warn("no rigid body has these moments: one exceeds the sum of the others")
+        warn("no rigid body has these moments: the largest exceeds the sum of the others")
     return scene
 
 

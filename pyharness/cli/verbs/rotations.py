@@ -14,7 +14,7 @@ OPTIONS = {
     "depends on it. In a flip, the rotation about the middle axis is reversed.",
     **shared.outputs(
         plot="the polhodes (curves of omega without torque) and of the growth rates of "
-        "perturbations for all ratios of the moments of inertia"
+        "perturbations"
     ),
 }
 USAGE = shared.ONE_SCENE

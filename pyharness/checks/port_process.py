@@ -53,7 +53,9 @@ def refuse_other(
     """
     with contextlib.suppress(PortError), PortProcess(command, _PROBE, option) as process:
         read(process.ask(line))
-        raise InputError(f"{option} {command}: answers requests of {instead}; give it to {instead}")
+        raise InputError(
+            f"{option} {command}: the command answers requests of {instead}; use {instead}"
+        )
 
 
 def _processes_with(mark: str) -> list[int]:

@@ -83,7 +83,7 @@ def truth_of(drawn: Draw) -> Truth:
     path = integer_series(drawn.scene, times)
     flow = along(drawn.scene, path.nodes, path.way)
     if not ROUNDING * flow.amplification < 1.0:
-        raise InputError("rounding leaves no digit of it")
+        raise InputError("amplified rounding errors leave no correct digit")
     largest = float(max(np.abs(path.way).max(), np.abs(path.omega).max()))
     return Truth(np.array(times), path.omega, 0.0, replace(flow, largest=largest))
 

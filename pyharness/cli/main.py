@@ -19,10 +19,10 @@ _GROUPS = {
         "doctor": "report versions, the build and missing packages, for bug reports",
     },
     "the thesis": {
-        "claims": "judge the statements of the thesis by its programs, with evidence",
-        "figures": "redraw Figures 6 to 12 of the thesis by original and corrected programs",
-        "cards": "show printed cards, the scanned text, our Fortran and Python, notes",
-        "defects": "list defects and doubtful cards of the programs, and their effects",
+        "claims": "judge the statements of the thesis by runs of its programs",
+        "figures": "redraw Figures 6 to 12 of the thesis with original and corrected programs",
+        "cards": "show program lines (cards) with their scan, our Fortran and Python, and notes",
+        "defects": "list defects and doubtful lines of the programs, and their effects",
         "deck": "write a program of the thesis as a deck of FORTRAN cards",
         "limits": "show the limits of the original programs as the step size goes to 0",
         "family": "derive and measure convergence orders of weighted residual methods",
@@ -30,13 +30,13 @@ _GROUPS = {
     },
     "rigid bodies": {
         "rotations": "find steady rotations, their stability, and the time between flips",
-        "prove": "enclose the true solution in proved intervals, with certificates",
+        "prove": "compute intervals that provably contain the true solution; check certificates",
         "sweep": "solve a grid of scenes, locally or on a cluster; store the results",
     },
     "checks and publication": {
-        "verify": "check our programs and methods, your port, or your integrator",
+        "verify": "check our programs and methods, your port of the programs, or your integrator",
         "stress": "test every method in extreme scenes against bounds from theory",
-        "bench": "measure run time against error of our and third-party integrators",
+        "bench": "measure run times and errors of our solvers and of third-party solvers",
         "edition": "write the annotated programs as a web site or as plain data",
     },
 }
@@ -145,7 +145,8 @@ def _complete() -> int:
 
 def _overview() -> str:
     lines = ["usage: pyharness VERB [options]", "       pyharness help VERB"]
-    lines.append("       pyharness help json VERB    the fields of --format json")
+    lines.append("       pyharness help json VERB    explains the fields of --format json")
+    lines += ["", "Rotation of rigid bodies, and three FORTRAN programs of a thesis of 1982."]
     for title, verbs in _GROUPS.items():
         lines += ["", f"{title}:", *(f"  {verb:10s}{about}" for verb, about in verbs.items())]
     lines += ["", "example:", "  pyharness compare --case 3"]

@@ -28,47 +28,46 @@ ONE_SCENE = "(--case N | --scene FILE)"
 # A placeholder after an option's name, as N in "--case N", means that the option takes a value.
 BODY = {
     "--case N": "Use this case of Table 1 of the thesis, 1 to 7, as the scene: body, initial "
-    "state, torque and steps. Give this or --scene.",
+    "state, torque and steps.",
     "--scene FILE": "Read the scene from this TOML file (`pyharness scene new` writes a sample).",
-    "--omega A,B,C": "Initial angular velocity (omega), rad/s: three components about the axes "
-    "of the body (default: the scene's).",
+    "--omega A,B,C": "Initial angular velocity (omega) about the body axes, in rad/s (default: "
+    "the scene's).",
 }
 SCENE = {
     **BODY,
-    "--step-size H": "Length of a step, s, above 0 (default: the scene's).",
-    "--steps N": "Number of steps from time 0, at least 1 (default: the scene's).",
+    "--step-size H": "Step size in s, above 0 (default: the scene's).",
+    "--steps N": "Number of steps, at least 1 (default: the scene's).",
 }
 LISTING = {
-    "--listing L": "Version of the program: original, with all defects (faults of its author; "
-    "default), or corrected, without any.",
-    "--fix NAME,...": "Correct these defects of the original program and keep all others (names: "
-    "`pyharness defects`).",
-    "--keep NAME,...": "Keep these defects of the original program and correct all others.",
-    "--reading NAME,...": "Interpret these doubtful cards (lines of a program) in the way "
-    "that we did not adopt (names: `pyharness defects --kind reading`).",
-    "--conjecture NAME,...": "Make these assumptions about statements missing from the original "
-    "program (names: `pyharness defects --kind conjecture`; none: no assumption; default: "
-    "torque-held, by which a varying torque is evaluated once in each step).",
-    "--lipschitz L": "Limit of the stop test, 1/s (default 500, as printed): the Runge-Kutta "
-    "program stops when, within a step, a derivative changes by more than L times the change of "
-    "its variable.",
-    "--no-stop": "Omit the stop test of --lipschitz, so that the Runge-Kutta program runs to its "
-    "last step.",
+    "--listing L": "Version of the program: original (default), or corrected, without defects "
+    "(faults of its author).",
+    "--fix NAME,...": "Correct only these defects of the original program (names: `pyharness "
+    "defects`).",
+    "--keep NAME,...": "Correct all defects of the original program except these.",
+    "--reading NAME,...": "Read these doubtful lines of the original program in the way that we "
+    "did not adopt (names: `pyharness defects --kind reading`).",
+    "--conjecture NAME,...": "Make these assumptions about missing statements of the original "
+    "program (names: `pyharness defects --kind conjecture`; none: no assumption). Default: "
+    "torque-held, which evaluates a varying torque once in each step.",
+    "--lipschitz L": "Stop the Runge-Kutta program when, within a step, a derivative changes by "
+    "more than L times the change of its variable; L in 1/s, above 0 (default 500, as in the "
+    "thesis).",
+    "--no-stop": "Omit the stop test of --lipschitz.",
 }
 _EFFORT = (
-    "Multiply the work limit of each computation by F, above 0 (default 1: about ten seconds{}). "
-    "Beyond the limit, the computation ends with an error."
+    "Factor of the work limit of each computation, above 0. The default, 1, allows about 10 "
+    "seconds{}. A computation that exceeds its limit ends with an error."
 )
-EFFORT = {"--effort F": _EFFORT.format(", or about 30 seconds for a program of the thesis")}
+EFFORT = {"--effort F": _EFFORT.format(" (30 for a program of the thesis)")}
 EFFORT_WITHOUT_PROGRAMS = {"--effort F": _EFFORT.format("")}
 STRICT = {
-    "--strict": "Exit with status 1 also if amplified rounding errors may exceed the tolerance, "
-    "not only if Fortran and Python differ, a corrected program misses its order of convergence, "
-    "or a method misses its tolerance or ends early."
+    "--strict": "Exit with status 1 also if amplified rounding errors may exceed the tolerance. "
+    "Without --strict, the status is 1 only if Fortran and Python differ, a corrected program "
+    "misses its order of convergence, or a method of --method misses its tolerance or ends early."
 }
 ALSO = {
-    "--also FILE,...": "Write the result to these files too; the ending of a name sets the "
-    "format: .md (Markdown), .xml (JUnit) or .json."
+    "--also FILE,...": "Write the result to these files too, each in the format of its ending: "
+    ".md (Markdown), .xml (JUnit) or .json."
 }
 _BY_SUFFIX = {".md": "markdown", ".xml": "junit", ".json": "json"}
 _WORTH_SAYING = 60.0  # run time (s) above which a forecast is printed
@@ -101,7 +100,7 @@ def outputs(formats: Sequence[str] = FORMATS, plot: str = "the results") -> dict
         "--plot FILE": f"Write a picture of {plot} to this file (.png, .svg or .pdf), and the "
         "plotted numbers to a .csv file of the same name."
     }
-    out = {"--out FILE": "Write the result to this file instead of standard output."}
+    out = {"--out FILE": "File for the result (default: standard output)."}
     return {**form, **(picture if plot else {}), **out}
 
 
@@ -179,7 +178,7 @@ def chosen_scene(options: argparse.Namespace, **allowed: bool) -> Scene:
     warn_of_attitude(scene)
     scene = checked_scene(replace(scene, **changes), **allowed)
     if scene.is_impossible:
-        warn("no rigid body has these moments, one exceeds the sum of the others; run all the same")
+        warn("no rigid body has these moments: the largest exceeds the sum of the others")
     return scene
 
 
@@ -221,7 +220,7 @@ def tell_inactive(options: argparse.Namespace, listings: Iterable[Listing]) -> N
     asked = {*names(options.reading), *names(options.conjecture)} - {"none"}
     active = {name for listing in listings for name in listing.active}
     for name in sorted(asked - active - set(names(options.fix))):
-        warn(f"no corrected statement depends on '{name}'; --keep {name} keeps it uncorrected")
+        warn(f"'{name}' has no effect on corrected statements; --keep {name} leaves it active")
 
 
 def listing_text(listing: Listing) -> str:

@@ -175,7 +175,7 @@ def _fitted(
             own = own[1:]
             continue
         if len(states) < len(times):
-            raise InputError("dense_output: the method reached fewer times than before")
+            raise InputError("dense output: the method reached fewer times than in its first run")
         largest = np.maximum(largest, np.abs(states).max(axis=0))
         sizes = sizes_of(largest, n_own)
         values = states[place.reshape(each.shape)]

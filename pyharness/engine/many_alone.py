@@ -212,8 +212,8 @@ def prepare_details(
     for each in functions:
         if np.isfinite(each.limit):
             raise InputError(
-                f"{each.name} is terminal; allowed in solve_many: events that are not; or call "
-                "solve for each body"
+                f"{each.name} is terminal; allowed in solve_many: events that are not terminal; or "
+                "call solve for each body"
             )
     names = None
     if sensitivities is not None:

@@ -137,7 +137,7 @@ class Run:
         """Return the exception for a phase above the limit at `time` (in units of `self.unit`)."""
         return TimedError(
             f"{self.label} stopped at t = {{time}} s: beyond {LARGEST_PHASE:.0e} radians the phase "
-            "has hardly a digit left; use a shorter time",
+            "has hardly a correct digit; use a shorter time",
             time * self.unit,
         )
 

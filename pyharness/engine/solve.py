@@ -149,8 +149,8 @@ def solve(
     check_torque(scene, method, attitude)
     if scene.states and any(scene.omega) and not is_ordinary(scene.omega):
         raise InputError(
-            f"omega is {scene.omega}; allowed with states of its own: 0, and a largest component "
-            "from 2**-300 to 2**300 rad/s"
+            f"omega is {scene.omega}; allowed in a scene with states of its own: 0, or a largest "
+            "component from 2**-300 to 2**300 rad/s"
         )
     functions = None if events is None else event_functions(events, attitude, scene.states)
     names = None if sensitivities is None else checked_names(scene, sensitivities, asked, attitude)

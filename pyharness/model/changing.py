@@ -166,8 +166,8 @@ class ChangingMoments(Changing):
         is_square = len(first) == len(second) == len(third) == 3
         if is_square and (first[1], first[2], second[2]) == (second[0], third[0], third[1]):
             raise InputError(
-                f"{where}: the rows of a symmetric matrix; allowed: inertia for a matrix, or for "
-                "polynomials a further coefficient 0"
+                f"{where}: the lists are the rows of a symmetric matrix; give it as inertia, or "
+                "append a coefficient 0 to a polynomial"
             )
         self._check_derivative()
 

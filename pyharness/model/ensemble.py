@@ -346,8 +346,7 @@ def place_for(
         array = getattr(out, name)
         if (array is None) == is_requested:
             raise InputError(
-                f"out.{name} does not match {name}; allowed: an array with {request}, None without "
-                "it"
+                f"out.{name}: allowed: an array with {request}, None without {request}"
             )
         if array is not None:
             buffer_of(f"out.{name}", array, (n, width), "d")

@@ -34,8 +34,8 @@ class InputError(ValueError):
 # The reason of an integration's end at a switch.
 SLIDING = (
     "a switch (where, sign, a comparison) would change back and forth without end from t = {time} "
-    "s on, because both sides push towards it; write a smooth function, such as tanh(x/width), or "
-    "hold the torque between steps of a Stepper"
+    "s on; write a smooth function, such as tanh(x/width), or hold the torque between steps of a "
+    "Stepper"
 )
 
 

@@ -185,7 +185,7 @@ def _tree(text: str, place: str) -> ast.expr:
         at = getattr(error, "offset", None) or 1
         near = text[max(at - 1, 0) :] or text
         raise InputError(
-            f"{place}: no arithmetic expression, at '{_short(near)}'; {_ALLOWED}"
+            f"{place}: not an arithmetic expression, at '{_short(near)}'; {_ALLOWED}"
         ) from None
 
 

@@ -46,25 +46,25 @@ _BETWEEN = (
 # Ratio of the largest moment to an excess that rounding may cause.
 _ROUNDED = 2**50
 FULL_INERTIA = (
-    "the scene has a full inertia matrix, and this takes principal axes; allowed: moments, or the "
-    "scene of pyharness.principal"
+    "the scene has a full inertia matrix; allowed: moments, or the scene that pyharness.principal "
+    "returns"
 )
 STATE_TORQUE = (
-    "the scene's torque depends on the state, and this needs a TorqueLaw: constant, linear and "
-    "sinusoidal terms of time; allowed: solve, prepare, solve_many, compare_methods, and the verbs "
-    "run and compare with --method auto, plan, prove, stress, and sweep with a method"
+    "the scene's torque depends on the state; allowed: a TorqueLaw of constant, linear and "
+    "sinusoidal terms of time; for this torque: solve, prepare, solve_many, compare_methods, and "
+    "the verbs plan, prove, stress, and, with the method auto, run, compare and sweep"
 )
 CHANGING = (
-    "the scene's inertia changes with time, and this takes a constant one; allowed for a changing "
-    "inertia: solve, prepare, solve_many, Stepper, and the verbs prove and run --method"
+    "the scene's inertia changes with time; allowed: a constant inertia; for a changing inertia: "
+    "solve, prepare, solve_many, Stepper, and the verbs prove and run --method"
 )
 OWN_STATES = (
-    "the scene has states of its own, which this can't integrate; allowed: solve, solve_many with "
-    "one scene, and the verb run, with the methods auto and taylor, and Stepper"
+    "the scene has states of its own; allowed for it: Stepper, and, with the methods auto and "
+    "taylor, solve, solve_many with one scene, and the verb run"
 )
 SPACE_TORQUE = (
-    "the torque is about the axes of space, and this takes one about those of the body; allowed: "
-    "methods auto and taylor, with the attitude"
+    "the torque is about the axes of space; allowed: a torque about the axes of the body, or the "
+    "methods auto and taylor with the attitude"
 )
 
 
@@ -267,7 +267,9 @@ class Scene:
                 given = inertia_function(place, given)
             if isinstance(given, Changing) and self.changing is None:
                 if given.place != place:
-                    raise InputError(f"[body] {place}: this is {given.place}; write {given.place}=")
+                    raise InputError(
+                        f"[body] {place}: the value belongs to {given.place}; write {given.place}="
+                    )
                 self._set("changing", given)
                 self._set(place, None)
         if self.changing is None:

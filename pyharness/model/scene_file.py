@@ -166,7 +166,7 @@ def _term_lines(term: tuple[tuple[str, Any], ...], changing: Changing | None) ->
     """Return the lines of a ready term; an inertia in it that changes must be that of the body."""
     if any(isinstance(value, Changing) and value != changing for _, value in term):
         raise InputError(
-            f"[torque]: a term {term[0][1]} whose inertia changes otherwise than that of the body "
+            f"[torque]: a term {term[0][1]} whose changing inertia differs from the body's "
             "can't be written to a file; allowed: the inertia of the body"
         )
     return [f"{key} = {_toml(value)}" for key, value in term if not isinstance(value, Changing)]

@@ -281,7 +281,8 @@ def _ordered_rates(rates: Any, names: tuple[str, ...]) -> list[Any]:
         return found
     if set(rates) != set(names):
         raise InputError(
-            f"[torque]: rates of {_listed(map(str, rates))}; allowed: of {_listed(names)}"
+            f"[torque]: the function returned rates of the states {_listed(map(str, rates))}; "
+            f"allowed: rates of {_listed(names)}"
         )
     return [rates[name] for name in names]
 

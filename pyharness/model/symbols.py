@@ -385,7 +385,7 @@ class Symbol:
         """Return a table at this symbol; raise InputError unless the symbol is the time."""
         if not self.is_time():
             raise InputError(
-                f"{self.recorder.place}: a table of anything but the time can't be recorded"
+                f"{self.recorder.place}: a table of a variable other than time can't be recorded"
             )
         return self.recorder.result("table", (), None, table)
 

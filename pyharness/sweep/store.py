@@ -36,7 +36,7 @@ from pyharness.sweep.store_layout import (
 from pyharness.sweep.sweep import Arrays, Sweep
 
 _UNFINISHED = "*.partial"  # Zarr's name for a file that is not renamed yet
-_SAME_SWEEP = "give another --out, or remove it"
+_SAME_SWEEP = "give another --out, or remove this folder"
 _REPAIR = "'pyharness sweep' with --repair"
 
 

@@ -68,8 +68,7 @@ def enclose(
         found = enclose_steps(scene, times, digits, velocity, transition, effort, progress)
     else:
         raise InputError(
-            "prove: this scene needs python-flint, which is not installed; install it with "
-            "'pip install python-flint'"
+            "prove: this scene needs python-flint; install it with 'pip install python-flint'"
         )
     return with_energy(scene, found)
 

@@ -129,7 +129,10 @@ def check_order(times: Sequence[float], who: str) -> None:
     away = [abs(t) for t in times]
     one_side = bool(times) and (min(times) >= 0.0 or max(times) <= 0.0)
     if not (one_side and all(t1 < t2 for t1, t2 in itertools.pairwise(away))):
-        raise InputError(f"{who}: times do not lead away from 0 on one side; give times that do")
+        raise InputError(
+            f"{who}: allowed: times that are all positive or all negative, in order of increasing "
+            "distance from 0"
+        )
 
 
 def _check_torque(scene: Scene) -> None:

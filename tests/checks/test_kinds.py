@@ -231,7 +231,7 @@ def test_record_that_is_none_is_told_in_one_line_and_mended(
 def test_no_record_is_said(tmp_path: Path, capsys: Capture) -> None:
     with patch("pyharness.cli.verbs.verify.RECORD", tmp_path / "none"):
         assert main(["verify", "--only", "golden,orders/rk4/case-5"]) == 0
-    assert "no golden record here" in capsys.readouterr().out
+    assert "no stored trajectories are here" in capsys.readouterr().out
 
 
 # One plant in both languages and one in a prepared solver; `verify --self-test` makes them all.

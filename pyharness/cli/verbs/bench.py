@@ -22,39 +22,38 @@ _Named = TypeVar("_Named", bound=Contender)
 _LONGEST = 1e3
 _BODIES, _MOST_BODIES, _MOST_GROWN = 100_000, 1_000_000, 10_000_000
 _TERM_BODIES = 1000
+_OPTION_OF = {"method": "--method", "peer": "--peers"}
 OPTIONS = {
     "--case N": "Measure only this case of Table 1 of the thesis, 1 to 7 (default: Cases 2 to 7, "
     "with --attitude also Case 1).",
-    "--horizon T": "End time of each integration, s, up to 1000 (default: 3 and, in Cases 3 and 4, "
-    "also 100; with --attitude, also 100 in all cases except 6).",
-    "--draws N": "Measure N random scenes, 1 to 10000, with all kinds of torque and body, "
-    "instead of the cases.",
-    "--ensemble": "Measure calls that solve many bodies at once: bodies per second, time per "
-    "body as a function of the number of bodies, and memory.",
-    "--terms": "Measure run times, for one body and many, under torques that depend on omega "
-    "(angular velocity), time and attitude: ready-made ones (pyharness.torques) and Python "
-    "functions.",
+    "--horizon T": "End time of each integration, in s, above 0, up to 1000. Default: 3, and also "
+    "100 in Cases 3 and 4 (with --attitude, in all cases except 6).",
+    "--draws N": "Instead of the cases, measure N random scenes, 1 to 10000, with all kinds of "
+    "torque and body.",
+    "--ensemble": "Instead of single trajectories, measure calls that solve many bodies at once: "
+    "bodies per second, time per body as a function of the number of bodies, and memory.",
+    "--terms": "Instead of the cases, measure torques that depend on omega (angular velocity), "
+    "time and attitude, for one body and many. Some are ready-made (pyharness.torques), others are "
+    "Python functions.",
     "--bodies N": f"Number of bodies of --ensemble or --terms, 1 to {_MOST_BODIES} (default "
     f"{_BODIES} with --ensemble, {_TERM_BODIES} with --terms).",
-    "--seed S": "Text that seeds the random scenes or bodies, so that a run can be repeated "
-    "(default: the present year and week, as in 2026-W47).",
+    "--seed S": "Seed, any text, of the random scenes of --draws or the bodies of --ensemble or "
+    "--terms (default: the present year and week, as in 2026-W47).",
     "--attitude": "Compute and measure the attitude (orientation) of the body together with omega.",
-    "--method M,...": "Measure only these of our methods and programs, as named in the first "
-    "column of the result; none: measure none of them (default: all).",
-    "--peers X,Y": "Measure only these third-party solvers, by their names in the first column "
-    "of the result or by package (heyoka, numba, scipy); none: measure none of them (default: all "
-    "installed ones).",
-    "--compiled": "With --terms, compile Python functions with the C compiler first, as "
-    "prepare(..., compiled=True) does.",
-    "--plan": "Measure instead run times with and without each computation that `pyharness plan` "
-    "can omit.",
-    "--growth": "Measure instead how the error of the Taylor method grows with the integration "
-    "time, up to 1e5 s, in Cases 3 and 4.",
+    "--method M,...": "Measure only these of our methods and programs, by their names in the first "
+    "column of the result, or none (default: all).",
+    "--peers NAME,...": "Measure only these third-party solvers, by their names in the first "
+    "column of the result or by package (heyoka, numba, scipy), or none (default: all installed).",
+    "--compiled": "With --terms, compile the Python functions with the C compiler first.",
+    "--plan": "Instead of comparing solvers, measure run times with and without each computation "
+    "that `pyharness plan` can omit.",
+    "--growth": "Instead of comparing solvers, measure how the error of the Taylor method grows "
+    "with the integration time, up to 1e5 s, in Cases 3 and 4.",
     **shared.outputs(),
 }
 GROUPS = {
-    "what is measured": "case horizon attitude draws ensemble terms bodies seed plan growth",
-    "which solvers": "method peers compiled",
+    "measurements": "case horizon attitude draws ensemble terms bodies seed plan growth",
+    "solvers": "method peers compiled",
 }
 EXAMPLE = "bench --case 5 --peers none"
 
@@ -113,10 +112,7 @@ def _present(
         )
     contenders = [*methods, *(each for each in others if each.is_installed)]
     if not contenders:
-        raise InputError(
-            "bench: no method and no third-party package is chosen; give at least one, with "
-            "--method or --peers"
-        )
+        raise InputError("bench: no solver is chosen; give at least one, with --method or --peers")
     return contenders, missing
 
 
@@ -152,7 +148,8 @@ def chosen(
     lacking = [each.name for each in found if not each.attitude]
     if attitude and lacking and text is not None:
         able = ", ".join(each.name for each in contenders if each.attitude)
-        raise InputError(f"--{what}s: {lacking[0]} does not compute attitudes; allowed: {able}")
+        option = _OPTION_OF[what]
+        raise InputError(f"{option}: {lacking[0]} does not compute attitudes; allowed: {able}")
     return found
 
 
@@ -257,5 +254,5 @@ def named(contenders: Sequence[_Named], text: str | None, what: str) -> list[_Na
     allowed = [*(each.name for each in contenders), *packages]
     for name in names:
         if name not in allowed:
-            raise unknown(what, name, [*allowed, "none"], f"--{what}s")
+            raise unknown(what, name, [*allowed, "none"], _OPTION_OF[what])
     return [each for each in contenders if not names or {each.name, each.package} & {*names}]

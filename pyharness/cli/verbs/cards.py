@@ -24,21 +24,21 @@ _LARGEST_SCAN = 1 << 24  # largest size (bytes) of a text
 _KINDS = ("--format tei", "--classes", "--collate", "--origins", "--second-reading", "--scan")
 FORMATS = (*shared.FORMATS, "tei")
 OPTIONS = {
-    "cards CARDS": "Show these cards (lines of the programs), by program, number or range, as in "
-    "two-term, 1660, 1040-1090 or two-term:1660 (default: a table of "
-    "contents; in JSON, CSV and Markdown, all cards).",
-    "--classes": "Count the notes of each kind (defect, doubtful reading, ...), the cards that "
-    "they name, and the differences from the scan that they explain.",
-    "--collate": "Compare the three programs, operation by operation, with each other and with "
-    "sections II to V of the thesis.",
+    "cards CARDS": "Cards (program lines) to show, separated by commas: programs, numbers or "
+    "ranges, as in two-term, 1660, 1040-1090 or two-term:1660 (default: a table of contents; in "
+    "JSON, CSV and Markdown, all cards).",
+    "--classes": "For each kind of note (defect, doubtful reading, ...), count the notes, the "
+    "cards that they name, and the differences between cards and scan that they explain.",
+    "--collate": "Compare the operations of the three programs with each other and with sections "
+    "II to V of the thesis.",
     "--origins": "Show where the programs and the thesis disagree, and what each disagreement "
     "suggests about the origin of a fault.",
     "--second-reading": "Compare our text of a random sample of cards with a second reading of "
     "the scan, and estimate how many misreadings remain.",
-    "--scan FILE": "Compare our text of the cards, character by character, with the text in this "
-    "file, which character recognition (OCR) made from a scan of the thesis.",
+    "--scan FILE": "Compare our text of the cards, character by character, with a scan of the "
+    "thesis: this file has its text, made by character recognition (OCR).",
     **shared.outputs(FORMATS, plot=""),
-    "--format F": f"Output format: {', '.join(FORMATS)} (default {FORMATS[0]}). tei: all cards "
+    "--format F": f"Output format: {', '.join(FORMATS)} (default {FORMATS[0]}). tei has all cards "
     "and notes in TEI, the XML format of text editions.",
 }
 GROUPS = {"instead of cards": "classes collate origins second-reading scan"}

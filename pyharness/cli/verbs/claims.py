@@ -17,18 +17,20 @@ from pyharness.thesis.programs import BINARY64, WORD_NAMES
 
 OPTIONS = {
     "--explain ID": "Explain the verdict on one claim (statement of the thesis), with the "
-    "numbers behind it; ID is its name in the output of `pyharness claims`.",
+    "numbers behind it. ID is the claim's name in the output of `pyharness claims`.",
     "--assignments": "For each case whose initial angular velocity the thesis omits, show for "
-    "which assumed values the claims about this case hold.",
+    "which assumed values the claims about this case hold (formats: table, json).",
     "--word W": f"Floating-point arithmetic of the programs: {', '.join(WORD_NAMES)} (default "
-    f"{WORD_NAMES[0]}). cdc48 is the truncating, cdc48-rounded the rounding arithmetic of CDC "
-    "computers.",
+    f"{WORD_NAMES[0]}). cdc48 is the arithmetic of CDC computers, which truncates results; "
+    "cdc48-rounded rounds them. Not with --assignments, --evidence or --atlas.",
     "--evidence": "Count the claims that hold for each combination of initial angular velocity, "
-    "readings of doubtful statements, assumptions about missing ones, and number of steps.",
-    "--atlas STORE": "Report from which initial angular velocities the claims hold, according to "
-    "the results of `pyharness sweep` in this folder; needs --sweep.",
-    "--sweep FILE.toml": "The sweep file from which `pyharness sweep` made the folder of --atlas.",
-    **shared.outputs(plot="the counts of --evidence, or the map of --atlas,"),
+    "interpretation of doubtful statements, assumptions about missing statements, and number of "
+    "steps.",
+    "--atlas STORE": "Show from which initial angular velocities the claims hold. STORE is the "
+    "folder in which `pyharness sweep` stored the results; needs --sweep.",
+    "--sweep FILE.toml": "Sweep file from which `pyharness sweep` computed the results in STORE; "
+    "needs --atlas.",
+    **shared.outputs(plot="the counts of --evidence or the map of --atlas"),
 }
 GROUPS = {"instead of all verdicts": "explain assignments evidence atlas sweep"}
 EXAMPLE = "claims --explain abstract-superior"
@@ -45,10 +47,10 @@ def run(options: argparse.Namespace) -> int:
         shared.check_known("format", options.format, ("table", "json"))
     if options.atlas is not None:
         return _atlas(options)
-    shared.refuse(options, "the ledger; give --atlas", ("sweep",))
+    shared.refuse(options, "the verdicts; give --atlas", ("sweep",))
     if options.evidence:
         return _evidence(options)
-    shared.refuse(options, "the ledger; give --evidence", ("plot",))
+    shared.refuse(options, "the verdicts; give --evidence", ("plot",))
     shared.check_known("word", options.word, WORD_NAMES)
     chosen = claims() if options.explain is None else [claim(options.explain)]
     shared.check_outputs(options)

@@ -17,24 +17,25 @@ from pyharness.thesis.programs import BINARY64, WORD_NAMES
 OPTIONS = {
     **shared.SCENE,
     **shared.LISTING,
-    "--listing L": "Version of the programs: original, with all defects (faults of their "
-    "author), or corrected, without any (default: both).",
-    "--program P": f"Compare this program alone: {', '.join(PROGRAMS)} (default: all three).",
-    "--method M,...": "Compare these methods (names: docs/reference/methods.md) instead of the "
-    "programs; the torque may then depend on omega or attitude.",
+    "--listing L": "Version of the programs: original, or corrected, without defects (faults of "
+    "their author); default: both.",
+    "--program P": f"Compare only this program: {', '.join(PROGRAMS)} (default: all three). The "
+    "first two use collocation.",
+    "--method M,...": "Compare these methods instead of the programs, such as auto,taylor,dop853 "
+    "(all names: docs/reference/methods.md). The torque may then depend on omega or attitude.",
     "--word W": f"Floating-point arithmetic of the programs: {', '.join(WORD_NAMES)} (default "
-    f"{WORD_NAMES[0]}). cdc48 is the truncating, cdc48-rounded the rounding arithmetic of CDC "
-    "computers.",
-    "--tolerance E": "Largest allowed error of the methods (without --method, of SciPy's "
-    "solve_ivp), relative to the largest component of omega, at most 1 (default: the method's "
-    "own).",
+    f"{WORD_NAMES[0]}). cdc48 is the arithmetic of CDC computers, which truncates results; "
+    "cdc48-rounded rounds them.",
+    "--tolerance E": "Largest allowed error of omega, relative to its largest component, at most 1 "
+    "(default: each method's own). It applies to the methods of --method; without them, to SciPy's "
+    "solve_ivp.",
     "--attitude": "Compare the attitude (orientation) of the body too; its error is an angle in "
     "rad.",
     "--ablate": "Run each program with every subset of its defects, and list the subsets, largest "
     "error first. Errors are compared up to the last step that all runs reached.",
-    "--numerics": "Also show drifts of energy and momentum, differences between Fortran and Python "
-    "in units in the last place, the error amplification, the errors of SciPy's solve_ivp, and "
-    "run times (JSON and CSV always have them).",
+    "--numerics": "Show also the drifts of energy and momentum, the differences between Fortran "
+    "and Python in units in the last place, the error amplification, the errors of SciPy's "
+    "solve_ivp, and the run times. JSON and CSV always have them.",
     **shared.STRICT,
     **shared.EFFORT,
     **shared.outputs(),

@@ -17,12 +17,13 @@ OPTIONS = {
     "(default: the published data, Case 5 for runge-kutta and Case 2 for the others).",
     **{each: shared.LISTING[each] for each in list(shared.LISTING)[:5]},
     "--dialect D": f"Form of the deck: {', '.join(DIALECTS)} (default {DIALECTS[0]}, as printed). "
-    "gfortran has changes for this compiler; ftn is a batch job for the CDC's compiler FTN.",
-    "--system S": "Operating system of the CDC computer that runs the job of --dialect ftn: "
+    "gfortran is adapted to this compiler; ftn is a batch job for FTN, the compiler of CDC "
+    "computers.",
+    "--system S": "With --dialect ftn, operating system of the CDC computer that runs the job: "
     f"{' or '.join(SYSTEMS)} (default nos).",
-    "--round": "Let FTN round results instead of truncating them; needs --dialect ftn.",
-    "--terms N": "Write a collocation deck with N terms, 3 or 5, derived from the four-term deck; "
-    "a conjecture, because the thesis prints no such deck. Needs --program four-term.",
+    "--round": "With --dialect ftn, let FTN round results instead of truncating them.",
+    "--terms N": "With --program four-term, write a deck for collocation with N terms, 3 or 5. It "
+    "is a conjecture derived from the four-term deck: the thesis prints no such deck.",
     **shared.outputs(FORMATS, plot=""),
 }
 USAGE = "--program P"
@@ -39,8 +40,8 @@ def run(options: argparse.Namespace) -> int:
     dialect = options.dialect or DIALECTS[0]
     if dialect == "1982" and (case == 7 or listing.has("do-variable")):
         shared.warn(
-            "the torque of Case 7 and what becomes of a DO variable are on no card; --dialect "
-            "gfortran has both, ftn the torque"
+            "no card has the torque of Case 7 or the value of a DO variable after its loop; "
+            "--dialect gfortran supplies both, --dialect ftn the torque"
         )
     terms = None if options.terms is None else shared.whole(options.terms, "--terms")
     text = deck_text(listing, scene, dialect, terms)

@@ -8,12 +8,14 @@ from pyharness.model.report import Report
 
 FORMATS = ("table", "json")
 OPTIONS = {
-    "name NAME": "Show one entry of the list and its effect in every case; NAME is its name or its "
-    "card (numbered line of a program), as in stage-base, 1660 or two-term:1660 (default: list the "
-    "defects that change numbers).",
-    "--all": "List all entries, also those that change no number (JSON always has all).",
+    "name NAME": "Entry to show with its effect in every case: its name or its card (numbered "
+    "line of a program), as in stage-base, 1660 or two-term:1660. By default, list the defects "
+    "that change numbers.",
+    "--all": "List all entries, also those that change no number (JSON always has all); not with "
+    "NAME.",
     "--kind K": "List only entries of this kind, such as defect (fault of the author), reading "
-    "(doubtful card) or conjecture (assumption about a missing card).",
+    "(line that can be read in two ways) or conjecture (assumption about a missing line); not with "
+    "NAME.",
     **shared.outputs(FORMATS, plot=""),
 }
 EXAMPLE = "defects stage-base"

@@ -7,13 +7,13 @@ from pyharness.model.errors import InputError
 
 FORMATS = ("table", "json")
 OPTIONS = {
-    "--out DIR": "Write the web pages to this folder, which is created if missing; the first "
-    "page is index.html. Give this or --data.",
-    "--data DIR": "Write only the data to this folder, as CSV, JSON, TEI and text: cards (lines "
-    "of the programs), notes on them, verdicts on the thesis, figures, runs, and the pages that "
-    "the programs print.",
-    "--docs DIR": "Folder of the documents from which pages are made (default: docs of the "
-    "source checkout).",
+    "--out DIR": "Write the web pages to this folder, which is created if missing; the first page "
+    "is index.html.",
+    "--data DIR": "Instead of web pages, write the data to this folder, as CSV, JSON, TEI (XML) "
+    "and text: cards (program lines), notes on them, verdicts on the thesis, figures, runs, and "
+    "the pages that the programs print.",
+    "--docs DIR": "With --out, folder of the documents from which pages are made (default: docs of "
+    "the source checkout).",
     "--format F": "Output format of the list of written files: table (default) or json.",
 }
 USAGE = "(--out DIR | --data DIR)"

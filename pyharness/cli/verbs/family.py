@@ -14,18 +14,19 @@ OPTIONS = {
     "--case N": "Use this case of Table 1 of the thesis, 1 to 7, as the scene (default: "
     f"{_DEFAULT_CASE}, without --scene).",
     "--weighting W": "Measure one method, with this weighting of its residual: "
-    f"{', '.join(WEIGHTINGS)} (default: several methods, or collocation if --terms, --points or "
+    f"{', '.join(WEIGHTINGS)} (default: several methods; collocation alone if --terms, --points or "
     "--corrections is given).",
     "--terms N": "Number of terms of the trial function, 1 to 12 (default 2).",
-    "--points P": "Collocation points: thesis (equally spaced, default), gauss (Legendre "
-    "nodes), or one fraction of the step for each term, as in 0.3,0.6.",
+    "--points P": "Collocation points in each step: thesis (equally spaced, default), gauss "
+    "(Legendre nodes), or one fraction of the step for each term, as in 0.3,0.6.",
     "--corrections K": "Number of times that each step corrects its first estimate, 0 to 100 "
     "(default 1).",
-    "--lost": "Instead, examine three programs that failed in the thesis (IV.2) but are not "
-    "printed there: rank possible mistakes by how many of the three would fail with each.",
-    "--word W": f"Floating-point arithmetic of the programs of --lost: {', '.join(WORD_NAMES)} "
-    f"(default {WORD_NAMES[0]}). cdc48 is the truncating, cdc48-rounded the rounding arithmetic of "
-    "CDC computers.",
+    "--lost": "Instead of measuring orders, rank mistakes that may explain three failed programs. "
+    "Section IV.2 of the thesis reports the failures but prints no program; a mistake ranks by how "
+    "many of the three would fail with it.",
+    "--word W": "Floating-point arithmetic of the programs of --lost: "
+    f"{', '.join(WORD_NAMES)} (default {WORD_NAMES[0]}). cdc48 is the arithmetic of CDC computers, "
+    "which truncates results; cdc48-rounded rounds them.",
     **shared.outputs(plot=""),
 }
 EXAMPLE = "family --case 5 --weighting galerkin --terms 3"
@@ -38,7 +39,7 @@ def run(options: argparse.Namespace) -> int:
     """
     if options.lost:
         return _lost(options)
-    shared.refuse(options, "the family; give --lost", ("word",))
+    shared.refuse(options, "the measurement of orders; give --lost", ("word",))
     if options.case is None and options.scene is None:
         options.case = _DEFAULT_CASE
     scene = shared.chosen_scene(options)

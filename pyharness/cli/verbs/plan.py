@@ -9,13 +9,14 @@ from pyharness.engine.solver import PREPARED
 
 OPTIONS = {
     **shared.BODY,
-    "--method M": f"Plan a solution by this method: {', '.join(PREPARED)} (default auto, which "
-    "chooses closed-form, quick or taylor).",
+    "--method M": "Plan a solution by this method: auto (default), closed-form, taylor, quick, "
+    "improved-euler, taylor-3, rk4, or gauss-1 to gauss-8. With auto, the plan chooses "
+    "closed-form, quick or taylor.",
     "--tolerance E": "Largest allowed error of omega, relative to its largest component, at most "
     "1 (default: the method's own, 1e-9 for auto).",
     "--velocity": "Plan the computation of the translational velocity too.",
-    "--times T1,T2,...": "Times of the results, s (default: the end of the scene's last "
-    "step). Several times require intermediate output.",
+    "--times T1,T2,...": "Times of the results, in s (default: the end of the scene's last step). "
+    "The plan includes intermediate output if there are several.",
     **shared.outputs(plot=""),
 }
 USAGE = shared.ONE_SCENE

@@ -14,18 +14,19 @@ from pyharness.truth.enclosure_report import certificates_report, enclosure_repo
 _DIGITS = 25
 OPTIONS = {
     **shared.SCENE,
-    "--times T1,T2,...": "Times of the results, s, all positive or all negative, in order of "
+    "--times T1,T2,...": "Times of the results, in s, all positive or all negative, in order of "
     "increasing distance from 0 (default: the end of the scene's last step).",
-    "--digits D": f"Number of digits, 1 to {MOST_DIGITS} (default {_DIGITS}): the half-width of "
-    "each interval is at most 10**-D rad/s, times the largest component of omega if that exceeds "
-    "1 rad/s.",
-    "--velocity": "Enclose the translational velocity too; needs python-flint.",
+    "--digits D": f"Number D of digits, 1 to {MOST_DIGITS} (default {_DIGITS}). The half-width of "
+    "each interval is at most 10**-D rad/s; if the largest component of omega exceeds 1 rad/s, at "
+    "most 10**-D times this component.",
+    "--velocity": "Enclose the translational velocity too; needs the package python-flint.",
     "--transition": "Enclose the derivatives of the solution with respect to the initial omega "
-    "too; needs python-flint.",
+    "too; needs the package python-flint.",
     "--certificate FILE": "Write the steps of the proof to this file (.json) as a certificate that "
-    "--check can verify; only for torques that depend on time alone.",
-    "--check FILE,...": "Verify the certificates in these files instead of proving anything; "
-    "needs no scene and no third-party library.",
+    "--check can verify; only for torques that depend on time alone; not with --velocity or "
+    "--transition.",
+    "--check FILE,...": "Verify the certificates in these files instead of proving anything; needs "
+    "no third-party library.",
     **shared.EFFORT_WITHOUT_PROGRAMS,
     **shared.outputs(plot=""),
 }

@@ -9,12 +9,12 @@ from pyharness.model.errors import InputError
 
 OPTIONS = {
     **shared.BODY,
-    "--disturbance D": "Size of the perturbation of each steady rotation (constant omega), divided "
-    "by this omega, above 0 and below 1 (default 0.001). In a flip, a body perturbed in its "
-    "rotation about the middle axis reverses omega about this axis.",
+    "--disturbance D": "Size of the perturbation of each steady rotation (rotation with constant "
+    "omega), divided by this omega; above 0 and below 1 (default 0.001). The time between flips "
+    "depends on it. In a flip, the rotation about the middle axis is reversed.",
     **shared.outputs(
-        plot="the polhodes (curves of omega without torque), and the growth rates of perturbations "
-        "for all ratios of the moments of inertia,"
+        plot="the polhodes (curves of omega without torque) and of the growth rates of "
+        "perturbations"
     ),
 }
 USAGE = shared.ONE_SCENE

@@ -28,23 +28,23 @@ PROGRAM_FORMATS = ("printer", "tape5")
 FORMATS = (*shared.FORMATS, *PROGRAM_FORMATS)
 OPTIONS = {
     **shared.SCENE,
-    "--program P": f"Run this program of the thesis: {', '.join(PROGRAMS)}. With "
-    "--case, give this or --method.",
-    "--implementation I": "Language of the program: fortran or python (default fortran, but "
-    "python with --word other than binary64).",
+    "--program P": f"Run this program of the thesis: {', '.join(PROGRAMS)}. The first two use "
+    "collocation.",
+    "--implementation I": "Language of the program: fortran (default with --word binary64) or "
+    "python (default with any other --word).",
     "--word W": f"Floating-point arithmetic of the program: {', '.join(WORD_NAMES)} (default "
-    f"{WORD_NAMES[0]}). cdc48 is the truncating, cdc48-rounded the rounding arithmetic of CDC "
-    f"computers. The Fortran programs support only {', '.join(COMPILED_WORDS)}.",
+    f"{WORD_NAMES[0]}). cdc48 is the arithmetic of CDC computers, which truncates results; "
+    f"cdc48-rounded rounds them. The Fortran programs support only {', '.join(COMPILED_WORDS)}.",
     "--method M": "Solve the scene by this method instead of a program: auto (default with "
     "--scene), taylor, closed-form, dop853 or another of docs/reference/methods.md.",
     **shared.LISTING,
-    "--times T1,T2,...": "Times of the results, s, positive or negative, in increasing or "
+    "--times T1,T2,...": "Times of the results, in s, positive or negative, in increasing or "
     "decreasing order (default: the ends of the scene's steps); not with --program.",
-    "--attitude [FORM]": "Compute the attitude (orientation) of the body too (default: only "
-    f"if the scene has one), and print it as {', '.join(FORMS)} (default {FORMS[0]}); 3-1-3 "
-    "and 3-2-1 are Euler angles about these axes.",
-    "--animate FILE": "Write an animation of the rotating body to this file (.gif or .html); "
-    "needs an attitude; not with --program.",
+    "--attitude [FORM]": "Compute the attitude (orientation) of the body, even if the scene has "
+    f"none. FORM is {', '.join(FORMS)} (default {FORMS[0]}); 3-1-3 and 3-2-1 are Euler angles "
+    "about these axes.",
+    "--animate FILE": "Write an animation of the rotating body to this file (.gif or .html). It "
+    "needs --attitude or a scene with an attitude; not with --program.",
     "--tolerance E": "Largest allowed error of omega, relative to its largest component (default: "
     "the method's own, 1e-9 for auto); not with --program.",
     "--strict": "Exit with status 1 if amplified rounding errors may exceed the tolerance, or if "
@@ -52,7 +52,8 @@ OPTIONS = {
     **shared.EFFORT,
     **shared.outputs(FORMATS),
     "--format F": f"Output format: {FORMATS[0]} (default), {', '.join(shared.FORMATS[1:])}. With "
-    "--program also printer (the page that the program prints) and tape5 (its binary file TAPE5).",
+    "--program also printer (the page that the program prints) or tape5 (the binary file TAPE5 "
+    "that it writes).",
 }
 GROUPS = {
     "a program of the thesis": "program implementation word",

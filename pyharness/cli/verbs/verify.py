@@ -19,11 +19,11 @@ _OF_THE_CHECKS = ("only", "seed", "draws", "external", "self_test", "update", "r
 _ABOUT = {
     "cells": "Fortran programs against Python",
     "words": "other floating-point formats",
-    "decks": "the compiled cards",
+    "decks": "programs compiled from cards",
     "schemes": "single steps of the programs",
     "stops": "the stop test of the Runge-Kutta program",
     "methods": "errors of omega",
-    "prepared": "solvers for many calls, made by `prepare`",
+    "prepared": "solvers for many calls",
     "attitudes": "errors of the attitude",
     "orders": "orders of convergence",
     "random": "random scenes",
@@ -31,44 +31,46 @@ _ABOUT = {
     "golden": "stored trajectories",
 }
 OPTIONS = {
-    "--only ID,...": "Run only checks of these kinds, or only those whose ids begin with this "
-    "text, as in cells/two-term. Kinds: "
+    "--only ID,...": "Run only the checks of these kinds, or whose ids begin with these texts, as "
+    "in cells/two-term. Kinds: "
     f"{', '.join(f'{kind} ({_ABOUT[kind]})' for kind in KINDS)}.",
-    "--seed S": "Text that seeds the random scenes, so that a run can be repeated (default: the "
-    "present year and week, as in 2026-W47).",
-    "--draws N": f"Number of random scenes (default: {DRAWS}; 0 with --port; 2 for each kind "
-    "of torque with --integrator).",
-    "--external FILE": "Do nothing but compare our methods with the published results in "
-    "this file (format: docs/how-to/external.md).",
-    "--listing-output FILE": "Find the floating-point arithmetic with which one of the programs "
-    "prints the page in this file, which an unknown machine printed.",
-    "--port COMMAND": "Start a version of the programs in another language by this command, and "
-    "compare it bit for bit with ours in Python (docs/how-to/ports.md).",
-    "--integrator COMMAND": "Start an integrator of rigid bodies by this command, compare it "
-    "with the true solution of random scenes, and name its faults (docs/how-to/integrators.md).",
-    "--order P": "Lowest order of convergence that your integrator (--integrator) may have "
-    "(default 1).",
+    "--seed S": "Seed of the random scenes, any text (default: the present year and week, as in "
+    "2026-W47).",
+    "--draws N": f"Number of random scenes, up to 1000000 (default {DRAWS}, or 0 with --port). "
+    "With --integrator, the number for each kind of torque, 1 to 1000 (default 2).",
+    "--external FILE": "Only compare our methods with the published results in this file (format: "
+    "docs/how-to/external.md).",
+    "--listing-output FILE": "Find the floating-point arithmetic of an unknown computer. FILE is a "
+    "page that one of the three programs printed on it; we compare the page with our runs in each "
+    "arithmetic (formats: table, json).",
+    "--port COMMAND": "Compare your port of the programs (their version in another language) bit "
+    "for bit with our Python programs. COMMAND starts it (protocol: docs/how-to/ports.md).",
+    "--integrator COMMAND": "Compare your integrator of rigid-body motion with the true solutions "
+    "of random scenes, and name its faults. COMMAND starts it (protocol: "
+    "docs/how-to/integrators.md).",
+    "--order P": "With --integrator, lowest order of convergence that passes, above 0 and at most "
+    "40 (default 1).",
     "--program P": "With --listing-output or --port, consider only this program: two-term, "
     "four-term or runge-kutta (default: all three).",
     "--case N": "With --listing-output or --port, consider only this case of Table 1 of the "
     "thesis, 1 to 7 (default: all).",
     "--cell NAME,...": "With --port, compare only these runs, as in two-term/case-3, or random "
-    "scenes, as in random/7; with --integrator, only these scenes, as in wave-1, or only scenes "
+    "scenes, as in random/7. With --integrator, use only these scenes, as in wave-1, or scenes "
     "with these kinds of torque: free (none), constant, wave (default: all).",
-    "--self-test": "Plant known faults one by one in the software, or in the answers of --port "
-    "or --integrator, and report which checks detect each.",
-    "--update": "Compute and write the stored trajectories (golden) again, and report "
-    "what changed.",
+    "--self-test": "Plant known faults, one by one, in our software, or in the answers of your "
+    "port or integrator, and report which checks detect each fault.",
+    "--update": "Compute the stored trajectories (kind golden) again, write them, and report "
+    "which changed.",
     "--record DIR": "Folder of the stored trajectories (default: tests/golden of the source "
     "checkout).",
-    **shared.outputs(FORMATS, plot="the errors of your integrator (--integrator)"),
+    **shared.outputs(FORMATS, plot="the errors of your integrator (needs --integrator)"),
     **shared.ALSO,
 }
 GROUPS = {
     "our programs and methods": "only seed draws self-test update record",
-    "a program of yours": "port integrator order",
-    "data of yours": "external listing-output",
-    "selection with the options above": "program case cell",
+    "your program": "port integrator order",
+    "your data": "external listing-output",
+    "selection for --port, --integrator and --listing-output": "program case cell",
 }
 EXAMPLE = "verify --only cells,methods"
 
@@ -81,13 +83,13 @@ def run(options: argparse.Namespace) -> int:
         from pyharness.cli.command_checks import check_integrator
 
         return check_integrator(options)
-    shared.refuse(options, "the checks; give --integrator", ("order", "plot"))
+    shared.refuse(options, "our own checks; give --integrator", ("order", "plot"))
     if options.port is not None:
         from pyharness.cli.command_checks import check_port
 
         return check_port(options, *_programs_and_cases(options))
-    shared.refuse(options, "the checks; give --listing-output or --port", ("program", "case"))
-    shared.refuse(options, "the checks; give --port or --integrator", ("cell",))
+    shared.refuse(options, "our own checks; give --listing-output or --port", ("program", "case"))
+    shared.refuse(options, "our own checks; give --port or --integrator", ("cell",))
     chosen = _selection(options)
     shared.check_outputs(options)
     if options.update:
@@ -105,11 +107,13 @@ def run(options: argparse.Namespace) -> int:
     if not checks:
         if chosen.may_ask("decks") and compiler() is None:
             raise InputError(
-                "the check needs gfortran to compile decks, and there is none on the PATH; "
-                "install it"
+                "the check needs gfortran to compile decks; install it, or put it on the PATH"
             )
         if not chosen.record.is_dir() and chosen.may_ask("golden"):
-            raise InputError("there is no golden record here; give --record DIR, or a checkout")
+            raise InputError(
+                "there are no stored trajectories (golden) here; give --record DIR, or run in a "
+                "source checkout"
+            )
         asked = f"--only {options.only}" if options.only else "--draws 0"
         raise InputError(f"{asked}: there is no such check; allowed: {', '.join(KINDS)}")
     drawn = samples(checks, ROUNDING) if options.draws is not None else []
@@ -177,7 +181,7 @@ def _selection(options: argparse.Namespace) -> Selection:
 def _title(chosen: Selection) -> list[str]:
     title = [f"seed of the random draws: {chosen.seed}"] if chosen.may_ask("random") else []
     if chosen.may_ask("golden") and not chosen.record.is_dir():
-        title.append("there is no golden record here (it is in the checkout): not compared")
+        title.append("golden: not run, as no stored trajectories are here (see --record)")
     return title
 
 
@@ -188,7 +192,10 @@ def _unjudged(chosen: Selection, checks: list[Check]) -> list[str]:
     count = sum(check.passed and check.value is None for check in checks)
     if chosen.problems is None or not count:
         return []
-    return [f"{count} of {len(checks)} judge nothing: too much for the method (--format json: why)"]
+    return [
+        f"{count} of {len(checks)} checks have no verdict, because the method can't solve the "
+        "problem (--format json has the reason)"
+    ]
 
 
 def _update(record: Path) -> int:
@@ -196,7 +203,9 @@ def _update(record: Path) -> int:
     from pyharness.cli.output import check_folder, write_folder
 
     if not record.parent.is_dir():
-        raise InputError("there is no golden record here to update; give --record DIR")
+        raise InputError(
+            "there are no stored trajectories (golden) here to update; give --record DIR"
+        )
     check_folder(str(record), (), "--record")
     files, news = update(record)
     write_folder(str(record), files, "--record")

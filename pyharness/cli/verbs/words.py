@@ -17,14 +17,14 @@ FORMATS = ("table", "json", "csv", "markdown")
 OPTIONS = {
     "--case N": "Run only this case of Table 1 of the thesis, 1 to 7 (default: all).",
     "--program P": f"Run only this program: {', '.join(PROGRAMS)} (default: all three).",
-    "--lengths": f"Show each run in selected precisions from {LENGTHS[0]} to {LENGTHS[-1]} bits "
-    "(about two minutes; implied by --plot and by formats other than table). By default, show only "
-    "whether CDC arithmetic changes the result.",
-    "--all": f"Show each run in every precision from {LENGTHS[0]} to {LENGTHS[-1]} bits (about "
-    "twelve minutes).",
-    "--vectors FILE": "Run no program; check our emulation of the CDC's arithmetic against the "
-    "operations and results in this JSON file.",
-    **shared.outputs(FORMATS, plot="the error as a function of the precision, for one --case,"),
+    "--lengths": f"Show each run in selected precisions from {LENGTHS[0]} to {LENGTHS[-1]} bits; "
+    "takes about two minutes. Formats other than table, and --plot, imply it. By default, show "
+    "only whether CDC arithmetic changes the result.",
+    "--all": f"Show each run in every precision from {LENGTHS[0]} to {LENGTHS[-1]} bits; takes "
+    "about twelve minutes.",
+    "--vectors FILE": "Instead of running programs, check our emulation of CDC arithmetic against "
+    "the operations and results in this JSON file.",
+    **shared.outputs(FORMATS, plot="the error as a function of the precision (needs --case)"),
 }
 EXAMPLE = "words --case 2 --program runge-kutta"
 

@@ -79,7 +79,7 @@ def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Array]) -> Atlas:
     if tuple(axes) != (*CHOSEN, *WHERE) or not codes:
         allowed = ", ".join((*CHOSEN, *WHERE))
         raise InputError(
-            f"--atlas: the sweep must reduce to claims, and its axes must be {allowed}"
+            f"--atlas: the sweep must store verdicts on claims, and have the axes {allowed}"
         )
     if any((each < 0).any() for each in codes.values()):
         raise InputError(

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from functools import lru_cache
 
 from pyharness.engine.leaves import (
+    HEADER,
     FIRST_UNKNOWN,
     TIME,
     Structure,
@@ -24,6 +25,7 @@ from pyharness.model.codes import Storage
 
 _UNKNOWNS = (3, 7)  # without and with attitude: the bodies that have lanes
 _TOGETHER = 4  # sums
+_N_INPUTS = 8  # time, omega and attitude; parameters follow
 _TERMS_AMID = 5  # terms of a series amid a step
 _ROW = 7  # length of a row of the Jacobian
 
@@ -83,8 +85,9 @@ static __attribute__((noinline)) void sums_in_lanes(const reg *x, const reg *y, 
 @lru_cache(maxsize=64)
 def whole_source(tape: Structure) -> str:
     """Return the C source of all leaves of a tape, with `leaves`, a structure of tape.h."""
-    functions = "(void *)expand, (void *)set_jacobian"
-    lines = [source(tape)]
+    functions, lines = "0, 0", [HEADER]
+    if not _has_parameters(tape):
+        functions, lines = "(void *)expand, (void *)set_jacobian", [source(tape)]
     if tape.n_unknowns in _UNKNOWNS:
         lines += [_HEADER, *_expand(tape), *_set_jacobian(tape)]
         functions += ", (void *)expand_lanes, (void *)set_lane_jacobian, (void *)IN_REGISTER"
@@ -105,11 +108,19 @@ def _in_lanes(text: str) -> str:
     return re.sub(r"\bk\*", "whole*", text)
 
 
+def _first_result(tape: Structure) -> int:
+    return min((operation[3] for operation in tape.operations), default=_N_INPUTS + 1)
+
+
+def _has_parameters(tape: Structure) -> bool:
+    """Return whether bodies differ in further inputs of the tape, which only lanes have."""
+    return tape.n_unknowns in _UNKNOWNS and _first_result(tape) > _N_INPUTS + 1
+
+
 def _inputs(tape: Structure, texts: list[str], letter: str) -> list[int]:
     """Return the slots of inputs that are read under a letter: time, unknowns and parameters."""
-    end = min((operation[3] for operation in tape.operations), default=FIRST_UNKNOWN + 7)
     read = {int(each) for each in re.findall(rf"\b{letter}(\d+)", " ".join(texts))}
-    return sorted(slot for slot in read if slot < end)
+    return sorted(slot for slot in read if slot < _first_result(tape))
 
 
 def _expand(tape: Structure) -> Iterator[str]:

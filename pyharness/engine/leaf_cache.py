@@ -62,9 +62,10 @@ def about_leaves() -> dict[str, str | int]:
 def leaves_for(scene: Scene, compiled: bool) -> tuple[int, str]:
     """Return the address of the compiled leaves, 0 without any, and the text of `Solver.leaves`."""
     tape = system_of(with_constant_body(scene))
-    if has_ready_leaves(tape):
-        return 0, "built"
-    return leaves_of(tape) if compiled else (0, "interpreter")
+    address, found = leaves_of(tape) if compiled else (0, "interpreter")
+    if not address and has_ready_leaves(tape):
+        found = found.replace("interpreter", "built", 1)
+    return address, found
 
 
 def leaves_of(tape: Tape) -> tuple[int, str]:

@@ -25,7 +25,7 @@ _SIZE = -(-Storage.MOST_UNKNOWNS // _BLOCK) * Storage.MOST_UNKNOWNS * _BLOCK  # 
 _MOST_OPERATIONS = 499  # whose products fit on the stack of a thread
 TIME, FIRST_UNKNOWN = 1, 2  # slots, from 1
 
-_HEADER = (
+HEADER = (
     f"""
 enum {{ PARTS = {_NODES}, SIZE = {_SIZE} }};
 #define A(slot, k) a[(slot - 1) * {Storage.SERIES_LENGTH} + k]"""
@@ -130,7 +130,7 @@ def source(tape: Structure, suffix: str = "") -> str:
 
     With a suffix to their names they are static.
     """
-    text = "\n".join([_HEADER, *chain(_expand(tape), _set_jacobian(tape))]) + "\n"
+    text = "\n".join([HEADER, *chain(_expand(tape), _set_jacobian(tape))]) + "\n"
     if suffix:
         text = re.sub(r"^void (expand|set_jacobian)", rf"static void \1{suffix}", text, flags=re.M)
     return text

@@ -71,6 +71,7 @@ def solve_many(
     step: Number | None = None,
     effort: float = 1.0,
     estimates: bool = False,
+    compiled: bool = False,
     events: object = None,
     sensitivities: Iterable[str] | None = None,
     threads: int = 1,
@@ -127,6 +128,8 @@ def solve_many(
         Factor on the work limit of a body. Beyond the limit its status is `gave up`.
     estimates : bool
         Whether to return estimated errors and error amplifications.
+    compiled : bool
+        Whether a C compiler translates a torque that depends on the state, as in `prepare`.
     events : callable, Event, or list of these
         Functions whose roots are computed, as in `solve`; none may be terminal. The method must be
         `auto`, `taylor` or `closed-form`.
@@ -191,8 +194,10 @@ def solve_many(
         scene = replace(scene, torque=getattr(scene.torque, "named", None) or scene.torque)
         arrays |= {f"{PARAMETER}{name}": value for name, value in parameters.items()}
     settings: Any = {"method": method, "tolerance": tolerance, "effort": effort}
+    compiled = boolean("compiled", compiled)
     if isinstance(scene, Scene) and scene.states:
         refused = {"events": events, "sensitivities": sensitivities, "out": out}
+        refused["compiled"] = compiled or None
         settings["tolerance"] = requested_tolerance(method, tolerance)
         with bar_of_bodies(boolean("progress", progress)):
             return solve_with_states(
@@ -221,7 +226,7 @@ def solve_many(
     with bar_of_bodies(boolean("progress", progress)):
         solved = _solve(
             bodies, ends, arrays, out, step, estimates=boolean("estimates", estimates),
-            threads=threads, **settings,
+            threads=threads, compiled=compiled, **settings,
         )  # fmt: skip
     if rows is not None:
         solved = solved.with_times(rows)
@@ -309,6 +314,7 @@ def _solve_groups(
     check_rows("t_end", times, n)
     times = spread(times, n)
     found = place_for(out, n, scenes[0].attitude is not None, settings["estimates"])
+    leaves: set[str | None] = set()
     expect_bodies(n)
     groups: dict[int, list[int]] = {}
     for row, kind in enumerate(kinds):
@@ -318,12 +324,13 @@ def _solve_groups(
         # Preparing a kernel takes longer than solving one scene; a torque given as array avoids it.
         alone = {"torque_constant": own.law.constant} if kind >= 0 and own.torque.in_space else {}
         part = solve_many(own, times[rows], step=step, **alone, **settings)
+        leaves.add(part.leaves)
         found.omega[rows], found.status[rows] = part.omega, part.status
         if found.attitude is not None:
             found.attitude[rows] = part.attitude
         if found.estimates is not None:
             found.estimates[rows] = part.estimates
-    return found
+    return replace(found, leaves="; ".join(sorted(filter(None, leaves))) or None)
 
 
 def _choose_kernel(method: str, tolerance: Number | None) -> tuple[int, float]:

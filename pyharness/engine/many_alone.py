@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.engine.event_functions import event_functions
+from pyharness.engine.leaf_cache import leaves_of
 from pyharness.engine.many_prepared import solve_each, solve_lanes, solve_row
 from pyharness.engine.many_scenes import (
     BODIES,
@@ -74,7 +75,7 @@ def is_solved_alone(scene: Scene, arrays: Mapping[str, object]) -> bool:
 
 def solve_one_by_one(
     scene: Scene, t_end: Any, arrays: dict[str, Any], out: "Ensemble | Array | None", *,
-    method: str, tolerance: float, effort: float, estimates: bool, threads: int,
+    method: str, tolerance: float, effort: float, estimates: bool, threads: int, compiled: bool,
 ) -> Ensemble:  # fmt: skip
     """Return the final states of bodies by prepared solvers; invalid bodies are REFUSED.
 
@@ -101,15 +102,19 @@ def solve_one_by_one(
         counted["attitude"] = rows_of("attitude", attitude0, 4)
     n = count_bodies(counted)
     settings: Any = {"effort": effort, "attitude": with_attitude}
+    leaves = None
     at_rest = partial(replace, scene, omega=_REST, attitude=None)
     shared = lanes = None
     if not rows:  # bodies that differ in their starts alone share one solver
-        key = method, tolerance, effort, with_attitude
+        settings["compiled"] = compiled
+        key = method, tolerance, *settings.values()
         shared = keep_with(scene, key, lambda: prepare(at_rest(), method, tolerance, **settings))
+        # Those built with the package are for single bodies.
+        leaves = shared.leaves and shared.leaves.replace("built", "interpreter", 1)
     else:
         check_prepared(scene, method)
         check_torque(scene, method, attitude=True)
-        lanes = _lanes(scene, rows, tolerance, effort, with_attitude)
+        lanes, leaves = _lanes(scene, rows, (tolerance, effort), with_attitude, compiled)
     found = place_for(out, n, with_attitude, estimates)
     if found.estimates is not None:
         found.estimates[:] = np.nan
@@ -141,15 +146,18 @@ def solve_one_by_one(
         # At time 0 it is normalised in the same way as by the vector kernel.
         at_start = (spread(times, n) == 0.0) & (found.status == Statuses.COMPLETE)
         found.attitude[at_start] = unit_quaternions(spread(counted["attitude"], n)[at_start])
-    return found
+    return found if leaves is None else replace(found, leaves=leaves)
 
 
 def _lanes(
-    scene: Scene, rows: Mapping[str, Array], tolerance: float, effort: float, attitude: bool
-) -> tuple[Array, Array] | None:
-    """Return packed equations and parameters of bodies, or None if one kernel call can't solve all.
+    scene: Scene, rows: Mapping[str, Array], settings: tuple[float, float], attitude: bool,
+    compiled: bool,
+) -> tuple[tuple[Array, Array] | None, str | None]:  # fmt: skip
+    """Return packed equations and parameters of bodies, and the text `Ensemble.leaves`.
 
-    The parameters of an invalid body are NaN, so that the kernel refuses this body.
+    `settings` are the tolerance and the factor on the work limit. Both results are None if one
+    kernel call can't solve all bodies. The parameters of an invalid body are NaN, so that the
+    kernel refuses this body.
     """
     names = [name for name in rows if name.startswith(PARAMETER)]
     kind = next((name for name in ("moments", "coefficients") if name in rows), None)
@@ -159,7 +167,7 @@ def _lanes(
         or scene.changing is not None
         or (scene.inertia is not None and kind is None)
     ):
-        return None
+        return None, None
     columns, body = [], None
     with np.errstate(all="ignore"):
         if kind == "moments":
@@ -174,8 +182,10 @@ def _lanes(
     columns += [rows[name] for name in names]
     own = tuple(name.removeprefix(PARAMETER) for name in names)
     tape = tape_of_bodies(scene.torque, body, own, attitude)
-    packed = packed_tape(tape, scene.step_size, tolerance, effort)
-    return packed, np.column_stack([spread(each, max(map(len, columns))) for each in columns])
+    address, leaves = leaves_of(tape) if compiled else (0, "interpreter")
+    packed = packed_tape(tape, scene.step_size, *settings, address)
+    parameters = np.column_stack([spread(each, max(map(len, columns))) for each in columns])
+    return (packed, parameters), leaves
 
 
 _METHODS = ("auto", "taylor", "closed-form")

@@ -257,12 +257,10 @@ def packed_scene(
     `leaves` is the address of the code compiled for a tape; 0 if this code was built with the
     package, or there is none.
     """
-    packed = _settings(code, scene.step_size, tolerance, effort)
     if code == Methods.TAPE:
-        packed = np.concatenate([packed, kernel_tape(system_of(with_constant_body(scene)))])
-        if leaves:
-            packed[Places.WAVES + _LEAVES : Places.WAVES + _LEAVES + 1].view(np.int64)[:] = leaves
-        return packed
+        tape = system_of(with_constant_body(scene))
+        return packed_tape(tape, scene.step_size, tolerance, effort, leaves)
+    packed = _settings(code, scene.step_size, tolerance, effort)
     coefficients, constant, rate, sines, cosines = normalized(scene)
     packed[Places.N_SINES] = sines.shape[1]
     packed[Places.N_COSINES] = cosines.shape[1]
@@ -276,11 +274,16 @@ def packed_scene(
     return np.concatenate([packed, sines.T.ravel(), cosines.T.ravel()])
 
 
-def packed_tape(tape: Tape, step_size: float, tolerance: float, effort: float) -> Array:
-    """Return equations of motion and settings as one array."""
-    return np.concatenate(
+def packed_tape(
+    tape: Tape, step_size: float, tolerance: float, effort: float, leaves: int = 0
+) -> Array:
+    """Return equations of motion and settings as one array, as `packed_scene`."""
+    packed = np.concatenate(
         [_settings(Methods.TAPE, step_size, tolerance, effort), kernel_tape(tape)]
     )
+    if leaves:
+        packed[Places.WAVES + _LEAVES : Places.WAVES + _LEAVES + 1].view(np.int64)[:] = leaves
+    return packed
 
 
 def _settings(code: int, step_size: float, tolerance: float, effort: float) -> Array:

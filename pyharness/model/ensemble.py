@@ -48,6 +48,9 @@ class Ensemble(BatchResult):
     times : ndarray, shape (m,), or None
         The times (s) of the results of all bodies. All arrays then have an axis of length m after
         the first axis: for example, `omega` has the shape (n, m, 3).
+    leaves : str or None
+        Whether the series of a recorded torque were ``compiled`` for bodies side by side, or
+        computed by an ``interpreter``, with the reason if `compiled` was requested.
 
     Examples
     --------
@@ -69,6 +72,7 @@ class Ensemble(BatchResult):
     times: Array | None = None
     own: Array | None = field(default=None, repr=False)
     names: tuple[str, ...] = ()
+    leaves: str | None = field(default=None, repr=False)
 
     @property
     def states(self) -> dict[str, Array]:
@@ -350,4 +354,4 @@ def place_for(
             )
         if array is not None:
             buffer_of(f"out.{name}", array, (n, width), "d")
-    return out
+    return out if out.leaves is None else replace(out, leaves=None)

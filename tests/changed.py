@@ -1,8 +1,8 @@
 """`make test-changed`: campaign tests of the packages that differ from a commit.
 
-The commit is that of `tests/passed.txt`, at which all tests passed, or the argument. Every campaign
-test runs if a shared file differs, or if the commit is not here. `--passed` writes the last commit
-to the file; only `make test-all` should have passed before.
+The commit is the argument or, by default, that of `tests/passed.txt`, at which all tests passed.
+Every campaign test runs if a shared file differs, or if the repository lacks the commit. After
+`make test-all` has passed, `--passed` writes the last commit to the file.
 """
 
 import subprocess

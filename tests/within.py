@@ -19,7 +19,7 @@ _ESTIMATE = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """The true motion of a scene at some times, away from 0 on one side of it."""
+    """The true motion of a scene at some times, all with one sign and in order from 0."""
 
     scene: Scene
     times: list[float]

@@ -1,7 +1,7 @@
 """Random scenes with torques of the state, and their right-hand sides as formulas of mpmath.
 
-Nothing here but the scenes themselves comes from pyharness: the formulas are written a second time,
-in plain arithmetic of mpmath's numbers.
+Only the scenes come from pyharness. The formulas are written a second time, in plain arithmetic of
+mpmath's numbers.
 """
 
 import math

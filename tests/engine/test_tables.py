@@ -49,7 +49,6 @@ def tables_of(torque: StateTorque) -> list[Table]:
 
 
 def scene_with(torque: StateTorque, **body: Any) -> Scene:
-    """Return a scene with a torque."""
     return Scene("table", (0.3, -1.1, 2.2), torque=torque, **body)
 
 

@@ -1,7 +1,7 @@
 """The table of tolerances: every entry point solves every kind of scene to what it promises.
 
-A scene is a row of `tests/engine/tolerance_scenes.py`, its true motion is that of the reference,
-and `tests/within.py` judges.
+The scenes are in `tests/engine/tolerance_scenes.py`. The reference gives their true motions, with
+which `tests/within.py` compares.
 """
 
 from collections.abc import Callable

@@ -53,7 +53,6 @@ def genuine(name: str) -> Record:
 
 
 def refused(certificate: Any) -> bool:
-    """Return whether the checker refuses a certificate that is read from JSON text."""
     try:
         check(json.loads(json.dumps(certificate)))
     except Exception:

@@ -58,7 +58,7 @@ def changed(base: str) -> list[str] | None:
 
 
 def campaigns_of(paths: Sequence[str] | None) -> list[str]:
-    """Return the folders and files of tests that belong to changed files; all for None."""
+    """Return the folders and files of tests that belong to changed files; for None, return all."""
     found: set[str] = set()
     for path in ["meson.build"] if paths is None else paths:
         begin = next((each for each in TESTS if path.startswith(each)), None)

@@ -30,7 +30,7 @@ class Motion:
 
 
 def true_motion(scene: Scene, times: Sequence[float]) -> Motion:
-    """Solve a scene by the reference; the attitude begins with that of the scene, or of space."""
+    """Solve a scene by the reference; without attitude, the scene begins with the axes of space."""
     turned = replace(scene, attitude=scene.attitude or IDENTITY)
     if isinstance(scene.torque, TorqueLaw) and scene.torque.in_space:
         # As a recorded torque it has a reference and an error amplification.

@@ -66,7 +66,7 @@ exact: Any = np.frompyfunc(mpf, 1, 1)
 
 
 class _Source:
-    """Random numbers; with few binary digits if `short`, so that sums and products are exact."""
+    """Random numbers; if `short`, with few binary digits, so that sums and products are exact."""
 
     def __init__(self, source: Random) -> None:
         self.random = source

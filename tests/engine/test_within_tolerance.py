@@ -89,7 +89,7 @@ def fine_series(motion: Motion, attitude: bool) -> tuple[Array, Array]:
 
 
 def by_call(method: str, motion: Motion, tolerance: float, attitude: bool, what: str) -> None:
-    """Check a prepared solver, from another start than that of its scene."""
+    """Check a prepared solver, from another start than the scene's."""
     start, end = motion.scene.omega, motion.times[-1]
     scene = replace(motion.scene, omega=(1.0, 2.0, 3.0))
     starts = np.tile(start, (9, 1))
@@ -115,7 +115,7 @@ def by_call(method: str, motion: Motion, tolerance: float, attitude: bool, what:
 
 
 def by_stepper(method: str, motion: Motion, tolerance: float, attitude: bool, what: str) -> None:
-    """Check the stepper, whose tolerance is that of a step."""
+    """Check the stepper, whose tolerance applies to each step."""
     stepper = Stepper(motion.scene, tolerance, attitude=attitude)
     rows, turns = [], []
     for time in motion.times:
@@ -149,7 +149,7 @@ def equations(scene: Scene) -> Callable[[Any, Any], Any]:
 
 
 def by_solve_ivp(method: str, motion: Motion, tolerance: float, attitude: bool, what: str) -> None:
-    """Check the method for SciPy's function, whose tolerances are those of a step."""
+    """Check the method for SciPy's function, whose tolerances apply to each step."""
     start = [*motion.scene.omega, *(motion.scene.attitude or IDENTITY)]
     found = solve_ivp(
         equations(motion.scene), (0.0, motion.times[-1]), start, method=Taylor,

@@ -160,7 +160,7 @@ def digit(source: Random, text: str, last: int) -> str:
 
 
 def put(holder: Any, key: Any, value: Any) -> None:
-    """Put a value at a place, or a function of what is there."""
+    """Replace the value at a place; `value` may be a function of the present value."""
     holder[key] = value(holder[key]) if callable(value) else value
 
 

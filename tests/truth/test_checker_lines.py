@@ -143,7 +143,7 @@ def edited(old: str, new: str) -> Change:
 
 
 def put(*keys: Any) -> Change:
-    """Return a change that puts the last of `keys` at the place to which the others lead."""
+    """Return a change that puts the last of `keys` at the place that the others name."""
 
     def change(record: Record) -> Record:
         *path, last, value = keys

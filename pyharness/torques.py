@@ -1,4 +1,4 @@
-"""Ready terms: predefined torques, functions of time and state that can be added.
+"""Ready terms: predefined torques that depend on time and state.
 
 A sum of terms, torque laws and Python functions is a torque for `pyharness.Scene`. At least one of
 two summands must be a term.

@@ -51,7 +51,7 @@ def compiler_here() -> bool:
 def as_written(folder: Path, changes: Mapping[str, tuple[str, str]] | None = None) -> Solve:
     """Compile the loops as written, not unrolled; return a function that solves by them.
 
-    `changes` maps a module's name to a passage that occurs once in it and to its replacement.
+    `changes` maps a module's name to a passage, which occurs once in it, and its replacement.
     """
     sources = [f"modern/{name}.f90" for name in _TAYLOR]
     sources += ["../tests/taylor_as_written.f90"]

@@ -32,14 +32,12 @@ def errors(motion: Motion) -> tuple[float, float]:
 
 
 def largest_error(found: Array, wanted: list[mpmath.mpf]) -> float:
-    """Return the largest error of any component."""
     with mpmath.workdps(DIGITS):
         pairs = zip(found, wanted, strict=True)
         return max(abs(float(mpmath.mpf(float(x)) - y)) for x, y in pairs)
 
 
 def main(count: int, seed: str = "1") -> None:
-    """Print a row of statistics for each kind."""
     print("kind               n  attitude: median      99 %   largest    omega: 99 %   largest")
     for kind in KINDS:
         source = random.Random(f"{kind} {seed}")

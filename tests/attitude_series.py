@@ -1,8 +1,8 @@
 """`python -m tests.attitude_series 3000 [SEED]`: check that the joint series meets its tolerance.
 
-The series integrates omega and attitude of random scenes of `verify`, with torque or not, each
-to a tolerance from `TOLERANCES`. The truth is the same series at 1e-14, which
-`tests/engine/test_attitude.py` compares with SciPy's solution of all seven unknowns.
+The series integrates omega and attitude of random scenes of `verify`, each to a tolerance from
+`TOLERANCES`. The truth is the same series at 1e-14, which `tests/engine/test_attitude.py` compares
+with SciPy's solution of all seven unknowns.
 """
 
 import sys
@@ -21,7 +21,7 @@ _ROUNDING = 1e-15  # rounding error for each unit of error amplification
 
 
 def try_scene(tally: driver.Tally) -> None:
-    """Compare one scene at its tolerance with the same at a fine one."""
+    """Compare the solution of one scene at its tolerance with the truth."""
     drawn = draw(tally.seed, tally.number)
     tolerance = TOLERANCES[tally.number % len(TOLERANCES)]
     times = [0.4 * drawn.time, drawn.time]

@@ -1,8 +1,8 @@
 """`make test-changed`: campaign tests of the packages that differ from a commit.
 
-The commit is that of `tests/passed.txt`, at which all tests passed, or the argument. Every campaign
-test runs if a shared file differs, or if the commit is not here. `--passed` writes the last commit
-to the file; only `make test-all` should have passed before.
+The commit is the argument or, by default, that of `tests/passed.txt`, at which all tests passed.
+Every campaign test runs if a shared file differs, or if the repository lacks the commit. After
+`make test-all` has passed, `--passed` writes the last commit to the file.
 """
 
 import subprocess
@@ -58,7 +58,7 @@ def changed(base: str) -> list[str] | None:
 
 
 def campaigns_of(paths: Sequence[str] | None) -> list[str]:
-    """Return the folders and files of tests that belong to changed files; all for None."""
+    """Return the folders and files of tests that belong to changed files; for None, return all."""
     found: set[str] = set()
     for path in ["meson.build"] if paths is None else paths:
         begin = next((each for each in TESTS if path.startswith(each)), None)

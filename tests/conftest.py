@@ -26,10 +26,10 @@ _FIRST = (
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the tests that share most, if several processes run tests.
+    """If several processes run tests, begin with the tests that share most work.
 
-    With `--dist worksteal` each process begins with a part of the list, and the first process has
-    all of them. A single process runs the tests in the order of its command line.
+    With `--dist worksteal` each process begins with a part of the list, so that the first process
+    has all these tests. A single process runs the tests in the order of its command line.
     """
     if "PYTEST_XDIST_WORKER" in os.environ:
         items.sort(key=lambda item: not item.nodeid.startswith(_FIRST))

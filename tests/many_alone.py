@@ -117,7 +117,7 @@ def parts_of(drawn: dict[str, Any], rows: Any) -> dict[str, Any]:
 def regroupings(
     drawn: dict[str, Any], rng: np.random.Generator, alone: int
 ) -> Iterator[tuple[str, Any, int]]:
-    """Yield ways to group the bodies: a name, the rows, the number of threads."""
+    """Yield groupings of the bodies, each with its name, rows and number of threads."""
     n = len(drawn["omega"])
     # Bodies of one kind, so that a call has no other kind.
     pushed, ramped, waved = (
@@ -147,7 +147,7 @@ def regroupings(
 def differing(
     drawn: dict[str, Any], seed: int, alone: int = _ALONE, **settings: Any
 ) -> dict[str, set[int]]:
-    """Return by the name of a grouping the bodies whose result changed."""
+    """Return the bodies whose result changed, by the name of the grouping."""
     rng = np.random.default_rng(seed)
     n = len(drawn["omega"])
     whole = solve_many(BASE, **drawn, **settings)

@@ -1,8 +1,8 @@
 """`python -m tests.many_errors 1000000 SEED`: check that many bodies keep the tolerance of one.
 
-Bodies over four decades, without torque and under constant torque, ramps and waves, are solved to
-tolerances of 1e-3 to 1e-12. The truth is `solve_many` at 1e-15, where it leaves all bodies to the
-single kernel. The only error of this truth is rounding in the body's own motion.
+Random bodies, without torque and under constant torque, ramps and waves, are solved to tolerances
+of 1e-3 to 1e-12. The truth is `solve_many` at 1e-15, where it leaves all bodies to the single
+kernel. The only error of this truth is rounding.
 """
 
 import sys
@@ -40,7 +40,6 @@ def bodies(kind: str, n: int, seed: int, decades: float = 3.0) -> dict[str, Any]
 
 
 def scene_of(drawn: dict[str, Any], row: int) -> Scene:
-    """Return the scene of one body."""
     waves = {
         name: [(tuple(wave[:3]), wave[3]) for wave in drawn[name][row]] if name in drawn else ()
         for name in ("sines", "cosines")
@@ -58,9 +57,9 @@ def scene_of(drawn: dict[str, Any], row: int) -> Scene:
 def exceeding(
     drawn: dict[str, Any], tolerance: float, found: Ensemble, truth: Ensemble
 ) -> tuple[list[int], list[int], Array]:
-    """Return bodies beyond their tolerance, those whose single solution is too, and all errors.
+    """Return the bodies beyond the tolerance, those of them that are so alone, and all errors.
 
-    Errors are relative to the tolerance; NaN for a body without result.
+    Errors are relative to the tolerance; they are NaN for a body without result.
     """
     done = (found.status == 0) & np.isin(truth.status, (0, 6))
     ends = np.maximum(np.abs(truth.omega), np.abs(drawn["omega"])).max(axis=1)

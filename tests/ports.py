@@ -35,7 +35,6 @@ def sample(names: Sequence[str] = SAMPLE) -> list[Cell]:
 
 
 def documented() -> str:
-    """Return the port that the documentation shows."""
     (text,) = re.findall(r"```py\n(.*?)```", (ROOT / "docs/how-to/ports.md").read_text(), re.DOTALL)
     return str(text)
 
@@ -115,7 +114,7 @@ def node(web: Path) -> str:
 
 
 def run_javascript(modules: Mapping[str, Path], body: str, **given: Any) -> Any:
-    """Return what JavaScript statements return, which use modules and values by their names."""
+    """Return the result of JavaScript statements, which use modules and values by their names."""
     imports = [
         f"import * as {name} from {json.dumps(str(path))};" for name, path in modules.items()
     ]

@@ -33,7 +33,7 @@ USERS = {
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run the tests that belong to what differs from a commit."""
+    """Run the tests of the files that differ from a commit, and return the exit status."""
     base = arguments[0] if arguments else "HEAD"
     try:
         near = nearest(changed(base), sources())
@@ -91,9 +91,11 @@ def sources() -> dict[str, str]:
 def nearest(paths: Sequence[str], tests: dict[str, str]) -> list[str]:
     """Return the test files to run, the nearest first.
 
-    The nearest are the changed test files, then those of a changed file's name. Tests of a module
-    of Python follow by the number of imports from the test to the module. Tests of any other file
-    name it; those of the folder that uses it follow, first those that have its first word.
+    The first are changed test files, then test files with the name of a changed file. The next are,
+    for a Python module, the test files that import it, by the number of imports in between, and
+    for any other file the test files that contain its name. If there are none, or if the file is
+    no Python module, the folder of `user_of` follows, first its files with the first word of the
+    changed file's name.
     """
     ranks: dict[str, tuple[int, bool]] = {}
     for path in paths:
@@ -199,7 +201,7 @@ class Counter:
             self.ring()
 
     def pytest_runtest_logfinish(self) -> None:
-        """Let the alarm ring in vain until the next test begins."""
+        """Let the alarm have no effect until the next test begins."""
         self._is_running = False
 
     def pytest_sessionfinish(self) -> None:

@@ -262,7 +262,7 @@ def test_a_field_that_is_not_documented_is_found(printed: Printed) -> None:
 
 
 def write_anew() -> None:
-    """Replace the output of every block by what the command prints today; build the article."""
+    """Replace the output of every block by the present output of the command; build the article."""
     import contextlib
     import io
     import os

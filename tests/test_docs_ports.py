@@ -1,4 +1,4 @@
-"""The guide to ports: its commands run, and its outputs and numbers are those of today."""
+"""The guide to ports: its commands run, and its outputs and numbers are current."""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""`make quick`: the tests that it chooses, and its end in time."""
+"""`make quick` chooses the right tests, and ends in time."""
 
 import os
 import subprocess

@@ -23,7 +23,7 @@ CELL = "two-term/case-2/original"
 
 
 def _run(folder: Path, **given: str) -> subprocess.CompletedProcess[str]:
-    """Run the script in a folder with these variables, beside those of this process."""
+    """Run the script in a folder, with the variables `given` added to the environment."""
     environment = {k: v for k, v in os.environ.items() if not k.startswith(("PORT_", "GITHUB_"))}
     return subprocess.run(
         [SCRIPT], cwd=folder, env={**environment, "PYTHON": sys.executable, **given},

@@ -60,7 +60,7 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
 
 
 def _is_long(item: pytest.Item, seconds: float) -> bool:
-    """Return whether a test with filled caches takes too long, or did, if it can't be repeated."""
+    """Return whether a test takes too long with filled caches or, if not repeatable, did so."""
     begin = _spent()
     with suppress(Exception):
         item.runtest()

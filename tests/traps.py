@@ -1,10 +1,10 @@
 """Floating-point exceptions in the compiled entries: an answer must report each of them.
 
-A kernel may overflow, or exceed its work limit on numbers too large, and reports it by its status.
-The stop test's quotient may be infinite, and is returned. If any other call raises invalid,
-divide-by-zero or overflow, it is called again with traps, which end the process at the very place.
-Since the first call runs without traps, tests that overflow need no mark, and every call is
-compared with its own status.
+A kernel that overflows, or exceeds its work limit on numbers too large, reports it by its status.
+An infinite quotient of the stop test is returned. If a call raises the flag invalid, divide-by-zero
+or overflow, and its answer does not report this, it is called again with traps. They end the
+process at the place of the exception. Since the first call runs without traps, tests that overflow
+need no mark.
 """
 
 import ctypes
@@ -43,7 +43,7 @@ _NAMES = {INVALID: "invalid", DIVIDE: "divide by zero", TOO_LARGE: "overflow"}
 
 
 class UntoldException(AssertionError):
-    """A kernel raised what its answer does not report, and traps did not end the process."""
+    """The error if an answer does not report an exception, and traps did not end the process."""
 
 
 def guard(module: ModuleType) -> int:

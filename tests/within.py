@@ -19,7 +19,7 @@ _ESTIMATE = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """The true motion of a scene at some times, away from 0 on one side of it."""
+    """The true motion of a scene at some times, all with one sign and in order from 0."""
 
     scene: Scene
     times: list[float]
@@ -30,7 +30,7 @@ class Motion:
 
 
 def true_motion(scene: Scene, times: Sequence[float]) -> Motion:
-    """Solve a scene by the reference; the attitude begins with that of the scene, or of space."""
+    """Solve a scene by the reference; without attitude, the scene begins with the axes of space."""
     turned = replace(scene, attitude=scene.attitude or IDENTITY)
     if isinstance(scene.torque, TorqueLaw) and scene.torque.in_space:
         # As a recorded torque it has a reference and an error amplification.

@@ -1,4 +1,4 @@
-"""The picture of the divergence of the collocation programs, with linear stability regions."""
+"""The picture `collocation.png`: where the collocation programs diverge."""
 
 import math
 from typing import TYPE_CHECKING, Any
@@ -74,8 +74,8 @@ def tenfold(
 ) -> Array:  # fmt: skip
     """Return for each |omega| in `sizes` the step (s) above which a wobble grows tenfold.
 
-    A wobble is a perturbation of a steady rotation. A collocation step multiplies it by
-    1 + z + z^2/2, for imaginary z of the magnitude 1 + |z|^4/8 (nearly).
+    A wobble is an oscillating perturbation of a steady rotation; let z be i times its frequency
+    times the step. A step multiplies it by 1 + z + z^2/2, whose magnitude is about 1 + |z|^4/8.
     """
     fastest = max(abs(q.imag) for q in rates(coefficients, omega)) / float(np.linalg.norm(omega))
     wobbles = fastest * sizes

@@ -1,7 +1,7 @@
 """Shared parts of the pictures of the atlas: maps of the square of all bodies, stability regions.
 
-The square has the coordinates b/a and c/b, where a >= b >= c are the integrals of x^2, y^2 and z^2
-over the mass.
+A body has the coordinates b/a and c/b in the square. There a >= b >= c are the integrals of x^2,
+y^2 and z^2 over the mass, with x, y and z along the principal axes.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -87,7 +87,7 @@ def place_of(moments: Triple) -> tuple[float, float]:
 
 
 def region_panels(plane: "Axes", growth: "Axes", found: Regions) -> None:
-    """Draw linear stability regions of the programs, and the growth on the imaginary axis."""
+    """Draw stability regions in the plot `plane`, growth on the imaginary axis in `growth`."""
     regions = {each.name: each for each in found.regions}
     plane.axvspan(found.real[0], 0.0, color="#ededed", zorder=0)
     for name, label, color, dash in _OF_REGIONS:

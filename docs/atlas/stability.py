@@ -1,4 +1,4 @@
-"""The picture of the stability atlas: times between flips of all bodies, in closed form."""
+"""The picture `stability.png`: times between flips of all bodies, in closed form."""
 
 import math
 from typing import TYPE_CHECKING, Any
@@ -22,7 +22,7 @@ _FEW = 21
 
 
 def stability_picture(store: Store) -> Picture:
-    """Draw flip times over the square, their quantiles by tilt, and tilts with rare flips."""
+    """Draw times between flips over the square, their quantiles by tilt, tilts with rare flips."""
     from matplotlib.colors import LogNorm
     from matplotlib.figure import Figure
 
@@ -68,10 +68,10 @@ def _contours(plot: "Axes", store: Store, values: Array) -> None:
 
 
 def _scanned(store: Store) -> tuple[Array, Array]:
-    """Return quantiles of the flip time, and the largest tilt (rad) with rare flips of each body.
+    """Return quantiles of the time between flips (s), and each body's largest tilt with rare flips.
 
     The quantiles have the shape (azimuth, quantile, tilt). Flips are rare if, at the first azimuth,
-    the time between them exceeds `_LONG`; without rare flips the tilt is NaN.
+    the time between them exceeds `_LONG`. The tilt (rad) is NaN if flips are rare at no tilt.
     """
     tilts, azimuths = values_of(store, "tilt"), values_of(store, "azimuth")
     times = store.array("flip-time")

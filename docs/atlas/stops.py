@@ -1,4 +1,4 @@
-"""The picture of the stops atlas: endings of the Runge-Kutta program, stability regions."""
+"""The picture `stops.png`: where the stop test ends runs, and linear stability regions."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -33,7 +33,7 @@ _FEW = 21
 
 
 def stops_picture(store: Store) -> Picture:
-    """Draw the variable that ends the run, and a prediction, for each listing and case."""
+    """Draw the variable that ends the run, for each listing and case, and predicted limits."""
     from matplotlib.colors import BoundaryNorm, ListedColormap
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch
@@ -60,7 +60,7 @@ def stops_picture(store: Store) -> Picture:
                 steps[down], constants[across], values[np.ix_(down, across)].T, norm=norm,
                 cmap=ListedColormap(_COLORS), shading="nearest", rasterized=True,
             )  # fmt: skip
-            told = listing.replace("fix:", "but for ")
+            told = listing.replace("fix:", "without ")
             _finish(plot, f"{told}\n{scene.name}: {_share(values)}", steps, constants)
             if listing == "corrected":
                 _foretell(plot, scene, steps)
@@ -102,11 +102,11 @@ def case_scenes(sweep: Sweep) -> list[Scene]:
 
 
 def predicted(scene: Scene, t_end: float) -> tuple[float, float]:
-    """Return the constant (1/s) below which the corrected program stops, and a step size (s).
+    """Return the Lipschitz constant (1/s) and the step size (s) at which stops should begin.
 
-    The constant is the maximum of |omega''| / |omega'| from 0 to `t_end`, to which the quotient of
-    the stop test tends as the step size decreases. Above the step size, rk4's stability limit for
-    the fastest oscillation in that time, perturbations grow.
+    Below the constant the corrected program stops. It is the maximum of |omega''| / |omega'| from 0
+    to `t_end`, to which the quotient of the stop test tends as the step size decreases. Above the
+    step size, rk4's stability limit for the fastest oscillation in this time, perturbations grow.
     """
     times = [t_end * (i + 1) / _ROWS for i in range(_ROWS)]
     omega = np.vstack([scene.omega, solve(scene, times).omega])

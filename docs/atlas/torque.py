@@ -1,4 +1,4 @@
-"""The picture of the torque atlas: flips and tilts under a torque fixed in the body."""
+"""The picture `torque.png`: flips and tilts under a torque fixed in the body."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +20,7 @@ _FEW = 16
 
 
 def torque_picture(store: Store) -> Picture:
-    """Draw flips over the square of bodies; by initial tilt, the share that flips and mean tilt."""
+    """Draw flips over the square; by initial tilt, the part that flips, and mean largest tilts."""
     from matplotlib.colors import BoundaryNorm
     from matplotlib.figure import Figure
 

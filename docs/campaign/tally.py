@@ -31,7 +31,7 @@ _HEAD = (
 
 @dataclass
 class Row:
-    """The counts of one kind of result, such as omega by one method in one group of scenes."""
+    """The counts of one kind of result, such as the omega of one method in a group of scenes."""
 
     results: int = 0
     broken: int = 0

@@ -89,7 +89,8 @@ def solution_rows() -> list[tuple[int, float, Balls]]:
 def limit_rows() -> list[tuple[int, float, Balls]]:
     """Return case, time (s) and ball of the limit of the original Runge-Kutta program.
 
-    The limit is 2 y(t/2) - y(0), for the solution y. Cases with a varying torque are left out.
+    The limit is 2 y(t/2) - y(0), where y is the solution. It is not so under a varying torque;
+    these cases are left out.
     """
     found = []
     for case in case_numbers():

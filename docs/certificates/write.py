@@ -39,9 +39,9 @@ class Planned:
 def planned() -> list[Planned]:
     """Return all certificates to be written.
 
-    The certificate of each case has rows at the times of the case's steps, to compare the programs,
-    and at half of `TIMES`, for the limit of the Runge-Kutta program. A case whose initial omega the
-    thesis does not give has further certificates, for the other omegas that this edition tries.
+    The certificate of a case has rows at the times of its steps, to compare the programs, at
+    `TIMES`, and at half of `TIMES`, for the limit of the Runge-Kutta program. A case whose initial
+    omega the thesis does not give has further certificates, for other initial omegas.
     """
     found = []
     for case in case_numbers():

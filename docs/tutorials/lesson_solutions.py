@@ -108,7 +108,7 @@ assert step_of_cards(lambda y: y, F(1), F(1), F(1))[0] == F(19, 6)
 
 
 def error_of_omega1(step_size: float, keep: Sequence[str]) -> float:
-    """Return the largest error of omega1 (rad/s) in Case 2 with these faults alone."""
+    """Return the largest error of omega1 (rad/s) in 1 s of Case 2, with only the faults `keep`."""
     scene = replace(case_scene(2), step_size=step_size, steps=round(1 / step_size))
     run = run_program(scene, Listing("runge-kutta", keep))
     return abs(run.omega[:, 0] - np.sin(5 * run.time)).max()

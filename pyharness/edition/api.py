@@ -83,7 +83,7 @@ def _signature(of: Any) -> str:
             told = re.sub(r" -> \w+$", "", told)
     except (TypeError, ValueError):
         return ""
-    # Types are written without their modules, array types as in the source files.
+    # Types are written without their modules; array types are written as in the source files.
     told = re.sub(r"<class '(.*?)'>", r"\1", told).replace("NoneType", "None")
     told = re.sub(r"numpy\.ndarray\[tuple\[.*?\], numpy\.dtype\[(.*?)\]\]", _array, told)
     return re.sub(r"\b(?:[a-z_]+\.)+(?=[A-Za-z])", "", told)

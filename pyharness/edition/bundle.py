@@ -1,8 +1,8 @@
 """Bundling of JavaScript (ES) modules into one classic script.
 
 Browsers do not import modules into a page that is opened from a file. In the script, every module
-is a function that returns its exports, and is after the modules that it imports. Only the forms
-of import and export that this project uses are supported.
+is a function that returns its exports, and follows the modules that it imports. Only the forms of
+import and export that this project uses are supported.
 """
 
 import re

@@ -61,8 +61,7 @@ def check_publishable() -> None:
 def bibtex(place: str = "", path: str = "") -> str:
     """Return BibTeX entries of the thesis and of the edition, or of a `place` in the edition.
 
-    `path` is the path of the place in the pages; it follows their address, or is alone if they
-    have none.
+    `path` is the path of the place in the pages. It is appended to their address, if they have one.
     """
     described = codemeta()
     version, thesis = described["version"], described["referencePublication"]
@@ -168,7 +167,7 @@ class Part(NamedTuple):
 
 
 def described(name: str, content: bytes = b"", /, **values: Any) -> Part:
-    """Return the file that table `name` of `package.toml` describes; `values` complete the text."""
+    """Return the file that table `name` of `package.toml` describes; `values` fill its fields."""
     texts = (text.format(**values) for text in _descriptions()[name].values())
     path, title, description, media_type = texts
     return Part(path, title, description, media_type, content)

@@ -68,8 +68,7 @@ def data_package(progress: Progress = no_progress) -> dict[str, bytes]:
     content[CRATE] = json_text(crate_record(parts), indent=2).encode()
     listed = {path: content_identifier(each) for path, each in content.items()}
     mark = {"schema": SCHEMAS["data package"], "version": codemeta()["version"]}
-    # The manifest contains the checksum of this file, so that the manifest's identifier is not
-    # known here.
+    # The manifest contains the checksum of the mark, which therefore can't identify the manifest.
     files = {**listed, MANIFEST: None}
     mark |= {"text": text_digest(), "data": data_identifier(), "files": files}
     content[PACKAGE_MARK] = json_text(mark, indent=2).encode()

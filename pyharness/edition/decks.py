@@ -1,7 +1,7 @@
 """The data of the pages that show the listings card by card, with scan and ports.
 
-The ports are in modern Fortran. A note is a numbered entry of the critical apparatus, which
-explains defects and deviations of the scan; `entry` is the identifier of an entry.
+A note is a numbered entry of the critical apparatus, the list of defects and of deviations of the
+scan. `entry` is the identifier of an entry.
 """
 
 import math
@@ -75,13 +75,13 @@ class Corrected(NamedTuple):
 class CardView(NamedTuple):
     """A card as shown on a page.
 
-    `card` is in brackets if the scan lacks the card. `witness` is the card with the names as
-    printed, where we made them uniform; it is empty if the scan lacks the card, and None if it
-    equals `card`. `after` has the following lines of the scan that belong to no card, each with its
-    entry. `scan` is the line of the scan with its blanks, or None. `port` has each line of the
-    Fortran port, the defect or reading on which it depends, if any, and whether it is executed if
-    that is active. `notes` begin with the most important kind; `begins` has the notes with a range
-    of cards that begins here, each with this range alone.
+    `card` is our text, in brackets if the scan lacks the card. `witness` is our text with the
+    scan's form of the names that we normalised; it is None if it equals `card`, and empty if the
+    scan lacks the card. `after` has the lines after this card that belong to no card. `scan` is the
+    line of the scan with its blanks, or None. `port` has each line of the Fortran port, the defect
+    or reading on which the line depends, and whether it is executed if this is active. `notes`
+    begin with the most important kind. `begins` has the notes with a range of cards that begins
+    here, each with only this range.
     """
 
     number: int
@@ -120,7 +120,7 @@ def sheets(program: str) -> list[Sheet]:
 
 
 def notes(program: str) -> list[Note]:
-    """Return a program's apparatus entries: defects by size of effect, then by kind and card."""
+    """Return a program's apparatus entries by kind; within it by size of effect, then by card."""
     having = [each for each in entries() if each["cards"].get(program)]
 
     def place(entry: dict[str, Any]) -> tuple[float, ...]:
@@ -133,7 +133,10 @@ def notes(program: str) -> list[Note]:
 
 @cache
 def _changes(name: str, program: str) -> tuple[float, float]:
-    """Return the largest changes of the errors of omega and velocity by an entry's correction."""
+    """Return by how much the correction of a defect changes the errors of omega and velocity.
+
+    The changes are the largest of all cases, in rad/s and m/s; they are 0 if `name` is no defect.
+    """
     if name not in names_of("defect", program):
         return 0.0, 0.0
     found = [each for each in effects_of(name) if each.program == program]

@@ -51,7 +51,7 @@ def context() -> dict[str, Any]:
 
 
 def data() -> dict[str, Any]:
-    """Return the script's `window.laboratoryData`, with which it runs any program on any case."""
+    """Return the data with which the page's script runs any program on any case."""
     cases = {number: case_scene(number) for number in case_numbers()}
     return {
         "scenes": list(map(requested_scene, cases.values())),
@@ -89,7 +89,7 @@ def _deck_data() -> dict[str, Any]:
     """Return the cards that are executed in a step, and their alterations by corrections.
 
     A pass is a part of a step that is executed once, with constant subscripts. Continuation cards
-    are joined to statements. Alterations for compilers are omitted.
+    are joined to statements.
     """
     order = facts("cards/passes")
     found: dict[str, Any] = {}

@@ -1,8 +1,8 @@
 """The data of the pages on the claims, the thesis, its figures and the apparatus.
 
 A claim is a statement of the thesis that we test; a judgement has our verdicts on it, for original
-and corrected programs. Common arguments: `judged` has the judgements of all claims, `told` all
-sentences with their judgements, and `figures` Figures 6 to 12, drawn from computed curves, by file
+and corrected programs. Three arguments are common: `judged` has the judgements of all claims,
+`told` all sentences with their judgements, and `figures` our versions of Figures 6 to 12, by file
 name without suffix.
 """
 
@@ -71,8 +71,8 @@ def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
 def verdicts(judgement: Judgement) -> list[tuple[str, str]]:
     """Return the verdicts to show, each with a text on the programs that it judges.
 
-    A claim about results has two verdicts, any other claim one: that on the programs as printed for
-    a claim about a design, else that on the corrected programs.
+    A claim about results has two verdicts. A claim about a design has only the verdict on the
+    programs as printed, any other claim only the verdict on the corrected programs.
     """
     original, corrected = judgement.original.verdict, judgement.corrected.verdict
     if judgement.claim["kind"] == "result":
@@ -81,7 +81,7 @@ def verdicts(judgement: Judgement) -> list[tuple[str, str]]:
 
 
 def assumption(case: int, programs: Iterable[str] = (), listing: str = "original") -> str:
-    """Return a text on what we supply in a case of Table 1 and in runs of `programs`, or ""."""
+    """Return a text on what we assume in a case of Table 1 and in runs of `programs`, or ""."""
     found = ["its initial omega"] if case in open_starts() else []
     start = " and ".join([*found, *(["its cards"] if case_scene(case).torque.varies else [])])
     among = assumed(case_scene(case), map(SETS[listing], programs))
@@ -173,10 +173,7 @@ def formulas() -> dict[str, list[Formula]]:
 
 
 def draw_figures(figures: Mapping[str, FigureFinding]) -> dict[str, bytes]:
-    """Return the figures as SVG and CSV, and Figure 7 with both versions of its programs.
-
-    That figure also shows the limit of the original program's omega as the step size goes to 0.
-    """
+    """Return the figures as SVG and CSV files, and a figure of both sets of Figure 7."""
     together = together_picture(figures["figure-07"], figures["figure-07-corrected"])
     files = saved(together, "figure-07-together.svg", "preview.png")
     for stem, each in figures.items():
@@ -190,7 +187,7 @@ def printed_figures(
     """Return the thesis's figures in order, each with its number, caption and place.
 
     `drawn` has our drawings of the figure. `says` has the thesis's sentences on it, each with its
-    anchor (empty for sections I to IV). `ours` is our text on a figure that is not drawn.
+    anchor, or "" in sections I to IV. `ours` is our text on a figure that we do not draw.
     """
     found = []
     for each in facts("figures")["printed"]:

@@ -36,7 +36,7 @@ class _Part(NamedTuple):
 
 
 class Cell(NamedTuple):
-    """A card in an aligned row; if a run differs, its `entry` is the kind of the difference."""
+    """A card in an aligned row; the `entry` of a run that differs is the kind of difference."""
 
     card: Card
     runs: list[Run]

@@ -50,8 +50,8 @@ class Chart(NamedTuple):
     """A chart with fixed axes, as numbers for SVG.
 
     `x` and `y` are the ranges of the axes; for a logarithmic `y`, exponents of ten. Ticks are pairs
-    of position and label. If `is_marked`, points are drawn as marks without lines. `marks` make
-    coinciding curves distinguishable.
+    of position and label. If `is_marked`, curves are drawn as marks without lines. `marks` on the
+    curves distinguish curves that coincide.
     """
 
     name: str
@@ -138,7 +138,7 @@ def context() -> dict[str, Any]:
 def _run(
     case: int, program: str, listing: str = "original", without: Names = (), may_stop: bool = True
 ) -> Trajectory:
-    """Return the run of a Python port: `listing`, but without the defects in `without`."""
+    """Return the run of a Python port with `listing`, but without the defects in `without`."""
     active = set(switches(program)) - set(without) if listing == "original" else set()
     return run_program(case_scene(case), Listing(program, active), "python", may_stop=may_stop)
 
@@ -211,7 +211,7 @@ def _fractions(program: str) -> list[float]:
 
 
 def _points_chart(step_size: float) -> Chart:
-    """Return the chart of the two-term program's points: their times after the step begins."""
+    """Return the chart of the two-term program's collocation points by step."""
     axes = ("step", "time after the beginning of the step, s")
     found = _chart("points", axes, (0, 100), (-3, 0), is_log=True)
     steps = range(1, 101)

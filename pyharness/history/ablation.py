@@ -39,8 +39,8 @@ for _a in "abcd":
 class Effect:
     """The outcome of one listing (a program with a choice of defects) on one scene.
 
-    `omega` (rad/s) and `velocity` (m/s) are the largest errors over the completed `steps`; `common`
-    has both over only the steps that all compared listings completed, or NaN.
+    `omega` (rad/s) and `velocity` (m/s) are the largest errors over the completed `steps`. `common`
+    has the same two errors over only the steps that all compared listings completed.
     """
 
     listing: Listing
@@ -106,8 +106,8 @@ def case_truth(case: int) -> Reference:
 def effects_of(name: str) -> Iterator[CaseEffects]:
     """Yield the effect of an apparatus entry in each of its programs and every case.
 
-    For a reading or a conjecture, `original` and `corrected_alone` are the original listing with it
-    and without it, `kept_alone` and `corrected` the corrected listing with it and without it.
+    For a reading or a conjecture, `original` is the original listing with it, `corrected_alone` the
+    original listing without it. `kept_alone` and `corrected` are the corrected listing likewise.
     """
     known = entry(name)
     for program in known["programs"]:
@@ -124,9 +124,9 @@ def lattice(
 ) -> list[Effect]:
     """Return a program's outcomes with every subset of its defects, the largest error first.
 
-    Errors are compared over the steps that all runs completed. The subsets include the `readings`
-    and, under a varying torque, the conjectures. A reading has no effect if a defect in the same
-    statement is corrected.
+    Subsets are also formed with the `readings` and, under a varying torque, with the conjectures.
+    Errors are compared over the steps that all runs completed. A reading has no effect if a defect
+    in the same statement is corrected.
     """
     check_steps(scene, program, "fortran", effort)
     truth = reference(scene, scene.times(), velocity=True, effort=effort)

@@ -37,10 +37,10 @@ SCHEMES: tuple[tuple[str, str | None], ...] = (
     *(("collocation", points) for points in POINTS),
     *((other, None) for other in WEIGHTINGS[1:]),
 )
-# Numbers of steps to the horizon, each twice the number two places before, and horizons as
-# fractions of the end time. Up to the first horizon, the leading term of the error dominates even
-# with large steps. Longer horizons are for methods whose error there is mostly rounding, the last
-# three for long scenes.
+# Each method is integrated up to a horizon, with each of these numbers of steps. Every number is
+# twice the number two places before. Horizons are fractions of the end time. Up to the first, the
+# leading term of the error dominates even with large steps. The next two are for methods whose
+# error at the first is mostly rounding, the last three for long scenes.
 _LADDER = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192)
 _HORIZONS = (1 / 4, 1 / 2, 1, 1 / 16, 1 / 64, 1 / 256)
 # Orders are computed from errors in this range, relative to the largest omega at the horizon. Above
@@ -56,10 +56,10 @@ MOST_STEPS = 2_000
 class Member:
     """A weighted residual method of the thesis.
 
-    The weight functions of least squares are i t**(i-1), the derivatives of the residual with f
-    held constant (eq. 25). `terms` is n. `points`, for collocation only, are fractions of the step:
-    k/(n+1), k = 1 to n (`thesis`), the Gauss-Legendre points (`gauss`), or n different numbers from
-    0 to 1.
+    The weight functions of least squares are i t**(i-1), the derivatives of the residual by ci if f
+    is constant (eq. 25). `terms` is n. `points`, for collocation only, are fractions of the step:
+    "thesis" for k/(n+1), k = 1 to n; "gauss" for the Gauss-Legendre points; or n different numbers
+    from 0 to 1.
     """
 
     weighting: str = "collocation"
@@ -235,9 +235,9 @@ def _torque(scene: Scene, times: Array) -> Array:
 class OrderFinding:
     """The derived and the measured order of convergence of a method in a scene, and its error.
 
-    `measured` is None if all errors are too large or only rounding. It is `settled` if the last two
-    measurements differ by at most a tenth. `error` (rad/s) is the error of omega with the scene's
-    step size.
+    `measured` is None if all errors are too large or only rounding errors. It is `settled` if the
+    last two measurements differ by at most 0.1. `error` (rad/s) is the error of omega with the
+    scene's step size.
     """
 
     member: Member

@@ -1,7 +1,7 @@
 """Identifiers of the edition: Software Heritage identifiers (SWHIDs), and a digest of its text.
 
 A SWHID (ISO/IEC 18670) contains git's SHA-1 hash of a file or folder. Anyone can recompute it from
-the content, and find a copy by it in the archive Software Heritage.
+the content. The archive Software Heritage finds its copies by SWHID.
 """
 
 import json
@@ -58,7 +58,7 @@ def data_identifier() -> str:
 
 
 def card_identifier(card: Card) -> str:
-    """Return the SWHID of a card: that of its deck's file, qualified by the card's line."""
+    """Return the SWHID of a card: its deck's file, qualified by the card's line."""
     content = source_files()[f"{DATA}/cards/{card.program}.toml"]
     return f"{content_identifier(content)};lines={card_lines(content)[card.number]}"
 

@@ -119,9 +119,10 @@ def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) ->
 def limit_solution(
     program: str, scene: Scene, times: Sequence[float], truth: Reference, effort: float = 1.0
 ) -> tuple[Array, str, float | None]:
-    """Return the limit of an original program's omega (rad/s), shape (times, 3); NaN without limit.
+    """Return the limit of an original program's omega (rad/s), shape (times, 3).
 
-    Also return a description of the limit, and the time (s) at which it is unbounded, or None.
+    Without a limit the values are NaN. Also return a description of the limit, and the time (s) at
+    which it becomes unbounded, or None.
     """
     scale = float(np.abs([scene.omega, *truth.omega]).max()) or 1.0
     start = list(scene.omega)

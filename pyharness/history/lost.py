@@ -4,9 +4,9 @@ The thesis does not print its programs for the subdomain, Galerkin and least-squ
 According to IV.2 they gave no meaningful results in Cases 1 and 2, where the solution is known.
 Each entry of `data/lost.toml` is a conjecture: a mistake that such a program may have had.
 
-The method is that of IV.2: a trial function of two terms, the products written out as polynomials,
-one solution for a constant right-hand side, and one correction. A method fails if its error exceeds
-a tenth of the largest omega.
+The methods are computed as in IV.2. The trial function has two terms, and products are written out
+as polynomials. A first estimate assumes a constant right-hand side; one correction follows. A
+method fails if its error exceeds a tenth of the largest omega.
 """
 
 from collections.abc import Sequence
@@ -102,7 +102,7 @@ def integrate(scene: Scene, weighting: str, mistake: str = "none") -> Array:
     weighted_over: float | None = None  # length (s) for which the matrix was computed
     with np.errstate(all="ignore"):
         for step in range(scene.steps):
-            # omega is evaluated at h whatever the length.
+            # Mistakes change the length of the weighted integrals, but not the step h.
             length = {"dt-accumulates": h * (step + 1), "unit-interval": 1.0}.get(mistake, h)
             if weighted_over is None or length != weighted_over:
                 matrix = _matrix(weighting, length)

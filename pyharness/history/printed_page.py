@@ -88,7 +88,7 @@ def rows_of_form(
 
 
 def compared_steps(rows: int, steps: int, card_steps: int) -> int:
-    """Return the number of steps for our run: that of the text or, for a longer page, the cards."""
+    """Return the steps of our run: those of the text or, if the page has more, of the cards."""
     return card_steps if rows > steps else steps
 
 

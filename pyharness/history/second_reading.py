@@ -1,8 +1,8 @@
 """An estimate of the remaining transcription errors, by capture and recapture.
 
 The first reading of the scan is our text of the cards. The second is a random sample that was read
-again (`data/cards/second-reading.toml`). The numbers of misreadings (errors of the scanned text)
-that either reading alone corrects, and that both correct, give an estimate of the uncorrected ones.
+again (`data/cards/second-reading.toml`). A misreading is an error of the scanned text. The numbers
+of misreadings that each reading corrects, and that both correct, give an estimate of the others.
 """
 
 from collections.abc import Iterator
@@ -33,7 +33,7 @@ class ReadCard(NamedTuple):
 
 
 def chapman(first: int, second: int, both: int) -> float:
-    """Return Chapman's estimate of a population from two samples and their common members."""
+    """Return Chapman's estimate of a population's size from two samples and their overlap."""
     return (first + 1) * (second + 1) / (both + 1) - 1
 
 
@@ -42,8 +42,8 @@ def recapture_interval(first: int, second: int, both: int) -> tuple[int, int]:
 
     `first` and `second` are the sizes of two samples, `both` the number of their common members.
     For independent samples, `both` has the hypergeometric distribution. A size is in the interval
-    if neither tail from `both` on is below 0.025. Raise ValueError if `both` is 0, because there is
-    no upper limit then.
+    if at most `both` and at least `both` common members each have a probability of 0.025 or more.
+    Raise ValueError if `both` is 0, because there is no upper limit then.
     """
     if both < 1:
         raise ValueError("both must be positive")

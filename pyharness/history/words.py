@@ -61,9 +61,9 @@ class WordRun(NamedTuple):
 
     `rule` is ``nearest-even``, ``chop`` (towards zero), or ``FX`` or ``RX``, the unrounded or the
     rounded operations of the CDC 6600. `stop` has reason and step of an early end, as in ``V2 at
-    25``. The longer one of the two printed pages has `fields` numbers, of which `different` differ.
-    `error` is the largest error of omega (rad/s); `singular` counts the steps with IER = 129, a
-    singular matrix.
+    25``. The longer of the two printed pages has `fields` numbers, of which `different` differ from
+    the other page. `error` is the largest error of omega (rad/s). `singular` counts the steps with
+    IER = 129, a singular matrix.
     """
 
     case: int
@@ -91,7 +91,7 @@ class WordCell:
         return next((run for run in self.runs if (run.p, run.rule) == (p, rule)), None)
 
     def settled(self, rule: str, same: Sequence[WordRun]) -> int | None:
-        """Return the least p such that all runs of `rule` with at least p bits are in `same`."""
+        """Return the least p from which on all runs with this `rule` are in `same`, or None."""
         of_rule = sorted((r for r in self.runs if r.rule == rule), key=lambda run: -run.p)
         return min((run.p for run in takewhile(same.__contains__, of_rule)), default=None)
 

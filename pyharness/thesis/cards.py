@@ -2,9 +2,9 @@
 
 A card is a line of a printed program, a deck the cards of one program. A line of the scan consists
 of card number, dash and text; blanks are ignored. `data/cards` has the decks, the pages of the
-scan, and for each card the corresponding lines of the Python port (the twin). Comments in the
-Fortran port name its cards. `data/apparatus.toml`, the critical apparatus, explains where the scan
-deviates from our text.
+scan, and for each card the corresponding lines of the Python port (the twin). In the Fortran port a
+comment on each line names its cards. `data/apparatus.toml`, the critical apparatus, explains where
+the scan deviates from our text.
 """
 
 import re
@@ -25,9 +25,9 @@ PORT = "fortran/original"
 
 
 class Difference(NamedTuple):
-    """A passage of a card that differs between our text and the scan, both without blanks.
+    """A passage of a card, without blanks, that differs between our text and the scan.
 
-    `entry` is the identifier of its explanation in the apparatus.
+    `entry` is the identifier of the apparatus entry that explains the difference.
     """
 
     ours: str
@@ -46,10 +46,9 @@ class Place(NamedTuple):
 class Card(NamedTuple):
     """A card of a printed program, and its appearance in the scan.
 
-    `text` is columns 1 to 72 in our text. `differences` are ordered from left to right; each is the
-    first occurrence of its characters after the previous difference. `printed` is a deviating card
-    number in the scan, with the apparatus entry that explains it. If the scan lacks the card,
-    `lost` is the apparatus entry on it.
+    `text` is columns 1 to 72 in our text. `differences` are ordered from left to right. If the scan
+    has another card number, `printed` is this number, with the apparatus entry that explains it. If
+    the scan lacks the card, `lost` is the apparatus entry on it.
     """
 
     program: str
@@ -91,7 +90,8 @@ class Card(NamedTuple):
     def passages(self) -> Iterator[tuple[str, Difference | None]]:
         """Yield each passage of the text, with its difference from the scan or None.
 
-        Raise ValueError if the text does not have all differences in order.
+        A difference is at the first occurrence of its characters after the previous difference.
+        Raise ValueError if there is none.
         """
         places = [n for n, letter in enumerate(self.text) if not letter.isspace()]
         letters = tight(self.text)
@@ -111,7 +111,7 @@ class Card(NamedTuple):
 
     @property
     def text_with_scanned_names(self) -> str:
-        """Return our text, but with the names as printed where we normalised them."""
+        """Return our text, but with the scan's form of each name that we normalised."""
         kinds = {each["id"]: each["kind"] for each in facts("apparatus")["entry"]}
         return "".join(
             each.scans if each and kinds[each.entry] == "normalization" else text
@@ -204,7 +204,7 @@ def deck(program: str) -> Deck:
 
 
 def statements_of(texts: Iterable[str]) -> list[list[str]]:
-    """Return label and text of each statement, both without blanks, on cards with these `texts`."""
+    """Return label and text, without blanks, of each statement on cards with these `texts`."""
     found: list[list[str]] = []
     for text in texts:
         if text.startswith("C"):

@@ -19,7 +19,7 @@ def subsets(names: tuple[str, ...]) -> Iterator[frozenset[str]]:
 
 
 def all_listings(program: str) -> Iterator[Listing]:
-    """Yield every listing of a program: all subsets of readings, with all subsets of `switches`."""
+    """Yield every listing of a program: each subset of readings with each subset of `switches`."""
     for readings in subsets(names_of("reading", program)):
         for defects in subsets(switches(program)):
             yield Listing(program, defects, readings)

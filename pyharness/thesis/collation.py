@@ -167,10 +167,11 @@ def rows() -> list[Row]:
 
 
 def faults(found: list[Row]) -> list[str]:
-    """Return a sentence for each mistake or unexplained disagreement.
+    """Return a sentence for each mistake or unexplained disagreement in the rows `found`.
 
-    An apparatus entry must be known, be in a row, and name a card of its row. A card must be known
-    and in exactly one row.
+    Every entry in a row must be in the apparatus, and name a card of the row. Every card except
+    comments must be in exactly one row. Every apparatus entry with cards must be in a row, unless
+    it concerns only the scan.
     """
     told = [f"{row.what}: no entry or reason" for row in found if not row.is_explained]
     known = {entry["id"]: entry for entry in facts("apparatus")["entry"]}

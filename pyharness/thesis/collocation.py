@@ -2,8 +2,8 @@
 
 In a step, every unknown is a polynomial x(0) + c1 t + c2 t**2 + ... (eq. 34). At n collocation
 points, n the number of terms after x(0), its derivative equals the right-hand side (eq. 36). A
-first estimate assumes a constant right-hand side; one correction evaluates the right-hand side at
-the points along this estimate.
+first estimate assumes a constant right-hand side. One correction then uses the right-hand sides
+at the collocation points of this estimate.
 """
 
 from collections.abc import Callable, Sequence
@@ -77,7 +77,7 @@ def interval(
 
 
 def fit(points: Sequence[float], rates: Sequence[Vector]) -> tuple[list[list[float]], int]:
-    """Return c1, c2, ... of each unknown, and IER, from the `rates` at each point (s)."""
+    """Return c1, c2, ... of each unknown, and IER, from the derivatives `rates` at `points` (s)."""
     by_unknown = [list(column) for column in zip(*rates, strict=True)]
     return leqt1f(collocation_matrix(points), by_unknown)
 

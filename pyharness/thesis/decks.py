@@ -57,10 +57,10 @@ def deck_text(
     steps (Runge-Kutta). A `scene` of Table 1 replaces the numbers in the assignments and in the DO
     statement.
 
-    In the `dialect` "1982" the cards are as published; "ftn" adds the torque of Case 7, "gfortran"
-    also adaptations to a modern compiler. Column 73 marks added and adapted cards. `terms`, 3 or 5,
-    requests the conjectural deck of `model_cards`. Raise InputError if the dialect is unknown, or
-    if the request can't be expressed in cards.
+    In the `dialect` "1982" the cards are as published. "ftn" adds cards for the torque of Case 7.
+    "gfortran" also adapts cards to a modern compiler. Column 73 marks added and adapted cards.
+    `terms`, 3 or 5, requests the conjectural deck of `model_cards`. Raise InputError if the dialect
+    is unknown, or if the request can't be expressed in cards.
     """
     if dialect not in DIALECTS:
         raise unknown("dialect", dialect, DIALECTS, "--dialect")
@@ -133,7 +133,7 @@ def job_text(deck: str, system: str = "nos", rounds: bool = False) -> str:
 def _is_made(
     alteration: Mapping[str, Any], listing: Listing, dialect: str, case: int | None
 ) -> bool:
-    """Return whether all conditions of an alteration hold; None is the published `case`."""
+    """Return whether all conditions of an alteration hold; `case` None is the published one."""
     named = alteration.get
     return (
         named("program") == listing.program

@@ -40,7 +40,7 @@ def accelerations(scene: Scene, listing: Listing) -> list[float]:
 
 
 def initial_torque(scene: Scene) -> Vector | None:
-    """Return torque over moments (rad/s2) for the conjecture `initial-torque`, or None."""
+    """Return `card_torque` over the moments (rad/s2), for the conjecture `initial-torque`."""
     given = card_torque(scene)
     if given is None or scene.moments is None:
         return None
@@ -67,7 +67,7 @@ class Record:
     """The results of a Python port's run, a row for each step."""
 
     def __init__(self, scene: Scene, evaluations_per_step: int) -> None:
-        """Create an empty record; a step has `evaluations_per_step` of the right-hand sides."""
+        """Create an empty record; each step has `evaluations_per_step` evaluations."""
         self._step_size = scene.step_size
         self._per_step = evaluations_per_step
         self._rows: list[list[float]] = []

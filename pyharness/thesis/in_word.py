@@ -108,7 +108,7 @@ def run_compiled(
 
 
 def compiled_words() -> tuple[str, ...]:
-    """Return the names of the compiled programs' arithmetics; empty if they are not built."""
+    """Return the names of the compiled programs' arithmetics; none if no program is built."""
     try:
         from pyharness import _build
     except ImportError:
@@ -156,8 +156,7 @@ def _pattern(x: Number) -> int:
     places, most = p - 1, (1 << _BITS[p] - p) - 1
     if x.m:
         sign, coefficient = x.m < 0, abs(x.m)
-        # A subnormal number has the exponent field 0, but the unit in the last place of the field
-        # 1.
+        # Subnormal numbers have the exponent field 0, but the last place of numbers with field 1.
         field = x.e + places + (most >> 1) if coefficient >> places else 0
         fraction = coefficient & (1 << places) - 1
     else:

@@ -38,7 +38,7 @@ _NOT_REACHED = -1
 class ProgramEnsemble(BatchResult):
     """The results of a program of the thesis for n bodies at m requested steps.
 
-    If the run of a body ended before a requested step, its values there are NaN, in `ier` -1.
+    If a body's run ended before a requested step, its values at this step are NaN, in `ier` -1.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class ProgramEnsemble(BatchResult):
         The requested steps, counted from 1.
     velocity : ndarray, shape (n, m, 3), or None
         Translational velocity along the body axes, m/s; None if it was not requested.
-    recorded_time : ndarray, shape (m,), or (n, m) where the step sizes differ
+    recorded_time : ndarray, shape (m,), or (n, m) if the bodies have different step sizes
         The program's variable TIME, s. With shape (m,), it is NaN at a step that no body reached.
     n_rows : ndarray of int32, shape (n,)
         The number of steps of each body that have a result.

@@ -31,8 +31,8 @@ ALIKE = dict.fromkeys(_OPERATIONS, 1)
 class Count(NamedTuple):
     """The number of additions, subtractions, multiplications and divisions in a step.
 
-    `written` counts every operation on the cards, `once` repetitions with the same operands only
-    once. If each operation is weighted with its time, both are times of sequential execution.
+    `written` counts every operation on the cards; `once` counts an operation that is repeated with
+    the same operands only once. If operations are weighted with times, both are times.
     """
 
     written: int

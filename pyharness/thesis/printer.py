@@ -23,7 +23,7 @@ from pyharness.thesis.equations import card_torque
 # Zero is printed without minus sign (FORTRAN 77, 13.5.9).
 _MINUS_ZERO = re.compile(r"-(0?\.0*)(?!\d)")
 # A value that is not finite is printed as asterisks, like a value that is too wide for its field.
-# The CDC printed R or I instead, which says no more.
+# The CDC printed R or I instead.
 _TOO_WIDE = 1e300
 _PLACES = re.compile(r"F\d+\.(\d+)")
 
@@ -31,8 +31,9 @@ _PLACES = re.compile(r"F\d+\.(\d+)")
 def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
     """Return the text that `program` prints for its run.
 
-    The moments and torques of `scene`, which must have moments, are followed by a line for each
-    row; if the stop test failed, the last line is that step. Lines have no trailing blanks.
+    The page has the moments and torques of `scene`, which must have moments, then a line for each
+    row of `trajectory`. If the stop test ended the run, the last line is the step that failed it.
+    Lines have no trailing blanks.
     """
     formats = formats_of(program)
     assert scene.moments is not None

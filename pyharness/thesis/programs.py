@@ -80,7 +80,7 @@ class Program:
 
 
 def work_of(word: str, implementation: str) -> str:
-    """Return the key of an arithmetic and an implementation in `check_steps`' work limits."""
+    """Return the key of an arithmetic and implementation in the work limits of `check_steps`."""
     if word == BINARY64:
         return implementation
     return "another word" if implementation == "python" else word

@@ -107,9 +107,9 @@ def lipschitz_test(
     """Return a variable that violates eq. 19, and its quotient of changes (1/s), or None.
 
     `change_k` and `change_u` are absolute changes of the six right-hand sides and unknowns in a
-    step. The test compares the norms of the changes of omega; with the defect
-    `lipschitz-per-component`, its single components; with `lipschitz-tests-velocity`, also the
-    velocity. The quotient is infinite if the unknowns do not change.
+    step. The test compares norms of the changes. With the defect `lipschitz-per-component` it
+    compares single components. It tests omega and, with `lipschitz-tests-velocity`, the velocity.
+    The quotient is infinite if the unknown does not change.
     """
     velocity_counts = listing.has("lipschitz-tests-velocity")
     last = 6 if velocity_counts else 3

@@ -1,4 +1,4 @@
-"""`bench --attitude`: methods are judged by omega and attitude; timings are not asserted."""
+"""`bench --attitude` judges methods by omega and attitude; run times are not tested."""
 
 import json
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""The benchmark: known times and errors give the expected table; timings are not asserted."""
+"""The benchmark: known times and errors give the expected table; run times are not tested."""
 
 import csv
 import itertools

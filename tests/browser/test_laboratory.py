@@ -47,7 +47,7 @@ def _table(browser: Chrome, selector: str) -> list[list[str]]:
 
 
 def _wait(browser: Chrome, holds: Callable[[], bool]) -> None:
-    """Wait until a condition holds; charts are drawn, and switches tried, after the change."""
+    """Wait until a condition holds, because charts are drawn after the change of an input."""
     WebDriverWait(browser, 5.0).until(lambda _: holds())
 
 

@@ -1,4 +1,4 @@
-"""The pages of the thesis, claims and figures: what an address opens, and what is side by side."""
+"""The pages of the thesis, claims and figures: the parts that addresses open, and the layout."""
 
 import base64
 import re

@@ -130,7 +130,6 @@ def motion(number: int, seed: str) -> tuple[str, Scene, float]:
 
 
 def main(count: int, seed: str) -> None:
-    """Print the number of motions that are not complete, by kind and tolerance."""
     left = {kind: dict.fromkeys(TOLERANCES, 0) for kind in KINDS}
     for number in range(count):
         kind, scene, end = motion(number, seed)

@@ -72,7 +72,6 @@ def try_scene(tally: driver.Tally) -> None:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run the campaign of the command line."""
     return driver.run("tests.campaigns.dense_campaign", try_scene, arguments)
 
 

@@ -3,8 +3,8 @@
 Each function depends on time alone, and has known simple and double roots: some at random times,
 some pairs within a step of the integrator, some at the ends of the integration or of its intervals.
 The command prints the numbers of planted, missed and invented roots, and the largest error of a
-time, relative to the last time. Exit status 1 if a root is missed or invented, or if a time has a
-larger error than LARGEST plus the one that rounding explains.
+time, relative to the last time. Exit status 1 if a root is missed or invented, if its direction is
+wrong, or if the error of a time exceeds LARGEST in addition to its rounding error.
 """
 
 import sys
@@ -180,7 +180,6 @@ def campaign(count: int, seed: int) -> Tally:
 
 
 def main(arguments: list[str]) -> int:
-    """Run the campaign, print its results and return the exit status."""
     tally = campaign(int(arguments[0]), int(arguments[1]))
     print(
         f"{tally.roots} roots planted, {tally.missed} missed, {tally.invented} invented, "

@@ -1,11 +1,12 @@
 """`python -m tests.campaigns.integrator_campaign COUNT SEED`: judge wrong and right integrators.
 
-COUNT integrators of each kind are drawn from the source of the guide's example, or of a method of
-order 2 or 1 in its place: numbers that are not finite or 0 late, a wrong sign, a wrong index, a
-wrong quaternion. The right ones are the example, two that give other signs of quaternions, and
-SciPy's RK45. The command prints a table of the names, and the change of conserved quantities in
-COUNT scenes without torque. Exit status 1 if a wrong integrator passes, a right one fails, a change
-is above its limit, or a fault is named that is not there; "unknown" is no name.
+COUNT wrong integrators of each kind are drawn. Their source is the guide's example, of order 4, or
+the example with a method of order 2 or 1. It is changed by late numbers that are 0 or not finite,
+by a wrong sign, a wrong index or a wrong quaternion. The right integrators are the example, two
+with other signs of quaternions, and SciPy's RK45. The command prints a table of the faults that
+are named, and the change of conserved quantities in COUNT scenes without torque. It returns exit
+status 1 if a wrong integrator passes, a right one fails, a change is above its limit, or a fault
+is named that an integrator does not have.
 """
 
 import ast
@@ -41,9 +42,9 @@ Solve = Callable[[dict[str, Any]], dict[str, Any]]
 
 @dataclass(frozen=True)
 class Drawn:
-    """An integrator, what is changed in it, and the name of its fault if it has one.
+    """An integrator with a description of its change.
 
-    `fault` is empty for a right integrator; otherwise it is a known name, or "unknown".
+    `fault` is the name of its fault, or "unknown"; it is empty for a right integrator.
     """
 
     says: str
@@ -87,7 +88,7 @@ def _late(random: Random, source: str) -> Drawn:
 
 
 def _places(source: str, wanted: Callable[[ast.AST], bool]) -> list[tuple[ast.Module, Any]]:
-    """Return parsed sources, each with another one of the wanted nodes of the equations."""
+    """Return a parsed source for each wanted node of the equations, together with the node."""
     found: list[tuple[ast.Module, Any]] = []
     while True:
         tree = ast.parse(source)
@@ -245,7 +246,7 @@ def named(found: Verdict) -> set[str]:
 
 
 def is_right(each: Drawn, found: Verdict) -> bool:
-    """Return whether the verdict is right, and no fault is named that is not there."""
+    """Return whether the verdict is right, and no wrong fault is named."""
     passed = all(check.passed for check in found.checks)
     if not each.fault:
         return passed and not found.findings

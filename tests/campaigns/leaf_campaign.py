@@ -1,8 +1,8 @@
-"""A campaign of random recorded torques, whose series the interpreter and compiled leaves compute.
+"""A campaign of random recorded torques: compiled leaves against the interpreter.
 
-The command is ``python -m tests.campaigns.leaf_campaign COUNT SEED [FIRST]``. The terms of a step
-may differ by 4 units in the last place of the largest term of their unknown, or of the summands of
-its derivative times the step, which may cancel.
+The command is ``python -m tests.campaigns.leaf_campaign COUNT SEED [FIRST]``. Both compute the
+terms of the Taylor series in one step. The terms of an unknown may differ by 4 units in the last
+place of its largest term or, if larger, of the step times the summands of its derivative.
 """
 
 import sys

@@ -40,16 +40,14 @@ SMALLEST = 2.0**-30  # smallest step size that is tried, as a ratio to the longe
 
 
 class NotEnclosedError(ArithmeticError):
-    """The error of a box that was not verified, or of steps that became too small."""
+    """The error if no box was verified, or if steps became too small."""
 
 
 def dot(first: Sequence[Any], second: Sequence[Any]) -> Any:
-    """Return the scalar product."""
     return sum(map(mul, first, second), arb(0))
 
 
 def identity() -> Matrix:
-    """Return the identity matrix."""
     return [[arb(i == j) for j in range(3)] for i in range(3)]
 
 

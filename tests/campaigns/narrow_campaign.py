@@ -1,11 +1,11 @@
 """A campaign of torques that act in a short time or a narrow band of omega, by every entry point.
 
 The command is ``python -m tests.campaigns.narrow_campaign COUNT SEED [FIRST]``. A symmetric body
-rotates about its axis under a torque about it: a pulse, a switch, a kink, or a brake in a narrow
-band of omega, of relative widths from 1e-7 to .03, or a torque with a pole or a root that ends. Its
-true omega is known in closed form, and is evaluated with many digits. A scene is solved by auto in
-every way, and by one of the other methods. A result that is `complete` exceeds the limit if its
-error is larger than the tolerance plus 4e-15 K; no result is right beyond a pole.
+rotates about its axis under a torque about this axis. The torque is a pulse, a switch, a kink or a
+brake in a narrow band of omega, of relative widths from 1e-7 to .03, or it has a pole, or a root
+whose argument becomes negative. The true omega is known in closed form. Each scene is solved by
+`auto` through every entry point, and by one of the other methods. The limit of the error of a
+`complete` result is the tolerance plus 4e-15 K. Beyond a pole every such result is a fault.
 """
 
 import math
@@ -125,7 +125,7 @@ def drawn(seed: str, number: int) -> Drawn:
 
 
 def results(one: Drawn, seed: str, number: int) -> Iterator[tuple[str, float, Callable[[], Any]]]:
-    """Yield names, tolerances and calls, which return omega at the end, the ending and K."""
+    """Yield name, tolerance and call of each result; a call returns omega, the ending and K."""
     source = Random(f"narrow results {seed} {number}")
     scene, start = one.scene, one.scene.omega
     other = source.choice([name for name in METHODS if name != "auto"])
@@ -198,7 +198,6 @@ def try_scene(tally: driver.Tally) -> None:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run the campaign of the command line."""
     return driver.run("tests.campaigns.narrow_campaign", try_scene, arguments)
 
 

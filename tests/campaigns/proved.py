@@ -6,15 +6,15 @@ torques that depend on the state. The solution is enclosed at several times in b
 digits.
 
 - A reference must differ from the balls by at most its own error, in omega and attitude.
-- The error of a method must be at most the tolerance plus 4e-15 K sqrt(1 + N/1000) after N steps,
-  in omega relative to the largest component, and in the angle of the attitude (rad). The error
-  amplification K is below 1e6; for the attitude it is multiplied by 1 plus half of the largest
-  omega times the time.
+- The error of a method must be at most the tolerance plus 4e-15 K sqrt(1 + N/1000) after N steps.
+  The error of omega is relative to its largest component; the error of the attitude is an angle
+  (rad). The error amplification K is below 1e6. For the attitude it is multiplied by 1 plus half of
+  the largest omega times the time.
 - The error of a method must be at most 100 times its estimate, which is at least 2e-16.
 
-Slow results are left out by chance if the forecast of their work is large, except with `--all`. A
-seed, a number and the groups determine a scene. The command prints a line for each broken promise,
-and a table. It returns exit status 1 if a promise is broken.
+If the forecast of a result's work is large, the result is left out by chance, except with `--all`.
+A seed, a number and the groups determine a scene. The command prints a line for each broken
+promise, and a table. It returns exit status 1 if a promise is broken.
 """
 
 import argparse

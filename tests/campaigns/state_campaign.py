@@ -120,7 +120,6 @@ def _try_scipy(tally: Tally, scene: Scene, truth: Truth, source: Random) -> None
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run the campaign of the command line."""
     return driver.run(MODULE, try_scene, arguments)
 
 

@@ -130,7 +130,6 @@ def _judge_other(
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run the campaign of the command line."""
     return driver.run(MODULE, try_scene, arguments)
 
 

@@ -1,7 +1,8 @@
 """An integration of a controlled body in 32 digits, which locates the switches itself.
 
-The Taylor series, in decimal arithmetic, of each unknown and of each operand of a switch ends where
-an operand crosses a level of its zone. It shares no code with the package.
+A switch selects a formula by the zone of its operand, between two levels. Each step computes the
+Taylor series of all unknowns and operands in decimal arithmetic, and ends where an operand crosses
+a level. The module shares no code with the package.
 """
 
 from bisect import bisect_left
@@ -19,7 +20,7 @@ _MOST_STEPS = 4000
 
 
 class SlidingError(Exception):
-    """No choice of the switches continues the motion: the argument is the time (s)."""
+    """The error if no choice of zones continues the motion; its argument is the time (s)."""
 
 
 class Series:
@@ -152,9 +153,10 @@ Expand = Callable[[Decimal, list[Decimal], Modes], list[Series]]
 def integrated(
     expand: Expand, y: list[Decimal], times: list[float]
 ) -> tuple[list[list[Decimal]], list[Decimal], int]:
-    """Return the rows at times of one sign, the largest of each unknown, and the crossings.
+    """Return the rows at `times` (s), the largest size of each unknown, the number of crossings.
 
-    Raise SlidingError where no zones continue the motion, OverflowError after too many steps.
+    All times have the same sign. Raise SlidingError if no zones continue the motion, and
+    OverflowError after too many steps.
     """
     with localcontext(prec=_DIGITS):
         t, zones, crossings = Decimal(0), list[int](), 0

@@ -43,7 +43,6 @@ def all_inside(row: Sequence[Any], exact: Sequence[Any]) -> bool:
 
 
 def real(x: Any) -> Any:
-    """Return the middle of a ball."""
     middle = fraction(x)
     return mpmath.mpf(middle.numerator) / middle.denominator
 

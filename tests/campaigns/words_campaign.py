@@ -86,7 +86,6 @@ def same(due: Any, ours: Number) -> bool:
 
 
 def main(arguments: list[str]) -> int:
-    """Run the campaign."""
     count = int(arguments[0]) if arguments else 1_000_000
     failures = []
     for name in FLOATS:

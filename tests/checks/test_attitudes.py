@@ -1,4 +1,4 @@
-"""Judgement of attitudes: a closed form solves what it can, and gives a reason where it refuses."""
+"""Attitudes are judged: a closed form solves what it can, and gives the reason of a refusal."""
 
 from pyharness import Scene, TorqueLaw
 from pyharness.checks.check import REFUSED, Check, Name

@@ -250,7 +250,7 @@ def test_plant_that_nothing_catches_is_a_failure(capsys: Capture) -> None:
     harmless = replace(ONE_BIT, name="harmless", size=0.0)
 
     def few(chosen: Selection) -> Iterator[Check]:
-        """Yield a small control; `verify --self-test` makes one of every kind."""
+        """Yield a few checks as the control; `verify --self-test` makes checks of all kinds."""
         return verify(replace(chosen, only=("cells",)))
 
     with patch.multiple(plants, PLANTS=(harmless,), verify=few):

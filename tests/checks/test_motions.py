@@ -1,4 +1,4 @@
-"""Trials of motions: torque, length, invariance, threads; and the truth they are compared with."""
+"""The trials of motions (torque, length, invariance, threads), and the truth of the comparison."""
 
 import time
 from dataclasses import replace

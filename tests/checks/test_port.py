@@ -1,4 +1,4 @@
-"""`verify --port`: ports that are right, wrong by a bit, silent or dead; the port in JavaScript."""
+"""`verify --port`: ports that are right, wrong by a bit, silent or crashing."""
 
 import json
 import math

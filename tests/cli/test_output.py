@@ -1,4 +1,4 @@
-"""Files are written completely or not at all after any interruption; stderr changes no result."""
+"""After any interruption, files are complete or missing; stderr changes no result."""
 
 import itertools
 import os

@@ -1,8 +1,8 @@
 """`make cross-check`: make builds, compare bits, run their tests; exit status 1 on faults.
 
-Without arguments: the build with run-time checks, and one by another compiler, or by other options
-where there is none; few tests, unless the kernels differ from the commit at which all passed.
-`--all` makes every build, and those with planted faults.
+Without arguments, it makes the build with run-time checks, and a build by another compiler or, if
+there is none, by other options. It runs few tests, unless the kernels differ from the commit at
+which all tests passed. `--all` makes every build, and those with planted faults.
 """
 
 import json

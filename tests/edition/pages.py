@@ -47,7 +47,6 @@ class Read(HTMLParser):
 
 
 def pages(site: dict[str, bytes]) -> dict[str, Read]:
-    """Parse every page of a site."""
     return {name: _parsed(each) for name, each in site.items() if name.endswith(".html")}
 
 

@@ -63,7 +63,7 @@ def _drawn(count: int) -> list[Motion]:
 
 
 def _differences(motions: list[Motion], folder: Path = BODY) -> list[float]:
-    """Return the largest difference of each motion, that of omega relative to its largest."""
+    """Return the largest difference of each motion; for omega, relative to the largest omega."""
     answers = ask(MOTIONS, [(moments, omega, time) for moments, omega, _, time in motions], folder)
     found = []
     for (moments, omega, attitude, time), answer in zip(motions, answers, strict=True):

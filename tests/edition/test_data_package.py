@@ -1,4 +1,4 @@
-"""The data package: complete, the same in every run, and enough to repeat results."""
+"""The data package is complete, the same in every run, and sufficient to repeat results."""
 
 import contextlib
 import csv

@@ -1,4 +1,4 @@
-"""Formulas of the thesis: all are there as printed, and their cards are those of the port."""
+"""All formulas of the thesis are present as printed, with the cards that the port cites."""
 
 import re
 from pathlib import Path

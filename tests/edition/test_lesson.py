@@ -1,4 +1,4 @@
-"""The lesson: its cards and commands are those of the project, and no fault is named too early."""
+"""The lesson has the cards and commands of the project, and names no fault too early."""
 
 import html
 import re

@@ -1,4 +1,4 @@
-"""The story without a browser: its numbers, curves and words are those of the programs."""
+"""The story has the numbers and curves of the programs, and its words agree with them."""
 
 import html
 import random

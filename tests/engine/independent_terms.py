@@ -1,7 +1,7 @@
 """Random scenes with torques of the state, and their right-hand sides as formulas of mpmath.
 
-Nothing here but the scenes themselves comes from pyharness: the formulas are written a second time,
-in plain arithmetic of mpmath's numbers.
+Only the scenes come from pyharness. The formulas are written a second time, in plain arithmetic of
+mpmath's numbers.
 """
 
 import math
@@ -66,7 +66,7 @@ exact: Any = np.frompyfunc(mpf, 1, 1)
 
 
 class _Source:
-    """Random numbers; with few binary digits if `short`, so that sums and products are exact."""
+    """Random numbers; if `short`, with few binary digits, so that sums and products are exact."""
 
     def __init__(self, source: Random) -> None:
         self.random = source

@@ -1,4 +1,4 @@
-"""Attitude by the joint series, and from rows of omega, compared with independent integrators."""
+"""The attitude by the joint series and from rows of omega, against independent integrators."""
 
 import pickle
 from concurrent.futures import ThreadPoolExecutor

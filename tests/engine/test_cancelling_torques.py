@@ -1,4 +1,4 @@
-"""Torques whose terms nearly cancel: solved where that is possible, and sensitive where it is not.
+"""Torques whose terms nearly cancel: results are accurate, or their status is `sensitive`.
 
 Each term, divided by a moment, is rounded by itself. Waves of one frequency are added first. The
 rounding of the other terms is in the error estimate, at every entry point.

@@ -42,7 +42,6 @@ def simple(t: Any, w: Any) -> Any:
 
 
 def scene_of(torque: Any = every_function, **own: Any) -> Scene:
-    """Return a scene with a recorded torque."""
     return Scene("leaves", (0.3, 0.2, 0.9), MOMENTS, torque=torque, **own)
 
 

@@ -1,4 +1,4 @@
-"""Many bodies in one call: as accurate as single calls, whatever the other bodies and threads."""
+"""Many bodies in one call: as accurate as single calls, with any other bodies and threads."""
 
 import tracemalloc
 from dataclasses import replace
@@ -291,7 +291,7 @@ def test_any_array_will_do() -> None:
 
 @pytest.fixture(scope="module")
 def by_loops(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[Any, ...]]:
-    """Return name, tolerance, bodies and results of what the loops as written solve."""
+    """Return name, tolerance, bodies and results of the solutions by the loops as written."""
     loops = many_as_written(tmp_path_factory.mktemp("loops"))
     solved = []
     for kind, method, tolerance in (

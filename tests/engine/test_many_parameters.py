@@ -13,12 +13,10 @@ MOMENTS = (1.0, 2.0, 2.5)
 
 
 def law(t: Any, omega: Any, *, gain: float = 0.3, push: float = 0.1) -> Any:
-    """Return a torque with two parameters."""
     return -gain * omega * np.sqrt(1.0 + omega @ omega) + np.array([0.0, push * np.sin(t), 0.0])
 
 
 def pointed(t: Any, omega: Any, attitude: Any, *, stiffness: float = 1.0) -> Any:
-    """Return a torque that depends on the attitude."""
     return -stiffness * attitude[1:] - 0.2 * omega
 
 
@@ -28,7 +26,6 @@ EXPRESSION = {
 
 
 def drawn(n: int, seed: int = 5) -> dict[str, Any]:
-    """Return starts, moments and times."""
     draw = np.random.default_rng(seed)
     return {
         "omega": draw.normal(size=(n, 3)), "moments": draw.uniform(1.0, 2.0, (n, 3)),

@@ -1,4 +1,4 @@
-"""Events of a body without torque over many periods: those of one period, repeated."""
+"""Events of a torque-free body over many periods: the events of one period are repeated."""
 
 from collections.abc import Callable
 from dataclasses import replace

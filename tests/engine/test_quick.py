@@ -23,7 +23,7 @@ def _truth(case: int, time: float) -> Array:
 def _ratios(
     scene: Scene, t_end: float, tolerance: float, truth: Array
 ) -> dict[str, tuple[float, str]]:
-    """Return error over tolerance, and status, by method; the last row of the truth is the end."""
+    """Return error over tolerance, and status, by method; `truth` ends with the row of `t_end`."""
     scale = max(np.abs(truth).max(), max(map(abs, scene.omega))) or 1.0
     found = {}
     for method in ("quick", "auto"):

@@ -24,12 +24,10 @@ SPHERE = (2.0, 2.0, 2.0)
 
 
 def scene_of(torque: Any, omega: Any = (1.0, 2.0, 3.0), **own: Any) -> Scene:
-    """Return a scene with moments 1, 2, 2.5 kg m2 unless `own` has others."""
     return Scene("test", omega, **{"moments": MOMENTS, "torque": torque, **own})
 
 
 def damped(t: Any, omega: Any) -> Any:
-    """Return the torque of viscous damping."""
     return -0.1 * omega
 
 

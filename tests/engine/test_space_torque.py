@@ -41,7 +41,6 @@ PUSHED = SCENES["constant"]
 
 
 def matrix(scene: Scene) -> Array:
-    """Return the inertia matrix."""
     return np.array(scene.inertia) if scene.inertia is not None else np.diag(scene.moments or ())
 
 

@@ -38,7 +38,7 @@ CASES: dict[str, StateTorque] = {
 
 
 def at(torque: StateTorque, t: float) -> Array:
-    """Return the torque at a time, which is the same in every state."""
+    """Return the torque at a time; it does not depend on the state."""
     return np.array(torque.at(t, (7.0, 8.0, 9.0), (0.0, 1.0, 0.0, 0.0)))
 
 
@@ -49,7 +49,6 @@ def tables_of(torque: StateTorque) -> list[Table]:
 
 
 def scene_with(torque: StateTorque, **body: Any) -> Scene:
-    """Return a scene with a torque."""
     return Scene("table", (0.3, -1.1, 2.2), torque=torque, **body)
 
 

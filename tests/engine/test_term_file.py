@@ -86,7 +86,7 @@ def scene_with(**torque: Any) -> Scene:
 
 
 def restored(scene: Scene, folder: Path) -> Scene:
-    """Return the scene that is read from the text of a scene."""
+    """Return the scene that is read from the text of `scene`."""
     path = folder / "again.toml"
     path.write_text(scene_text(scene))
     return read_scene(path)

@@ -18,7 +18,6 @@ def integrated(scene: Scene, end: float) -> tuple[Array, Array]:
 
 
 def scene_with(torque: Any, **changed: Any) -> Scene:
-    """Return the scene of the checks, about principal axes, with a torque."""
     fields: dict[str, Any] = {
         "omega": (0.3, -0.5, 0.8),
         "moments": MOMENTS,

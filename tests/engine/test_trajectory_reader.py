@@ -274,7 +274,7 @@ def _base() -> dict[str, Any]:
 
 
 def _content(**changes: Any) -> bytes:
-    """Return the content of a file with other arrays; None removes one."""
+    """Return the content of a file with replaced arrays; None removes an array."""
     arrays = _base() | changes
     return archive_of({name: each for name, each in arrays.items() if each is not None})
 

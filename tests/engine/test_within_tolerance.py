@@ -1,7 +1,7 @@
 """The table of tolerances: every entry point solves every kind of scene to what it promises.
 
-A scene is a row of `tests/engine/tolerance_scenes.py`, its true motion is that of the reference,
-and `tests/within.py` judges.
+The scenes are in `tests/engine/tolerance_scenes.py`. The reference gives their true motions, with
+which `tests/within.py` compares.
 """
 
 from collections.abc import Callable
@@ -89,7 +89,7 @@ def fine_series(motion: Motion, attitude: bool) -> tuple[Array, Array]:
 
 
 def by_call(method: str, motion: Motion, tolerance: float, attitude: bool, what: str) -> None:
-    """Check a prepared solver, from another start than that of its scene."""
+    """Check a prepared solver, from another start than the scene's."""
     start, end = motion.scene.omega, motion.times[-1]
     scene = replace(motion.scene, omega=(1.0, 2.0, 3.0))
     starts = np.tile(start, (9, 1))
@@ -115,7 +115,7 @@ def by_call(method: str, motion: Motion, tolerance: float, attitude: bool, what:
 
 
 def by_stepper(method: str, motion: Motion, tolerance: float, attitude: bool, what: str) -> None:
-    """Check the stepper, whose tolerance is that of a step."""
+    """Check the stepper, whose tolerance applies to each step."""
     stepper = Stepper(motion.scene, tolerance, attitude=attitude)
     rows, turns = [], []
     for time in motion.times:
@@ -149,7 +149,7 @@ def equations(scene: Scene) -> Callable[[Any, Any], Any]:
 
 
 def by_solve_ivp(method: str, motion: Motion, tolerance: float, attitude: bool, what: str) -> None:
-    """Check the method for SciPy's function, whose tolerances are those of a step."""
+    """Check the method for SciPy's function, whose tolerances apply to each step."""
     start = [*motion.scene.omega, *(motion.scene.attitude or IDENTITY)]
     found = solve_ivp(
         equations(motion.scene), (0.0, motion.times[-1]), start, method=Taylor,

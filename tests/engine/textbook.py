@@ -53,7 +53,6 @@ def van_der_pol(t: Any, y: Any) -> Any:
 
 
 def pendulum(t: Any, y: Any) -> Any:
-    """Return the pendulum."""
     return np.array([y[1], -np.sin(y[0])])
 
 

@@ -58,7 +58,6 @@ def _print(name: str, rotations: float, row: tuple[float, float, float]) -> None
 
 
 def main() -> None:
-    """Print the table."""
     print("| scene | rotations | macro-steps | ms, averaged | ms, taylor | quotient |")
     print("| --- | --- | --- | --- | --- | --- |")
     for rotations in (1e4, 1e5, 1e6):

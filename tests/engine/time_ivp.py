@@ -28,7 +28,6 @@ TOLERANCES = (1e-6, 1e-9, 1e-12)
 
 
 def main(repeats: int = 5) -> None:
-    """Print the table."""
     names = ["Taylor", "DOP853"] + ["heyoka"] * HAS_HEYOKA
     columns = ["problem", "tolerance", *(f"error, {each}" for each in names)]
     columns += [*(f"ms, {each}" for each in names), *(["ms to compile"] * HAS_HEYOKA)]
@@ -71,7 +70,6 @@ def relative(problem: Problem, found: Any) -> float:
 
 
 def by_scipy(problem: Problem, method: Any, tolerance: float) -> Any:
-    """Return the state at the end."""
     found = solve_ivp(
         problem.fun, (0.0, problem.end), problem.y0, method=method, rtol=tolerance, atol=tolerance
     )
@@ -92,7 +90,6 @@ def integrator(problem: Problem, tolerance: float) -> Any:
 
 
 def by_heyoka(problem: Problem, compiled: Any) -> Any:
-    """Return the state at the end."""
     compiled.time = 0.0
     compiled.state[:] = problem.y0
     compiled.propagate_until(problem.end)

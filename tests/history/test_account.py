@@ -1,4 +1,4 @@
-"""The account: what pages and documents say of the thesis is in them word for word, and is so."""
+"""Pages and documents have the statements of the account word for word, and these are true."""
 
 import re
 from dataclasses import replace

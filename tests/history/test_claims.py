@@ -1,4 +1,4 @@
-"""The ledger of claims is complete and computed; a verdict changes with the defect behind it."""
+"""The ledger of claims is complete; each verdict is computed, and changes with its defect."""
 
 import csv
 import json
@@ -335,7 +335,7 @@ def test_claims_in_every_form(printed: Printed) -> None:
 
 
 def _lab(run: Any = None, error: Any = None, truth: Any = None) -> Any:
-    """Return a laboratory of functions of a case; the truth is omega alone."""
+    """Return a laboratory from functions of a case; `truth` returns only omega."""
     return SimpleNamespace(
         is_original=False,
         assumptions=Assumptions(),

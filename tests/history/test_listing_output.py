@@ -1,4 +1,4 @@
-"""A printed page, compared with the pages of every machine word; the pages that we ship."""
+"""A printed page is compared with our pages in every arithmetic."""
 
 from pathlib import Path
 

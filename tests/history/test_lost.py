@@ -1,4 +1,4 @@
-"""The lost experiments: the weightings without a mistake, and what each mistake must show."""
+"""The lost methods: their results without a mistake, and the effect of each mistake."""
 
 from dataclasses import replace
 

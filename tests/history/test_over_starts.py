@@ -1,4 +1,4 @@
-"""Claims over many starts: their verdicts are those of the ledger, start by start."""
+"""Claims over many starts have, start by start, the verdicts of the ledger."""
 
 from dataclasses import replace
 from typing import Any

@@ -1,4 +1,4 @@
-"""Every claim has a story of three sentences, whose numbers are those of its verdicts."""
+"""Every claim has a story of three sentences with the numbers of its verdicts."""
 
 import re
 from dataclasses import replace

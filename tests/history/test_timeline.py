@@ -1,4 +1,4 @@
-"""The timeline: every date is in its source, and the page and the site show the same events."""
+"""Every date is in its source, and the page and the site show the same events."""
 
 import re
 from datetime import datetime

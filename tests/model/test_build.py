@@ -1,4 +1,4 @@
-"""The build: what the binary needs, what f2py may not guess, and the messages of the set-up."""
+"""The build: the parts of the binary, the types that f2py may not guess, the set-up's messages."""
 
 import importlib.util
 import os

@@ -24,7 +24,7 @@ def solved(**given: Any) -> Trajectory:
 
 
 def stopped() -> Trajectory:
-    """Return a trajectory of a program that its Lipschitz test stopped; it has all quantities."""
+    """Return the trajectory, with all quantities, of a program that the stop test ended."""
     return run_program(case_scene(2), subset("runge-kutta"), implementation="python")
 
 

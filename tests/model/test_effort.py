@@ -1,4 +1,4 @@
-"""Work limits: they count the work, and each message names the one option that raises the limit."""
+"""Work limits count the work, and each message names the option that raises the limit."""
 
 import copy
 import pickle

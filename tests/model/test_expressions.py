@@ -60,7 +60,7 @@ def test_value_is_that_of_the_same_text_in_python(text: str) -> None:
 
 
 def _drawn(source: random.Random, depth: int) -> str:
-    """Return a random expression; its value is bounded, and so are those of its parts."""
+    """Return a random expression whose value, and the values of whose parts, are bounded."""
     if depth == 0:
         return source.choice([*INPUTS, "pi", "k", f"{source.uniform(-2.0, 2.0)!r}"])
     a, b = (_drawn(source, source.randrange(depth)) for _ in range(2))

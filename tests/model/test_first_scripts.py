@@ -1,4 +1,4 @@
-"""First scripts as users of SciPy write them from memory: they run, or say what to write."""
+"""First scripts as users of SciPy write them: they run, or the message says what to write."""
 
 import inspect
 from pathlib import Path

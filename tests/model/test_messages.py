@@ -1,4 +1,4 @@
-"""The catalogue of error messages: complete, and each message in the words of the others."""
+"""The catalogue of error messages is complete, and messages use the same words."""
 
 import re
 

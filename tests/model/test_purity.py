@@ -1,4 +1,4 @@
-"""A function of a torque may keep what its result does not depend on."""
+"""A torque function may store values on which its result does not depend."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Scenes and scene files: what is read."""
+"""Scenes, and the scene files that are read."""
 
 import math
 import re

@@ -59,19 +59,17 @@ _FOLDER = TemporaryDirectory()  # beside that of the row, in which no file may b
 
 
 def file(content: str | bytes, name: str) -> Path:
-    """Make a file."""
     path = Path(_FOLDER.name) / name
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
     return path
 
 
 def scene(content: str | bytes) -> Scene:
-    """Read a scene file."""
     return read_scene(file(content, "scene.toml"))
 
 
 def in_file(more: str) -> Scene:
-    """Read a scene file with more in it than a body and omega."""
+    """Read a scene file that has `more` in addition to a body and omega."""
     return scene(BODY + START + more)
 
 
@@ -87,7 +85,6 @@ def expression(text: str, **constants: Any) -> StateTorque | TorqueLaw:
 
 
 def sweep(*axes: str, **parts: str) -> Any:
-    """Read a sweep file."""
     return read_sweep(file(text(*axes, **parts), "sweep.toml"))
 
 

@@ -30,7 +30,6 @@ _OTHERS = (
 
 
 def table(name: str) -> dict[str, str]:
-    """Return the rows of a table."""
     return tomllib.loads((HERE / f"{name}.toml").read_text())
 
 

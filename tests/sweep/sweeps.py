@@ -60,12 +60,10 @@ def axis(field: str, values: object) -> str:
 
 
 def text(*axes: str, top: str = 'reductions = ["end", "status"]', scene: str = BASE) -> str:
-    """Return the text of a sweep file with these axes."""
     return "\n".join([top, scene, *axes])
 
 
 def written(folder: Path, content: str, name: str = "sweep.toml") -> str:
-    """Write a sweep file and return its path."""
     (folder / name).write_text(content)
     return str(folder / name)
 

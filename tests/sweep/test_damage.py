@@ -1,4 +1,4 @@
-"""Damaged stores: one line names the damage, and a repair restores the same bytes."""
+"""A damaged store is reported in one line, and a repair restores the same bytes."""
 
 import itertools
 import json

@@ -1,4 +1,4 @@
-"""Executors: all return the same bytes, even if their workers die."""
+"""All executors return the same bytes, even if their workers die."""
 
 import multiprocessing
 import os

@@ -1,7 +1,7 @@
 """A second implementation of the arithmetic of words: exact rationals, then the rounding rule.
 
-It uses nothing of the rules in `pyharness.thesis.word`: no shifts of integers, no frames. A
-number is a fraction, and its unit is found by comparison with powers of two.
+It shares no code with `pyharness.thesis.word`. A number is a fraction, and its unit is found by
+comparison with powers of two.
 """
 
 import math
@@ -19,7 +19,7 @@ OPERATIONS: dict[str, Callable[[Any, Any], Any]] = {
 
 
 def exact(p: int, rule: str, name: str, x: Fraction, y: Fraction) -> Fraction:
-    """Return the result in p bits for two non-zero numbers; no exponent may leave the range."""
+    """Return an operation's result in p bits for two non-zero numbers; exponents have no limit."""
     value: Fraction = OPERATIONS[name](x, y)
     if rule == "chop":
         return _towards_zero(value, unit(value, p))

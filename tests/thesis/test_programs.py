@@ -1,4 +1,4 @@
-"""Fortran against twin, bit for bit; corrected programs against the truth; stops of the thesis."""
+"""Fortran agrees with the twin bit for bit, and corrected programs agree with the solution."""
 
 import inspect
 import itertools

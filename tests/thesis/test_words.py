@@ -1,4 +1,4 @@
-"""Words: bits as the processor's, as exact rationals, as the CDC's vectors; the twins in words."""
+"""Words: the bits of the processor, of exact rationals and of CDC's vectors; the twins in words."""
 
 import math
 from dataclasses import replace

@@ -53,7 +53,6 @@ def genuine(name: str) -> Record:
 
 
 def refused(certificate: Any) -> bool:
-    """Return whether the checker refuses a certificate that is read from JSON text."""
     try:
         check(json.loads(json.dumps(certificate)))
     except Exception:
@@ -161,7 +160,7 @@ def digit(source: Random, text: str, last: int) -> str:
 
 
 def put(holder: Any, key: Any, value: Any) -> None:
-    """Put a value at a place, or a function of what is there."""
+    """Replace the value at a place; `value` may be a function of the present value."""
     holder[key] = value(holder[key]) if callable(value) else value
 
 

@@ -1,4 +1,4 @@
-"""The certificates of the documents: their check without any library, and what the page proves."""
+"""The certificates of the documents are checked without a library, and prove the page's results."""
 
 import json
 import subprocess

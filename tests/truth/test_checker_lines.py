@@ -1,7 +1,7 @@
-"""Each line of the checker with a part of the proof refuses what a weaker line would accept.
+"""Each line of the checker that carries out a part of the proof is necessary.
 
-The file `weaker_lines.txt` has weaker lines. A certificate for each is made with the bounds of the
-weaker checker, and with further changes where these are needed.
+The file `weaker_lines.txt` has weaker forms of these lines. For each a forged certificate is made,
+with the bounds of the weaker checker. The weaker checker accepts it, the real one refuses it.
 """
 
 import ast
@@ -143,7 +143,7 @@ def edited(old: str, new: str) -> Change:
 
 
 def put(*keys: Any) -> Change:
-    """Return a change that puts the last of `keys` at the place to which the others lead."""
+    """Return a change that puts the last of `keys` at the place that the others name."""
 
     def change(record: Record) -> Record:
         *path, last, value = keys

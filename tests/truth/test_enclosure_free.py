@@ -29,7 +29,7 @@ ATTITUDE = (0.5, -0.1, 0.7, 0.3)
 
 @pytest.fixture(autouse=True)
 def many_bits() -> Iterator[None]:
-    """Compute what is compared with the balls to 1000 bits."""
+    """Compute the solutions that are compared with the balls to 1000 bits."""
     with flint.ctx.workprec(1000):
         yield
 

@@ -1,4 +1,4 @@
-"""Reports: every form gives the same values, each in its own way."""
+"""Every form of a report has the same values."""
 
 import csv
 import json

@@ -252,10 +252,7 @@ def _percentage_turned(atlas: Atlas) -> Table:
 
 
 def atlas_picture(atlas: Atlas) -> Picture:
-    """Return maps of the total score over directions of omega(0), beside mean scores.
-
-    The means are those of each claim at each magnitude of omega(0).
-    """
+    """Return maps of the score over directions of omega(0), and each claim's mean by magnitude."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12.0, 7.2), dpi=100, layout="constrained")

@@ -192,10 +192,9 @@ def by_literals(
 ) -> Array:
     """Return omega of an original collocation program with changed step literals.
 
-    The step size is divided by `parts` in the literals `changed`, elements of `LITERALS`. Under
-    constant torque a model, equal except for rounding, integrates all scenes at once. The result
-    (rad/s) is at the steps of the unchanged program, shape (scenes, steps, 3), and NaN after an
-    overflow.
+    The step size is divided by `parts` in the literals `changed`, elements of `LITERALS`. All
+    scenes, under constant torque, are integrated at once by `integrate_models`. The result (rad/s)
+    is at the steps of the unchanged program, shape (scenes, steps, 3), and NaN after an overflow.
     """
     h, steps = scenes[0].step_size, scenes[0].steps
     dt, end, growth = (h / parts if name in changed else h for name in LITERALS)

@@ -50,9 +50,9 @@ def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
     """Judge the claim that eq. 19 of the thesis, the Lipschitz condition, ends unbounded runs.
 
     A quotient is the change of a derivative between two stages, divided by the change of its
-    variable. The stop test applies eq. 19 only if its quotients are Lipschitz quotients of the
-    differential equations, which are at most the largest norm of the Jacobian, here along the
-    reference solution and the run.
+    variable. Lipschitz quotients of the differential equations are at most the largest norm of the
+    Jacobian. The stop test therefore applies eq. 19 only if its quotients do not exceed this norm,
+    which is computed along the reference solution and the run.
     """
     numbers: dict[str, float] = {}
     for case in cases:
@@ -179,8 +179,8 @@ def execution_time(
 ) -> Judged:
     """Judge the claim that collocation takes about twice the time of Runge-Kutta.
 
-    The operations of a step, on the cards and in our linear solver LEQT1F, are weighted by
-    `unit_times`, and counted in two ways: as written, and with repeated terms counted once.
+    The operations of a step, on the cards and in our LEQT1F, are weighted by `unit_times`. They are
+    counted in two ways: as written, and with repeated terms counted once.
     """
     listings = {program: lab.listing(program) for program in PROGRAMS}
     counts = {name: operations_per_step(each) for name, each in listings.items()}
@@ -255,9 +255,10 @@ def computer_error(
 ) -> Judged:
     """Judge the claim that rounding error makes the weightings other than collocation fail.
 
-    Rounding error (rad/s) is measured in two ways: as the error in Case 1 with decreasing steps,
-    because every method solves this case exactly except for rounding; and as the difference between
-    runs of the methods of section IV.2 in binary64 and in the arithmetics `words`.
+    Rounding error (rad/s) is measured in two ways. The first is the error in Case 1 with decreasing
+    steps, because every method solves this case exactly except for rounding. The second is the
+    difference between runs of the methods of section IV.2 in binary64 and in the arithmetics
+    `words`.
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})

@@ -53,7 +53,7 @@ def omega3_varies(bench: Bench, case: int, limit: float) -> Grade:
 
 
 def no_deviation(bench: Bench, case: int, limit: float) -> Grade:
-    """Grade the claim that no error reaches `limit` (rad/s), half a unit of the last digit."""
+    """Grade the claim that errors are below `limit` (rad/s), half a unit of the last decimal."""
     numbers = {f"{name}: largest error (rad/s)": bench.error(name, case) for name in PROGRAMS}
     return Grade(numbers, _most(numbers) < limit)
 

@@ -65,8 +65,8 @@ class Sentence(NamedTuple):
 
     `text` is the whole sentence, with formulas in LaTeX, `quote` a few words of it, and `where` its
     place. `why` says why a sentence has no claims. `laboratory` names the run that shows the
-    sentence best, as in ``case=2&program=two-term``. `command` is one that shows more than `claims
-    --explain`.
+    sentence best, as in ``case=2&program=two-term``. `command` is a command that shows more than
+    `claims --explain`.
     """
 
     where: str

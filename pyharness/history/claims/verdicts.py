@@ -75,8 +75,7 @@ def omega3_varies(lab: Laboratory, case: int, limit: float) -> Judged:
 def no_deviation(lab: Laboratory, case: int, limit: float) -> Judged:
     """Judge the claim that all three programs coincide with the known solution of a case.
 
-    The numbers include the count of steps that Runge-Kutta runs from each initial omega in
-    `starts`.
+    The numbers include the steps that Runge-Kutta ran from each initial omega in `starts`.
     """
     found = judged(rules.no_deviation(lab, case, limit))
     for start in starts():
@@ -186,8 +185,8 @@ def more_reliable(lab: Laboratory, case: int) -> Judged:
 def too_fast(lab: Laboratory, case: int, same: float, worse: float) -> Judged:
     """Judge the claim that the two-term error is due to a motion too fast for two terms.
 
-    The corrected programs run from all initial omegas in `starts`, because the thesis omits that of
-    some cases.
+    The corrected programs run from all initial omegas in `starts`, because the thesis does not give
+    the initial omega of every case.
     """
     numbers = {}
     for start in starts():

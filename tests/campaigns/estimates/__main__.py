@@ -1,10 +1,10 @@
 """True and reported errors: `python -m tests.campaigns.estimates --scenes 20000 --seed 1`.
 
-Every scene is drawn from the seed and its number, solved to its tolerance by every entry point, and
-compared with a truth of 30 digits. `--seed 1 --only 123` repeats one scene. The exit status is 1 if
-an error exceeds the tolerance, if an answer reports wrongly whether any digit is left, if a
-reported error is below a hundredth of the true one, or if more than one in a thousand reported
-errors are below a tenth of it.
+Every scene is drawn from the seed and its number. It is solved to its tolerance by every entry
+point, and compared with a solution of 30 digits. `--seed 1 --only 123` repeats one scene. The exit
+status is 1 in four cases: an error exceeds the tolerance; the status is wrong on whether any digit
+is left; a reported error is below a hundredth of the true error; or more than one in a thousand
+reported errors are below a tenth of it.
 """
 
 import argparse

@@ -68,8 +68,8 @@ def drawn(seed: str, number: int, tolerances: tuple[float, ...] = (), dressed: b
 
     Its tolerance is one of `tolerances`, by default any from `COARSEST` to `FINEST`. A scene is
     drawn again if the body turns more than some 300 times, or if the truth would take too many
-    steps. Without `dressed` it has principal axes, no attitude and one time, and no kind of motion
-    after "rough".
+    steps. Unless `dressed`, the scene has principal axes, no attitude and one time, and none of the
+    kinds of motion after "rough".
     """
     source = Random(f"estimates/{seed}/{number}")
     law, place = LAWS[number % len(LAWS)], number // len(LAWS)
@@ -169,7 +169,7 @@ def _by_kind(source: Random, law: str, way: str) -> tuple[Scene, float, tuple[st
 def _steady(source: Random, scene: Scene) -> Scene:
     """Return a rotation that is steady up to rounding: about a principal axis, or by a torque.
 
-    Half of those about an axis keep the torque of the scene along that axis.
+    Of the rotations about an axis, half keep the scene's torque along this axis.
     """
     moments = scene.moments or (1.0, 1.0, 1.0)
     if source.random() < 0.4:

@@ -41,9 +41,9 @@ class Truth:
 
 
 def truth_of(scene: Scene, until: float | Sequence[float], attitude: bool = False) -> Truth:
-    """Return the truth of a scene at times (s), which have one sign and go away from 0.
+    """Return the truth of a scene at times (s) of one sign, in the order of their distance from 0.
 
-    Raise InputError if omega grows without bound, or turns too much, before the last time.
+    Raise InputError if omega grows without bound, or the body rotates too much, before the end.
     """
     joint = attitude or scene.law.in_space
     times: list[float] = np.atleast_1d(until).tolist()

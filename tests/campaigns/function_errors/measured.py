@@ -206,7 +206,6 @@ def javascript_ulps(given: Sequence[float]) -> float:
 
 
 def main() -> None:
-    """Print the measured errors."""
     given = angles(_COUNT)
     pairs = {"statements": lane_circular.compute(LANES.read_text(), given)}
     if shutil.which(os.environ.get("FC", "gfortran")):

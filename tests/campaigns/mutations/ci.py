@@ -36,7 +36,6 @@ PLANTED = (
 
 
 def find(file: str, id: str) -> Mutation:
-    """Return a mutation by its name."""
     return next(each for each in mutations(file) if each.id == id)
 
 

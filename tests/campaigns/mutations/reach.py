@@ -43,7 +43,6 @@ class Check:
 
 
 def command_of(kind: str) -> list[str]:
-    """Return the arguments of pyharness that run a kind of `verify`."""
     seed = ["--seed", SEED] if kind == "random" else []
     return ["verify", "--only", kind, "--format", "json", *seed]
 

@@ -71,7 +71,6 @@ class Mutation:
 
 
 def files() -> list[str]:
-    """Return the files that may be changed."""
     python = [path for folder in _PYTHON for path in (ROOT / "pyharness" / folder).rglob("*.py")]
     kept = [path for path in python if not _OTHER_PYTHON.search(path.as_posix())]
     others = [path for pattern in _OTHERS for path in ROOT.glob(pattern)]
@@ -80,7 +79,6 @@ def files() -> list[str]:
 
 
 def mutations(file: str) -> list[Mutation]:
-    """Return all changes to a file."""
     text = (ROOT / file).read_text()
     language = language_of(file)
     if language == "Python":

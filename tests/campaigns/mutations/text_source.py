@@ -44,7 +44,6 @@ def constant(text: str) -> str:
 
 
 def language_of(file: str) -> str:
-    """Return the language of a file by its ending."""
     return _LANGUAGES.get(PurePosixPath(file).suffix, "Python")
 
 

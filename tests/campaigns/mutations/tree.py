@@ -78,7 +78,6 @@ class Processes:
 
 
 def kill(group: int) -> None:
-    """Kill the processes of a group, if there are any."""
     with contextlib.suppress(ProcessLookupError, PermissionError):
         os.killpg(group, signal.SIGKILL)
 

@@ -120,7 +120,7 @@ def _entering(functions: Set[str | None], modules: set[str], checks: list[Check]
 
 
 def _tiers(mutation: Mutation, checks: list[Check]) -> list[list[Check]]:
-    """Return lists of checks, each to be run if nothing failed in the lists before."""
+    """Return lists of checks; each list is run only if no check before it failed."""
     found = near(mutation, checks)
     kinds = sorted((e for e in found if e.name.startswith("verify")), key=lambda e: e.seconds)
     tests = [each for each in found if not each.is_campaign]
@@ -142,7 +142,7 @@ def _without(checks: list[Check], tried: list[Check]) -> list[Check]:
 
 
 def _own(mutation: Mutation) -> str:
-    """Return the end of the name of a file with the tests of the changed file."""
+    """Return how the name of the changed file's test file ends."""
     return f"/test_{PurePosixPath(mutation.file).stem}.py"
 
 

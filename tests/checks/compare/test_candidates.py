@@ -1,4 +1,4 @@
-"""Candidates of a comparison: the program that is judged is the one that was requested."""
+"""A comparison judges the program that was requested."""
 
 import numpy as np
 import pytest

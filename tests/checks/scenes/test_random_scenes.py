@@ -1,4 +1,4 @@
-"""Random scenes: a seed gives the same scenes as when it was first used."""
+"""A seed gives the same random scenes in every version of the project."""
 
 import hashlib
 import re

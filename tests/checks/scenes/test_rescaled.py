@@ -1,4 +1,4 @@
-"""Motions of any scale: the same digits in other units, by rows and by a prepared solver."""
+"""Motions of any scale have the same digits in other units, in rows and by a prepared solver."""
 
 import math
 from dataclasses import replace

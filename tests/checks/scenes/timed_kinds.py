@@ -17,7 +17,6 @@ Generator = np.random.Generator
 
 
 def triple(values: Array) -> Triple:
-    """Return three plain floats."""
     first, second, third = values.tolist()
     return first, second, third
 

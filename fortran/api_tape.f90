@@ -182,3 +182,13 @@ subroutine ready_number(key, number)
 
   number = ready_leaves(key)
 end subroutine ready_number
+
+subroutine compiled_lanes(address, fits)
+  ! Return whether the compiled operations at an address can be used for many bodies.
+  use levels, only: fits_lanes
+  implicit none
+  integer(8), intent(in) :: address
+  integer(4), intent(out) :: fits
+
+  fits = fits_lanes(address)
+end subroutine compiled_lanes

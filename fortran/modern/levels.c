@@ -26,11 +26,11 @@ typedef void runner(void *ensemble);
   solver solve_tape_##level;                                                                   \
   solver step_tape_##level;                                                                    \
   solver vary_solution_##level;
-#define TAKEN(level)                                                                           \
+#define TAKEN(level, width)                                                                    \
   {taylor_solve_##level,       quick_solve_##level,      solve_many_free_##level,              \
    solve_many_taylor_##level,  solve_many_fixed_##level, run_lanes_##level,                    \
    solve_tape_##level,         step_tape_##level,        vary_solution_##level,                \
-   solve_tape_bodies_##level,  ready_leaves_##level}
+   solve_tape_bodies_##level,  ready_leaves_##level,      width}
 
 DECLARED(plain)
 #ifdef WITH_LEVELS
@@ -55,11 +55,12 @@ static struct {
   solver *vary;
   runner *bodies;
   const struct leaves *leaves; /* of ready torques, in the order of ready_keys */
+  int width;                   /* numbers in a register */
 } chosen, known[] = {
-  TAKEN(plain),
+  TAKEN(plain, IN_REGISTER),
 #ifdef WITH_LEVELS
-  TAKEN(avx2),
-  TAKEN(avx512),
+  TAKEN(avx2, 4),
+  TAKEN(avx512, 8),
 #endif
 };
 static int level = 0; /* 0 plain, 1 AVX2 with FMA, 2 AVX-512 */
@@ -145,6 +146,13 @@ const void *leaves_at(int64_t number)
 {
   if (number <= 0 || number >= LEAST_ADDRESS) return (const void *)(intptr_t)number;
   return chosen.leaves ? chosen.leaves + number - 1 : NULL;
+}
+
+/* Return whether the leaves at an address are for bodies in the registers of this level. */
+int fits_lanes(int64_t address)
+{
+  const struct leaves *leaves = leaves_at(address);
+  return leaves != NULL && leaves->expand_lanes != NULL && leaves->width == chosen.width;
 }
 
 void run_lanes(void *ensemble) { chosen.lanes(ensemble); }

@@ -6,7 +6,7 @@ module levels
   implicit none(type, external)
   private
 
-  public :: choose_level, many_fixed, many_free, many_taylor, quick_solve, ready_leaves, &
+  public :: choose_level, fits_lanes, many_fixed, many_free, many_taylor, quick_solve, ready_leaves, &
             run_lanes, tape_bodies, tape_solve, tape_step, tape_variation, taylor_solve
 
   interface
@@ -52,6 +52,13 @@ module levels
       implicit none(type, external)
       integer(c_int64_t), intent(in), value :: key
     end function ready_leaves
+
+    integer(c_int) function fits_lanes(address) bind(c, name="fits_lanes")
+      !! Return whether (1, not 0) compiled operations are for bodies in this level's registers.
+      import :: c_int, c_int64_t
+      implicit none(type, external)
+      integer(c_int64_t), intent(in), value :: address
+    end function fits_lanes
 
     subroutine quick_solve(problem, request, contest, solution) bind(c, name="quick_solve")
       import :: c_int

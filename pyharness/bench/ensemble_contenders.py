@@ -122,17 +122,17 @@ def with_attitudes(loads: list[EnsembleLoad], seed: str) -> list[EnsembleLoad]:
     return [replace(each, name=f"{each.name}, attitude", attitude0=turned) for each in loads]
 
 
-def own_ensembles() -> list[EnsembleContender]:
-    """Return our contenders for many bodies."""
+def own_ensembles(compiled: bool = False) -> list[EnsembleContender]:
+    """Return our contenders for many bodies; `compiled` is as in `solve_many`."""
     one, closed = EnsembleContender, _make_own("closed-form")
     return [
         one("closed-form", "none", closed, torque_free=True, attitude=True),
-        one("taylor", "tolerance", _make_own("taylor"), attitude=True),
+        one("taylor", "tolerance", _make_own("taylor", compiled), attitude=True),
         one("rk4", "steps", _make_own("rk4")),
     ]
 
 
-def _make_own(method: str) -> EnsembleMaker:
+def _make_own(method: str, compiled: bool = False) -> EnsembleMaker:
     def prepare(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
         # Each call of the solver writes its results into the arrays of the previous call.
         tolerance = setting if method == "taylor" else None
@@ -144,7 +144,7 @@ def _make_own(method: str) -> EnsembleMaker:
             kept = solve_many(
                 load.scene, load.horizon, omega=load.omega0, torque_constant=load.torque,
                 attitude=load.attitude0, method=method, tolerance=tolerance, step=step,
-                threads=threads, out=kept,
+                threads=threads, out=kept, compiled=compiled,
             )  # fmt: skip
             if load.attitude0 is None:
                 return kept.omega

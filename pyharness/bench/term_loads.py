@@ -248,7 +248,7 @@ def term_peers(scenes: Sequence[TermScene]) -> list[SceneContender]:
     ]
 
 
-def body_contenders() -> list[EnsembleContender]:
+def body_contenders(compiled: bool = False) -> list[EnsembleContender]:
     """Return our and heyoka's contender for many bodies, each on one core."""
-    found = [*own_ensembles(), *ensemble_peers()]
+    found = [*own_ensembles(compiled), *ensemble_peers()]
     return [replace(each, threads=(1,)) for each in found if each.name in (MANY_OURS, MANY_HEYOKA)]

@@ -202,7 +202,5 @@ def in_space(torque: TorqueLaw | Numbers) -> StateTorque:
     """
     law = law_of_vector("[torque] in space", torque, "space")
     return ready_term(
-        "in_space",
-        lambda time, omega, attitude: turned_law(law, time, attitude),
-        torque=law,
+        "in_space", lambda time, omega, attitude: turned_law(law, time, attitude), torque=law
     )

@@ -10,7 +10,6 @@ from functools import lru_cache
 
 from pyharness.engine.leaves import (
     HEADER,
-    FIRST_UNKNOWN,
     TIME,
     Structure,
     derivatives,
@@ -43,7 +42,10 @@ enum { IN_REGISTER = 2 };
 #endif
 typedef double reg __attribute__((vector_size(8 * IN_REGISTER)));
 typedef long long reg_bits __attribute__((vector_size(8 * IN_REGISTER)));
-static reg half_in_lanes(reg x, reg root) { return (reg)((reg_bits)(x / (2.0 * root)) & (x != 0.0)); }
+static reg half_in_lanes(reg x, reg root)
+{
+  return (reg)((reg_bits)(x / (2.0 * root)) & (x != 0.0));
+}
 static reg root_slope_in_lanes(reg root) { return (reg)((reg_bits)(0.5 / root) & (root != 0.0)); }
 /* The sum of the products of terms 1 to k - 1. */
 static reg sum_in_lanes(const reg *x, const reg *y, int k)
@@ -63,11 +65,9 @@ static inline reg late_sum(const reg *x, const reg *y, int k, int late, const re
 /* The parts of four such sums, from number k, of products of terms before k. */
 static __attribute__((noinline)) void sums_in_lanes(const reg *x, const reg *y, int k, reg *sums)
 {
-  reg y1 = y[k - 1], y2 = y[k - 2], y3 = y[k - 3];
-  reg a = x[1] * y1, b = x[2] * y1, c = x[3] * y1, d = {0.0};
+  reg y1 = y[k - 3], y2 = y[k - 2], y3 = y[k - 1];
+  reg a = x[1] * y3 + x[3] * y1, b = x[2] * y3, c = x[3] * y3, d = {0.0};
   reg a2 = x[2] * y2, b2 = x[3] * y2, c2 = {0.0}, d2 = {0.0};
-  a += x[3] * y3;
-  { const reg last = y1; y1 = y3; y3 = last; }
   for (int j = 4; j < k; j += 4) {
     const reg u0 = y[k - j], u1 = y[k - j - 1], u2 = y[k - j - 2], u3 = y[k - j - 3];
     a += x[j] * u0, b += x[j] * y1, c += x[j] * y2, d += x[j] * y3;
@@ -96,14 +96,14 @@ def whole_source(tape: Structure) -> str:
 
 def _in_lanes(text: str) -> str:
     """Return statements for numbers as statements for registers."""
-    # An exponential in lanes is never constant.
     for old, new in {
         "const double t": "const reg t",
-        "z_p ? 0.0 : ": "",
         "halved(": "half_in_lanes(",
         "slope_of_root(": "root_slope_in_lanes(",
+        "= 0.0;": "= {0.0};",
     }.items():
         text = text.replace(old, new)
+    # An exponential in lanes is never constant.
     text = re.sub(r"\bz\d+ \? 0\.0 : ", "", text)
     return re.sub(r"\bk\*", "whole*", text)
 
@@ -149,7 +149,8 @@ def _expand(tape: Structure) -> Iterator[str]:
         yield f"      sums_in_lanes(&{place(x, '0')}, &{place(y, '0')}, k, sums[{n}]);"
     yield "    }"
     for n, (x, y) in enumerate(pairs):
-        yield f"    const reg sum{n} = late_sum(&{place(x, '0')}, &{place(y, '0')}, k, late, sums[{n}]);"
+        both = f"&{place(x, '0')}, &{place(y, '0')}"
+        yield f"    const reg sum{n} = late_sum({both}, k, late, sums[{n}]);"
     yield from ("    " + re.sub(r"\bsum\[(\d+)\]", r"sum\1", each) for each in body)
     yield "  }\n}"
 

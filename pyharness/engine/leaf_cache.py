@@ -17,8 +17,10 @@ from pathlib import Path
 
 from pyharness.engine.lane_leaves import whole_source
 from pyharness.engine.leaves import Structure, structure
-from pyharness.engine.recorded import has_ready_leaves, listing, system_of
+from pyharness.engine.recorded import has_ready_leaves, listing, number_of_leaves, system_of
+from pyharness.model.array_type import Array
 from pyharness.model.constant_body import with_constant_body
+from pyharness.model.extension import extension
 from pyharness.model.scene import Scene
 from pyharness.model.tape import Tape
 
@@ -80,6 +82,14 @@ def leaves_of(tape: Tape) -> tuple[int, str]:
         return loaded(shape, str(folder())), "compiled"
     except _FAILURES as error:
         return 0, f"interpreter: {error}"
+
+
+def leaves_of_many(packed: Array, leaves: str) -> str:
+    """Return the text of `Ensemble.leaves` from a packed scene and the text of `Solver.leaves`."""
+    if leaves == "compiled" and not extension().compiled_lanes(number_of_leaves(packed)):
+        return "interpreter: the compiler does not use the registers of this processor"
+    # What was built with the package is for single bodies.
+    return leaves.replace("built", "interpreter", 1)
 
 
 @cache  # a kernel may use what has been loaded for as long as the process lives

@@ -180,6 +180,7 @@ def _rates(tape: Structure) -> range:
 
 
 def unknowns_of(tape: Structure) -> range:
+    """Return the slots of the unknowns."""
     return range(FIRST_UNKNOWN, FIRST_UNKNOWN + tape.n_unknowns)
 
 

@@ -293,7 +293,7 @@ def _solve(
             if found.error is not None:
                 # The initial omega was rounded after the rotation to principal axes.
                 found.error[:] += ROUNDING * np.max(np.abs(omega0), axis=1) * np.abs(times)
-    return found
+    return found if found.leaves is None else replace(found, leaves=None)
 
 
 def _kind_of(scene: Scene, row: int) -> int:

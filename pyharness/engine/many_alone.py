@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.engine.event_functions import event_functions
-from pyharness.engine.leaf_cache import leaves_of
+from pyharness.engine.leaf_cache import leaves_of, leaves_of_many
 from pyharness.engine.many_prepared import solve_each, solve_lanes, solve_row
 from pyharness.engine.many_scenes import (
     BODIES,
@@ -109,8 +109,7 @@ def solve_one_by_one(
         settings["compiled"] = compiled
         key = method, tolerance, *settings.values()
         shared = keep_with(scene, key, lambda: prepare(at_rest(), method, tolerance, **settings))
-        # Those built with the package are for single bodies.
-        leaves = shared.leaves and shared.leaves.replace("built", "interpreter", 1)
+        leaves = shared.leaves and leaves_of_many(shared.packed, shared.leaves)
     else:
         check_prepared(scene, method)
         check_torque(scene, method, attitude=True)
@@ -146,7 +145,7 @@ def solve_one_by_one(
         # At time 0 it is normalised in the same way as by the vector kernel.
         at_start = (spread(times, n) == 0.0) & (found.status == Statuses.COMPLETE)
         found.attitude[at_start] = unit_quaternions(spread(counted["attitude"], n)[at_start])
-    return found if leaves is None else replace(found, leaves=leaves)
+    return found if found.leaves == leaves else replace(found, leaves=leaves)
 
 
 def _lanes(
@@ -185,7 +184,7 @@ def _lanes(
     address, leaves = leaves_of(tape) if compiled else (0, "interpreter")
     packed = packed_tape(tape, scene.step_size, *settings, address)
     parameters = np.column_stack([spread(each, max(map(len, columns))) for each in columns])
-    return (packed, parameters), leaves
+    return (packed, parameters), leaves_of_many(packed, leaves)
 
 
 _METHODS = ("auto", "taylor", "closed-form")

@@ -237,6 +237,12 @@ def kernel_tape(tape: Tape, n_unknowns: int | None = None) -> Array:
     return packed
 
 
+def number_of_leaves(packed: Array) -> int:
+    """Return the address or number of the leaves of a packed scene that is a tape."""
+    at = Places.WAVES + _LEAVES
+    return int(packed[at : at + 1].view(np.int64)[0])
+
+
 def _in_pairs(integers: Sequence[int] | NDArray[np.int64]) -> Array:
     """Return 32-bit integers as the bits of floats, two in each."""
     pairs = np.zeros(len(integers) + len(integers) % 2, dtype=np.int32)

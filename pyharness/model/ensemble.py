@@ -354,4 +354,4 @@ def place_for(
             )
         if array is not None:
             buffer_of(f"out.{name}", array, (n, width), "d")
-    return out if out.leaves is None else replace(out, leaves=None)
+    return out

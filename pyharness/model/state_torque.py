@@ -16,13 +16,7 @@ from pyharness.model.numpy_calls import called_once, symbol_array
 from pyharness.model.own_states import OwnState
 from pyharness.model.symbols import SYMBOLS, Recorder, Symbol, recorded_twice
 from pyharness.model.tape import N_INPUTS, TIME, Tape, evaluate, float_outputs
-from pyharness.model.torque_law import (
-    FRAMES,
-    TorqueLaw,
-    body_torque,
-    law_value,
-    to_body,
-)
+from pyharness.model.torque_law import FRAMES, TorqueLaw, body_torque, law_value, to_body
 from pyharness.model.values import Triple, converted, three_floats, triple
 
 Function = Callable[..., Any]

@@ -34,7 +34,7 @@ from pyharness.sweep.sweep import ReductionSpec, Sweep
 
 Claim = Callable[[Batch], NDArray[Any]]
 _KEYS = ("schema", "name", "scene", "axis", "solve", "reductions", "chunk")
-_OF_METHODS = ("method", "tolerance", "t_end")
+_OF_METHODS = ("method", "tolerance", "t_end", "compiled")
 _OF_PROGRAMS = ("listing", "reading", "lipschitz", "may_stop")
 CHUNK = 100_000
 _MOST_IN_CHUNK = 1_000_000
@@ -148,7 +148,10 @@ def _solver(table: object, axes: tuple[Axis, ...]) -> Solver:
     t_end = None if t_end is None else finite("[solve] t_end", t_end)
     listing, reading = given.get("listing", "original"), given.get("reading", "adopted")
     may_stop = boolean("[solve] may_stop", given.get("may_stop", True))
-    return Solver(method, program, tolerance, t_end, listing, reading, lipschitz, may_stop)
+    compiled = boolean("[solve] compiled", given.get("compiled", False))
+    return Solver(
+        method, program, tolerance, t_end, listing, reading, lipschitz, may_stop, compiled
+    )
 
 
 def _reduction(entry: object, claims: Mapping[str, Claim]) -> ReductionSpec:

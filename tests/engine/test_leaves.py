@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -14,12 +15,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import Scene, TorqueLaw, prepare, solve, torques
+from pyharness import Scene, TorqueLaw, prepare, solve, solve_many, torques
 from pyharness.checks.scenes.state_scenes import READY, draw, draw_ready
 from pyharness.engine import leaf_cache
-from pyharness.engine.leaves import source, structure
+from pyharness.engine.lane_leaves import whole_source
+from pyharness.engine.leaves import structure
 from pyharness.engine.recorded import kernel_tape, listing, system_of, taylor_step
 from pyharness.model.constant_body import with_constant_body
+from pyharness.model.extension import extension
 from pyharness.model.principal import principal
 from pyharness.truth.reference import reference
 
@@ -113,6 +116,74 @@ def test_growth_and_estimate_are_those_of_the_interpreter(attitude: Any) -> None
     assert found[1].error == pytest.approx(found[0].error, rel=0.1)
     truth = reference(scene, [2.0])
     assert states[1][:3] == pytest.approx(truth.omega[0], rel=0.0, abs=1e-9)
+
+
+def start_many(scene: Scene, n: int) -> Any:
+    return np.array(scene.omega) * (1.0 + 0.2 * np.random.default_rng(9).random((n, 3)))
+
+
+def assert_same(found: list[Any], texts: tuple[str, str] = ("interpreter", "compiled")) -> None:
+    """Compare results of many bodies, interpreted and compiled."""
+    assert tuple(each.leaves for each in found) == texts
+    interpreted, compiled = found
+    assert (interpreted.status == compiled.status).all()
+    assert interpreted.has_result.sum() > 3
+    apart = np.abs(interpreted.omega - compiled.omega).max(axis=1)
+    sizes = np.abs(interpreted.omega).max(axis=1)
+    has = interpreted.has_result
+    assert (apart <= (interpreted.error + compiled.error) * sizes + 1e-300)[has].all()
+    assert compiled.growth[has] == pytest.approx(interpreted.growth[has], rel=0.01)
+
+
+@pytest.mark.parametrize("number", range(4))
+def test_many_bodies_are_those_of_the_interpreter(number: int) -> None:
+    scene = scenes(number)
+    end = 1.0 / max(map(abs, scene.omega))
+    omega = start_many(scene, 19)
+    both = (False, True)
+    found = [solve_many(scene, end, omega=omega, estimates=True, compiled=x) for x in both]
+    assert_same(found)
+    if number == 0:  # compiled sums of many terms are rounded in another order
+        assert (found[0].omega != found[1].omega).any()
+
+
+def test_leaves_have_parameters_of_each_body() -> None:
+    def torque(t: Any, w: Any, *, k: float = 0.1) -> Any:
+        return -k * w * np.sqrt(w @ w + 0.01) + [k, 0.0, k * k * np.sin(t)]
+
+    scene = scene_of(torque)
+    omega, k = start_many(scene, 11), np.linspace(0.1, 0.5, 11)
+    moments = np.array(MOMENTS) + 0.1 * np.random.default_rng(1).random((11, 3))
+    more: Any = {"parameters": {"k": k}, "moments": moments, "estimates": True}
+    found = [solve_many(scene, 5.0, omega=omega, compiled=x, **more) for x in (False, True)]
+    assert_same(found)
+    one: Any = replace(scene, omega=tuple(omega[7]), moments=tuple(moments[7]))
+    one = replace(one, torque=lambda t, w: torque(t, w, k=k[7]))
+    assert found[1].omega[7] == pytest.approx(solve(one, 5.0).omega[-1], rel=1e-8)
+
+
+def test_leaves_for_other_registers_are_not_used() -> None:
+    scene, choose = scene_of(simple), extension().choose_instructions
+    omega = start_many(scene, 9)
+    best = choose(2)
+    if best == 0:
+        pytest.skip("the processor has one instruction set")
+    try:
+        choose(best - 1)
+        found = [solve_many(replace(scene), 3.0, omega=omega, compiled=x) for x in (False, True)]
+    finally:
+        choose(best)
+    assert found[1].leaves == (
+        "interpreter: the compiler does not use the registers of this processor"
+    )
+    assert (found[0].omega == found[1].omega).all()
+
+
+def test_switches_of_many_bodies_are_interpreted() -> None:
+    scene = scene_of(lambda t, w: np.where(w > 0.1, -0.1, 0.1))
+    found = solve_many(scene, 1.0, omega=start_many(scene, 3), compiled=True)
+    assert found.leaves is not None
+    assert found.leaves.startswith("interpreter: switches and torques of")
 
 
 def test_ready_torques_have_leaves_that_were_built() -> None:
@@ -223,8 +294,8 @@ def of_another_processor(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def of_another_version(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shape = structure(listing(system_of(scene_of(simple))))
     assert shape is not None
-    text = source(shape) + "/* newer */"
-    monkeypatch.setattr(leaf_cache, "source", lambda _: text)
+    text = whole_source(shape) + "/* newer */"
+    monkeypatch.setattr(leaf_cache, "whole_source", lambda _: text)
 
 
 def as_a_link(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:

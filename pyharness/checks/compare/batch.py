@@ -36,7 +36,7 @@ class Solver:
     `t_end` (s) is by default the step size times the number of steps. The fields after it are for
     programs: `listing` names the active defects, `reading` the interpretation of doubtful cards.
     `lipschitz` is the limit (1/s) of the stop test; `may_stop` tells whether the test may end a
-    run.
+    run. `compiled` is as in `solve_many`.
     """
 
     method: str | None = "auto"
@@ -47,6 +47,7 @@ class Solver:
     reading: str = "adopted"
     lipschitz: float = 500.0
     may_stop: bool = True
+    compiled: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,6 +215,7 @@ class Batch:
             return self._solve_each(method, tolerance, t_end)
         hidden = OF_PROGRAMS if self.scene.torque.needs_attitude else (*OF_PROGRAMS, "attitude")
         options: dict[str, Any] = {k: x for k, x in self.arrays.items() if k not in hidden} | more
+        options["compiled"] = self.solver.compiled and by_state
         return solve_many(self._shared, t_end, method=method, tolerance=tolerance, **options)
 
     def _solve_each(self, method: str, tolerance: float, t_end: Array) -> Ensemble:

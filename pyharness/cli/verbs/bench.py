@@ -228,7 +228,8 @@ def _terms(options: argparse.Namespace) -> int:
     single = measure(loads, contenders, shared.progress, process_time)
     packages = {each.package for each in contenders}
     bodies = term_loads.term_bodies(scenes, options.seed, n)
-    both = [each for each in term_loads.body_contenders() if each.package in packages]
+    rivals = term_loads.body_contenders(options.compiled)
+    both = [each for each in rivals if each.package in packages]
     many = measure_ensembles(bodies, both, options.seed, shared.progress, least=n)
     shared.end_progress()
     single.refused.extend(_not_measured(missing, loads))

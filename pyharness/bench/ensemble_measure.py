@@ -187,9 +187,8 @@ def _ladder(each: EnsembleContender, target: float) -> Iterator[float]:
     if each.setting == "none":
         yield 1.0
     elif each.setting == "tolerance":
-        # No contender has an error below a hundredth of its tolerance, or above a thousand times
-        # its tolerance.
-        for digits in range(-2, 4):
+        # Errors were between 1e-4 and 1e3 times the tolerance.
+        for digits in range(-5, 4):
             if target * 10.0**-digits >= FINEST:
                 yield float(f"{target * 10.0**-digits:.0e}")
     else:

@@ -15,7 +15,7 @@ enum { SIDE_BY_SIDE = IN_REGISTER };
 typedef reg lanes;
 typedef reg_bits bits;
 
-enum { LEAST_ORDER = 8, TERMS = LANE_TERMS, MOST_ORDER = TERMS - 1 };
+enum { LEAST_ORDER = 14, TERMS = LANE_TERMS, MOST_ORDER = TERMS - 1 };
 enum { MANY = 3 };                            /* factors of a product that may not show early */
 enum { FEW_TERMS = 5 };                       /* of values amid a step */
 enum { CARRIED = 6 };                         /* terms of an exponential */
@@ -34,7 +34,7 @@ static const double MOST_ANGLE = 5e3;  /* rad of a motion: longer ones need prec
 static const double ROUNDINGS = 4.0;   /* of an unknown that add up before they are amplified */
 /* Factors on the subtracted error and on the last terms for the stated error, as in many_taylor. */
 static const double WRONG = 2.0, UNSEEN = 0.1;
-static const double SHARE = 0.25;      /* of the tolerance, for the truncation errors */
+static const double SHARE = 0.15;      /* of the tolerance, for the truncation errors */
 static const double RIDGE = 1.001;     /* makes the fit work for one pole or none */
 static const double FAR = 1e60;        /* products of numbers from 1/FAR to FAR are finite */
 static const double LEAST = 1e-290;

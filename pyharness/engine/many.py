@@ -129,7 +129,8 @@ def solve_many(
     estimates : bool
         Whether to return estimated errors and error amplifications.
     compiled : bool
-        Whether a C compiler translates a torque that depends on the state, as in `prepare`.
+        Whether a C compiler translates a torque that depends on the state, as in `prepare`, for
+        bodies side by side. `Ensemble.leaves` says whether it did.
     events : callable, Event, or list of these
         Functions whose roots are computed, as in `solve`; none may be terminal. The method must be
         `auto`, `taylor` or `closed-form`.

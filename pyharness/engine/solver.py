@@ -304,8 +304,8 @@ def prepare(
     attitude : bool
         Whether calls return the attitude too, as in `solve`.
     compiled : bool
-        Whether a C compiler translates a recorded torque, in some 0.1 s, unless the user's cache
-        has the result; without a compiler it is interpreted. `Solver.leaves` says which.
+        Whether a C compiler translates a recorded torque, in up to a second, unless the user's
+        cache has the result; without a compiler it is interpreted. `Solver.leaves` says which.
 
     Returns
     -------

@@ -2,11 +2,14 @@
 
 The command is ``python -m tests.campaigns.leaf_campaign COUNT SEED [FIRST]``. Both compute the
 terms of the Taylor series in one step. The terms of an unknown may differ by 4 units in the last
-place of its largest term or, if larger, of the step times the summands of its derivative.
+place of its largest term or, if larger, of the step times the summands of its derivative. Five
+bodies side by side may differ by the sum of their estimated errors.
 """
 
 import sys
+from dataclasses import replace
 from random import Random
+from typing import Any
 
 import numpy as np
 
@@ -20,8 +23,10 @@ from pyharness.checks.scenes.state_scenes import (
     draw_ready,
 )
 from pyharness.engine.leaf_cache import leaves_of
+from pyharness.engine.many import solve_many
 from pyharness.engine.recorded import Step, inputs_of, kernel_tape, system_of, taylor_step
 from pyharness.model.constant_body import with_constant_body
+from pyharness.model.scene import Scene
 from pyharness.model.tape import Tape, slot_values
 from pyharness.model.tape_arrays import ARRAYS
 from pyharness.model.trajectory import Array
@@ -52,6 +57,7 @@ def try_torque(tally: Tally) -> None:
     if not address:
         tally.counts[leaves] += 1
         return
+    compare_many(tally, scene, time, source)
     state = np.array([*scene.omega, *(scene.attitude or ())])
     h = 10.0 ** source.uniform(-3.0, 0.0) / max(map(abs, scene.omega))
     t = source.random() * time
@@ -68,6 +74,28 @@ def try_torque(tally: Tally) -> None:
     parts = [abs(interpreted.h) * np.abs(each).sum() for each in summands]
     sizes = np.maximum(np.abs(interpreted.terms).max(axis=0), parts)
     tally.judge("difference", (difference / np.spacing(sizes)).max(), _UNITS, f", {scene.name}")
+
+
+def compare_many(tally: Tally, scene: Scene, time: float, source: Random) -> None:
+    """Compare the states of bodies side by side."""
+    start = np.array(scene.omega)
+    omega = np.array([start * (1.0 + 0.2 * source.random()) for _ in range(5)])
+    tolerance = 10.0 ** source.uniform(-12.0, -3.0)
+    found: list[Any] = [
+        solve_many(
+            replace(scene), time, omega=omega, tolerance=tolerance, estimates=True, compiled=each
+        )
+        for each in (False, True)
+    ]
+    tally.counts[str(found[1].leaves)] += 1
+    both = found[0].has_result & found[1].has_result
+    sizes = np.abs(found[0].omega).max(axis=1)
+    apart = np.abs(found[0].omega - found[1].omega).max(axis=1) / sizes
+    errors = [each.error for each in found]
+    for k in np.flatnonzero(both & np.isfinite(errors[0] + errors[1])):
+        allowed = max(tolerance, 4e-15 * found[0].growth[k])
+        tally.judge("many, tolerances", apart[k] / allowed, 1.0, f", {scene.name}")
+        tally.judge("many, errors", apart[k] / (errors[0] + errors[1])[k], 1.0, f", {scene.name}")
 
 
 if __name__ == "__main__":

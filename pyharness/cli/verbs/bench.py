@@ -44,7 +44,7 @@ OPTIONS = {
     "column of the result, or none (default: all).",
     "--peers NAME,...": "Measure only these third-party solvers, by their names in the first "
     "column of the result or by package (heyoka, numba, scipy), or none (default: all installed).",
-    "--compiled": "With --terms, compile the Python functions with the C compiler first.",
+    "--compiled": "With --terms, compile all torques with the C compiler first.",
     "--plan": "Instead of comparing solvers, measure run times with and without each computation "
     "that `pyharness plan` can omit.",
     "--growth": "Instead of comparing solvers, measure how the error of the Taylor method grows "

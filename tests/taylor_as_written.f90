@@ -29,18 +29,21 @@ subroutine taylor_as_written(coefficients, constant, rate, n_sines, sines, n_cos
 end subroutine taylor_as_written
 
 ! In place of step_nodes.c.
-subroutine sum_at_nodes_as_written(terms, stride, order, parts, sums) &
+subroutine sum_at_nodes_as_written(terms, size, to_next_term, to_next, n, order, parts, sums) &
   bind(c, name="sum_at_nodes_level")
   use, intrinsic :: iso_c_binding, only: c_double, c_int
   use step_nodes, only: AT_ONCE
   implicit none(type, external)
-  integer(c_int), intent(in), value :: stride, order
-  real(c_double), intent(in) :: terms(stride, order), parts(AT_ONCE)
-  real(c_double), intent(out) :: sums(AT_ONCE)
-  integer :: k
+  integer(c_int), intent(in), value :: size, to_next_term, to_next, n, order
+  real(c_double), intent(in) :: terms(size), parts(AT_ONCE)
+  real(c_double), intent(out) :: sums(AT_ONCE, n)
+  integer :: i, k
 
   sums = 0.0_c_double
-  do k = order, 1, -1
-    sums = (sums + terms(1, k))*parts
+  do i = 1, n
+    do k = order, 1, -1
+      sums(:, i) = sums(:, i)*parts + terms(1 + k*to_next_term + (i - 1)*to_next)
+    end do
+    sums(:, i) = sums(:, i)*parts
   end do
 end subroutine sum_at_nodes_as_written

@@ -7,15 +7,16 @@ module step_nodes
   private
 
   interface
-    pure subroutine sum_at_nodes(terms, stride, order, parts, sums) &
+    pure subroutine sum_at_nodes(terms, size, to_next_term, to_next, n, order, parts, sums) &
       bind(c, name="sum_at_nodes_level")
-      !! Compute the sums of terms from the first power on.
+      !! Compute the sums of terms of n unknowns from the first power on.
       import :: AT_ONCE, c_double, c_int
       implicit none(type, external)
-      integer(c_int), intent(in), value :: stride, order
-      real(c_double), intent(in) :: terms(stride, order) !! the first row of them
+      integer(c_int), intent(in), value :: size, n, order
+      real(c_double), intent(in) :: terms(size) !! from term 0
+      integer(c_int), intent(in), value :: to_next_term, to_next !! distances of terms and unknowns
       real(c_double), intent(in) :: parts(AT_ONCE)
-      real(c_double), intent(out) :: sums(AT_ONCE)
+      real(c_double), intent(out) :: sums(AT_ONCE, n)
     end subroutine sum_at_nodes
   end interface
 

@@ -14,9 +14,9 @@ module tape_march
   use tape_live, only: keep_live, settle
   use tape_plan, only: converge, fitting, LEAST_LOCAL_TOLERANCE, local_tolerance_of, &
                        MOST_TRIES, order_for
-  use tape_series, only: derivatives_at, expand, MOST_BLOCKS, noise_of, PADDED, perturb_tape, &
-                         series_t, SIDE_BY_SIDE, slot_gradient, sum_perturbations, sum_terms, &
-                         VARIATION_TOLERANCE
+  use tape_series, only: derivatives_at, expand, LAST_TERM, MOST_BLOCKS, MOST_ORDER, noise_of, &
+                         PADDED, perturb_tape, series_t, SIDE_BY_SIDE, slot_gradient, &
+                         sum_perturbations, sum_terms, VARIATION_TOLERANCE
   use tape_switches, only: CROSSES, follow, IS_CHANGED, jump_at, next_crossing, &
                            operand_error, resolve_switches, SLIDES, STAYS, switches_t
   use two_words, only: two_sum
@@ -819,10 +819,12 @@ contains
         parts = factor*parts_from(first, solution%nodes)
         powers = powers_of(parts/factor, s%order + 1)
         sizes = 0.0_dp
+        call sum_at_nodes(s%a(:, FIRST_UNKNOWN:FIRST_UNKNOWN - 1 + n), n*(LAST_TERM + 1), 1, &
+                          LAST_TERM + 1, n, s%order, parts, changes)
+        call sum_at_nodes(s%blocks(:, :, FIRST_UNKNOWN:FIRST_UNKNOWN - 1 + n, 1), &
+                          n*(MOST_ORDER + 1)*SIDE_BY_SIDE, SIDE_BY_SIDE, &
+                          (MOST_ORDER + 1)*SIDE_BY_SIDE, n, last_terms(1), parts, errors)
         do i = 1, n
-          call sum_at_nodes(s%a(1:s%order, FIRST_UNKNOWN - 1 + i), 1, s%order, parts, changes(:, i))
-          call sum_at_nodes(s%blocks(:, 1:last_terms(1), FIRST_UNKNOWN - 1 + i, 1), SIDE_BY_SIDE, &
-                            last_terms(1), parts, errors(:, i))
           errors(:, i) = errors(:, i) + s%blocks(1, 0, FIRST_UNKNOWN - 1 + i, 1)
           errors(:, i) = errors(:, i) - powers*left(i)
           sizes = max(sizes, weights(i)*abs(errors(:, i)))

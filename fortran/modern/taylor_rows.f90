@@ -123,14 +123,12 @@ contains
       do first = 1, size(solution%nodes), AT_ONCE
         n = min(AT_ONCE, size(solution%nodes) - first + 1)
         parts = parts_from(first, solution%nodes)
-        do i = 1, 3
-          call sum_at_nodes(s%terms(i, 1), 4, order, parts, changes(:, i))
-        end do
+        call sum_at_nodes(s%terms, 4*(order + 1), 4, 1, 3, order, parts, changes(:, :3))
         call add_states(now, order, parts, changes(:, :3), ends, left, tolerance, &
                         solution%at_nodes(:3, first:first + n - 1, solution%n_steps))
         if (.not. associated(solution%attitudes)) cycle
+        call sum_at_nodes(s%turns, 4*(order + 1), 4, 1, 4, order, parts, changes)
         do i = 1, 4
-          call sum_at_nodes(s%turns(i, 1), 4, order, parts, changes(:, i))
           changes(:, i) = room%attitude%q_low(i) + changes(:, i)
         end do
         call add_attitudes(changes, order, parts, min(LINEAR, tolerance), room%attitude, &

@@ -11,6 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pyharness import InputError, Scene, read_scene, solve, torques
+from pyharness.engine.leaf_cache import folder
 from pyharness.model.codes import Statuses
 from pyharness.sweep.batches import batches, solve_points
 from pyharness.sweep.executors import EXECUTORS
@@ -196,6 +197,26 @@ def test_forecast_keeps_constants_that_every_scene_has_of_its_own(tmp_path: Path
     sweep = read_sweep(written(tmp_path, text(grid, many)))
     places, _ = places_of_a_chunk(sweep, spread(sweep, 100))
     assert len({*places.tolist()}) == 5
+
+
+def test_torques_are_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    given = axis("torque.constants.k", [0.1, 0.2, 0.5])
+    plain, compiled = (
+        ends(read_sweep(written(tmp_path, text(given, solver=solver))))
+        for solver in ("", "compiled = true")
+    )
+    assert compiled == pytest.approx(plain, rel=0.0, abs=1e-8)
+    assert len(list(folder().glob("*.so"))) == 1
+
+
+@pytest.mark.parametrize(("solver", "message"), [
+    ("compiled = 1", r"\[solve\] compiled"),
+    ('program = "two-term"\ncompiled = true', "compiled has no meaning with a program"),
+])  # fmt: skip
+def test_a_wrong_request_to_compile_is_refused(solver: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=message):
+        read_sweep(written(tmp_path, text(axis("omega.1", [0.5]), solver=solver)))
 
 
 INERTIA = SCENE.replace(

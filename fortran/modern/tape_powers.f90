@@ -15,6 +15,7 @@ module tape_powers
   real(dp), parameter :: LEAST_NUMBER = 1e-300_dp ! whose logarithm is computed
 
   integer, parameter :: NONE = 0, SEVERAL = huge(1) ! divisors
+  integer, parameter :: TOGETHER = 4 ! slots whose terms are summed
 
   ! What is below exp(-INVISIBLE), relative to the unknowns or to a divisor, changes no digit of a
   ! result, unless its factor is huge.
@@ -32,6 +33,8 @@ module tape_powers
     real(dp), allocatable :: least(:) !! (slots): logarithm of the least product that matters
     ! (2, slots): logarithm of the sum of the absolute terms, and their mean order
     real(dp), allocatable :: shown(:, :)
+    integer, allocatable :: alone(:) !! (slots): first those whose number of factors is above 0
+    integer :: n_alone = 0           !! their number
     ! that shows the products of few factors where a factor and its first derivative are 0
     integer :: order = 0
   end type powers_t
@@ -76,6 +79,8 @@ contains
     allocate (powers%least(tape%n_slots), stat=failed)
     if (failed /= 0) return
     allocate (powers%shown(2, tape%n_slots), stat=failed)
+    if (failed /= 0) return
+    allocate (powers%alone(tape%n_slots), stat=failed)
     if (failed /= 0) return
     call find_scales(tape, powers%scales)
     call find_divisors(tape, powers%divisors)
@@ -181,6 +186,11 @@ contains
         if (tape%operations(1, n) == PRODUCT) factors = -factors
       end associate
     end do
+    do n = 1, tape%n_slots
+      if (powers%factors(n) <= 0) cycle
+      powers%n_alone = powers%n_alone + 1
+      powers%alone(powers%n_alone) = n
+    end do
   end subroutine keep_many
 
   subroutine resolve(tape, order, smallest, a, powers, factor)
@@ -198,8 +208,9 @@ contains
     if (powers%order == 0) return
     has_least = .false.
     do while (factor > 0.0_dp)
-      do n = 1, tape%n_slots
-        if (powers%factors(n) > 0) powers%shown(:, n) = size_and_mean(a(:order - 1, n), factor)
+      do n = 1, powers%n_alone, TOGETHER
+        call show(a(:order - 1, :), factor, &
+                  powers%alone(n:min(n + TOGETHER - 1, powers%n_alone)), powers%shown)
       end do
       if (.not. has_least) then
         ! Where all means are small enough, it does not matter which products are visible.
@@ -209,8 +220,10 @@ contains
         call find_least()
         has_least = .true.
       end if
-      do n = 1, tape%n_slots
-        if (powers%factors(n) > 0) powers%shown(1, n) = logarithm(powers%shown(1, n))
+      do n = 1, powers%n_alone
+        associate (total => powers%shown(1, powers%alone(n)))
+          total = logarithm(total)
+        end associate
       end do
       call find_largest()
       if (largest <= 1.0_dp) return
@@ -263,22 +276,31 @@ contains
 
   end subroutine resolve
 
-  pure function size_and_mean(terms, factor)
-    !! Return the sum of the absolute terms, and their mean order.
-    real(dp), intent(in) :: terms(0:)
-    real(dp), intent(in) :: factor !! on the step
-    real(dp) :: size_and_mean(2)
-    real(dp) :: total, weighted
-    integer :: k
+  pure subroutine show(terms, factor, slots, shown)
+    !! Compute the sums of the absolute terms of some slots, and their mean orders. No addition waits
+    !! for that of another slot.
+    real(dp), intent(in) :: terms(0:, :)
+    real(dp), intent(in) :: factor        !! on the step
+    integer, intent(in) :: slots(:)       !! at most TOGETHER
+    real(dp), intent(inout) :: shown(:, :)
+    real(dp) :: total(TOGETHER), weighted(TOGETHER)
+    integer :: each(TOGETHER), i, k
 
+    do i = 1, TOGETHER
+      each(i) = slots(min(i, size(slots)))
+    end do
     total = 0.0_dp
     weighted = 0.0_dp
     do k = ubound(terms, 1), 0, -1
-      weighted = factor*weighted + total
-      total = factor*total + abs(terms(k))
+      do i = 1, TOGETHER
+        weighted(i) = factor*weighted(i) + total(i)
+        total(i) = factor*total(i) + abs(terms(k, each(i)))
+      end do
     end do
-    size_and_mean = [total, factor*weighted/max(LEAST_NUMBER, total)]
-  end function size_and_mean
+    do i = 1, size(slots)
+      shown(:, slots(i)) = [total(i), factor*weighted(i)/max(LEAST_NUMBER, total(i))]
+    end do
+  end subroutine show
 
   pure real(dp) function logarithm(x)
     real(dp), intent(in) :: x

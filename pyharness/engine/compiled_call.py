@@ -1,4 +1,4 @@
-"""Calls of prepared solvers from compiled code, and with arguments that Python must convert."""
+"""Calls of prepared solvers from compiled code, and checks of arguments that C code refused."""
 
 import math
 import reprlib

@@ -1,4 +1,4 @@
-"""Tests of the thesis's claims about history, theory and orders, mostly in sections I to IV.
+"""Tests of the thesis's claims about history, theory and orders.
 
 Each function is the `test` of one or more claims in `data/claims.toml`, whose `rule` describes the
 decision; `lab` runs the programs. An error is the largest deviation of any omega component from the

@@ -67,7 +67,7 @@ class Summary:
 
 
 def term_report(found: Terms, packages: Iterable[str], command: str) -> Report:
-    """Return the report: tables for single bodies, for many bodies, and of mean ratios."""
+    """Return the report: run times and ratios for one and for many bodies, and mean ratios."""
     text = [*_make_tables(found), _notes(found)]
     report = Report("bench", text, partial(_record, found), _data(found), pictures={})
     return measured_report("# Torques that depend on the state", _WORTH, report, packages, command)

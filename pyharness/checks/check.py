@@ -242,7 +242,7 @@ def selected(id: str, only: Sequence[str]) -> bool:
 
 
 def may_hold(id: str, only: Sequence[str]) -> bool:
-    """Return whether `only` may request a check whose id equals or begins with `id`."""
+    """Return whether `only` can include a check whose id begins with `id`."""
     return selected(id, only) or any(each.startswith(id + "/") for each in only)
 
 
@@ -259,7 +259,7 @@ class Selection:
     thin: bool = False  # a few checks of every kind, for `verify --self-test`
 
     def may_ask(self, id: str) -> bool:
-        """Return whether a check whose id equals or begins with `id` may be requested."""
+        """Return whether the selection can include a check whose id begins with `id`."""
         return may_hold(id, self.only)
 
     def name_draw(self, number: int, subject: str = "") -> Name:

@@ -158,7 +158,7 @@ def refusable(tried: MethodRun, truth: Truth, why: str) -> bool:
     """Return whether a method may refuse a scene.
 
     `quick` may refuse any scene; `closed-form`, a scene without a closed form; a series method, a
-    scene in which the phase of a torque's wave exceeds 1e8 rad.
+    scene in which the phase of a sine or cosine of the torque exceeds 1e8 rad by the end.
     """
     method, scene = tried.method, tried.scene
     if method == "closed-form":

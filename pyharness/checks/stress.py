@@ -19,14 +19,15 @@ SCENE_TRIALS = ("length", "step-size", "invariance", "threads")
 LISTINGS = tuple(f(program) for program in PROGRAMS for f in (Listing.original, Listing.corrected))
 
 named = partial(Name, command="stress")
-"""Return a `Name`, from the same arguments, whose command is `stress`."""
+"""Return a `Name` with the command `stress`, and with the given other fields."""
 
 
 @dataclass(frozen=True)
 class Trial:
     """A group of checks of `stress` under one kind of extreme conditions.
 
-    `bound` is a text on the limits; `attempts` takes the beginnings of the requested ids.
+    `bound` describes the limits in words. `attempts` takes the requested beginnings of ids, and may
+    omit checks that are not requested.
     """
 
     name: str

@@ -39,8 +39,8 @@ SCENE = {
     "--steps N": "Number of steps, at least 1 (default: the scene's).",
 }
 LISTING = {
-    "--listing L": "Version of the program: original (default), or corrected, without defects "
-    "(faults of its author).",
+    "--listing L": "Version of the program: original (default), or corrected (without the "
+    "defects, which are faults of its author).",
     "--fix NAME,...": "Correct only these defects of the original program (names: `pyharness "
     "defects`).",
     "--keep NAME,...": "Correct all defects of the original program except these.",
@@ -62,8 +62,9 @@ EFFORT = {"--effort F": _EFFORT.format(" (30 for a program of the thesis)")}
 EFFORT_WITHOUT_PROGRAMS = {"--effort F": _EFFORT.format("")}
 STRICT = {
     "--strict": "Exit with status 1 also if amplified rounding errors may exceed the tolerance. "
-    "Without --strict, the status is 1 only if Fortran and Python differ, a corrected program "
-    "misses its order of convergence, or a method of --method misses its tolerance or ends early."
+    "Without --strict, the status is 1 only if the Fortran and the Python version of a program "
+    "differ, a corrected program misses its order of convergence, or a method of --method misses "
+    "its tolerance or ends early."
 }
 ALSO = {
     "--also FILE,...": "Write the result to these files too, each in the format of its ending: "

@@ -188,7 +188,6 @@ def _documents(docs: Path) -> Iterator[Page]:
 
 
 def _sections(path: str, html: str) -> Iterator[Found]:
-    """Yield the sections of a page, for the search."""
     heads = r'<h[12](?: id="(?:h-)?([\w-]+)")?>(.*?)</h[12]>'
     _, *parts = re.split(heads, html.partition("</main>")[0])
     for anchor, title, text in zip(*(parts[n::3] for n in range(3)), strict=True):

@@ -1,4 +1,4 @@
-"""Calls of prepared solvers from compiled code, and with arguments that Python must convert."""
+"""Calls of prepared solvers from compiled code, and checks of arguments that C code refused."""
 
 import math
 import reprlib
@@ -38,7 +38,7 @@ def compiled_call(solver: Any) -> CompiledCall:
 
 
 def get_include() -> str:
-    """Return the folder of `pyharness.h`, with which C code calls prepared solvers.
+    """Return the folder of `pyharness.h`, the header for C code that calls solvers of `prepare`.
 
     Returns
     -------

@@ -39,10 +39,12 @@ def gauss(
 ) -> Trajectory:
     """Return the trajectory by Gauss collocation with 1 to 8 `stages`.
 
-    Steps are halved until the estimated error meets the tolerance. The estimate for the finer of
-    two solutions is 2 d / (r**p - 1), where 2 is a safety factor, d the largest difference of
-    omega, and r <= 2 the ratio of the steps. The exponent p is the order, twice the number of
-    stages, but at most 8, because long steps at higher orders do not show the full order yet.
+    The step is halved until the estimated relative error of omega meets the tolerance, or the last
+    two solutions differ only by rounding errors. The estimate is 2 d / (r**p - 1), with the safety
+    factor 2. Here d is the largest difference of the two solutions, divided by the largest
+    component of omega. The ratio r is the smallest ratio of their numbers of steps between
+    requested times, at most 2. The exponent p is the order, 2 `stages`, but at most 8, because
+    long steps do not show a higher order.
     """
     given, most = normalized(scene), effort * _MOST_EVALUATIONS / (1.0 + 0.5 * waves(scene))
     if times[-1] == 0.0:

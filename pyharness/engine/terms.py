@@ -116,8 +116,9 @@ def drag(coefficients: Iterable[MatrixLike], per_axis: bool = False) -> StateTor
 def rate_control(gain: MatrixLike, target: Numbers = (0.0, 0.0, 0.0)) -> StateTorque:
     """Return the torque -K (omega - target), which controls the angular velocity.
 
-    Acting alone, with a positive definite K, it drives any nearby omega to a target that is 0 or
-    along a principal axis.
+    Acting alone, with a positive definite K, it drives any omega to the target 0. A target along a
+    principal axis attracts nearby omegas if K is large enough: for K = k and the middle axis, k >
+    |target| sqrt((I3 - I2) (I2 - I1)), with the moments I1 < I2 < I3.
 
     Parameters
     ----------

@@ -235,7 +235,7 @@ def invisible(scene: Scene) -> dict[str, tuple[str, ...]]:
 def limits_report(
     scene: Scene, found: Sequence[Limit], invisible: Mapping[str, Sequence[str]]
 ) -> Report:
-    """Return the report of `limits`: the programs' distances from their limits."""
+    """Return the report; `invisible` is a result of the function of this name."""
     ends = [[x.program, x.order, x.halvings[-1].from_truth, x.tends_to] for x in found]
     hidden = [f"{each.program}: {', '.join(invisible[each.program]) or 'none'}" for each in found]
     listings = [Listing.original(each.program) for each in found]

@@ -1,8 +1,8 @@
 """Archives in the format of `numpy.savez` with a digest, for trajectories and ensembles.
 
 The array `header` is JSON with the kind of the content and its schema number, and `sha256` is a
-digest of all other arrays. Files are not trusted: nothing is executed or unpickled, and no array is
-larger than the file.
+digest of all other arrays. Files are not trusted: nothing is executed or unpickled, and a file is
+rejected if an array claims to be larger than the file.
 """
 
 import hashlib

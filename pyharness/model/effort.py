@@ -53,7 +53,7 @@ def suggested(effort: float, needed: float | None = None) -> str:
 
 
 def waves(scene: Scene) -> int:
-    """Return the number of waves of the torque; 0 if it depends on the state."""
+    """Return the number of sines and cosines in the torque; 0 if it depends on the state."""
     if isinstance(scene.torque, StateTorque):
         return 0
     return len(scene.law.sines) + len(scene.law.cosines)
@@ -62,7 +62,8 @@ def waves(scene: Scene) -> int:
 def check_steps(scene: Scene, program: str, implementation: str, effort: float) -> None:
     """Raise InputError if a program exceeds the work limit of an `implementation`.
 
-    The work is the number of steps, times a factor that increases with the number of torque waves.
+    The work is steps times (1 + c w), where w is the number of sines and cosines in the torque, and
+    c the work for one of them (`_LIMITS`).
     """
     if implementation not in _LIMITS:
         raise unknown("implementation", implementation, _LIMITS)
@@ -74,7 +75,7 @@ def check_steps(scene: Scene, program: str, implementation: str, effort: float) 
 def check_bodies(scene: Scene, program: str, bodies: int, effort: Number) -> None:
     """Raise InputError if a compiled program on many bodies exceeds the work limit.
 
-    The work is the product of bodies, steps, and the number of waves of the torque plus 1.
+    The work is bodies times steps times (1 + c w), as in `check_steps`, with c = 1.
     """
     cost = 1.0 + _LIMITS["fortran"][1] * waves(scene)
     needed = bodies * scene.steps * cost / _MOST_STEPS_OF_ALL

@@ -1,6 +1,6 @@
 """Batches: scenes of a sweep that are solved in one call with the same settings.
 
-The n scenes of a batch differ only in the fields of `own`, which maps each field to its n values.
+In this module, `own` maps each field in which the n scenes of a batch differ to its n values.
 """
 
 import tomllib

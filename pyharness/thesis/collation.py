@@ -1,7 +1,7 @@
-"""Comparisons of the scan, our text of the cards, the apparatus, the decks and the thesis.
+"""Comparisons of the scan with our text of the cards, and of the three decks with the thesis.
 
 `data/cards/collation.toml` lists the operations of the programs, and the statements of sections II
-to V about them. Whether the decks agree is computed from their statements.
+to V about them. Whether the decks agree is computed from their Fortran statements.
 """
 
 import difflib

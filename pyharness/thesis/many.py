@@ -53,7 +53,7 @@ class ProgramEnsemble(BatchResult):
     recorded_time : ndarray, shape (m,), or (n, m) if the bodies have different step sizes
         The program's variable TIME, s. With shape (m,), it is NaN at a step that no body reached.
     n_rows : ndarray of int32, shape (n,)
-        The number of steps of each body that have a result.
+        The number of steps with a result in each body's run, requested or not.
     stop_variable : ndarray of int8, shape (n,)
         The variable that failed the stop test, or 0: 1-3 for U1-U3 (angular velocity), 4-6 for
         V1-V3 (translational velocity), 7 for the norm of U, 8 for the norm of U and V.

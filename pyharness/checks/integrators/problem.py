@@ -150,7 +150,7 @@ class Convergence:
     """The errors of a `part`, omega or attitude, in one problem, at decreasing settings.
 
     The errors are proportional to the power `order` of the setting, a step size (s) or a tolerance;
-    `order` is None if the errors are only rounding.
+    `order` is None if all errors are rounding errors.
     """
 
     part: str
@@ -169,12 +169,12 @@ class Convergence:
 
     @property
     def converges(self) -> bool:
-        """Return whether the order is at least 1 - `ORDER_SLACK`, or the errors are rounding."""
+        """Return whether the order is at least 1 - `ORDER_SLACK`, or unknown (None)."""
         return self.order is None or self.order >= 1.0 - ORDER_SLACK
 
     @property
     def is_higher(self) -> bool:
-        """Return whether the order is above 1, or the errors are rounding."""
+        """Return whether the order is clearly above 1, or unknown (None)."""
         return self.order is None or self.order >= _ORDER_ONE
 
     def predicted(self, level: int) -> float:

@@ -143,7 +143,6 @@ def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
 
     The sum at each node has s + 3 roundings of the right-hand sides and one of omega. Its error is
     multiplied by the inverse of 1 - h A J, where A is the tableau's matrix and J the Jacobian.
-    Gauss collocation conserves quadratic invariants for any step size.
 
     The truncation error is the integral of the state-transition matrix times the residual. The
     residual is zero at the nodes, the zeros of an orthogonal polynomial. Divide it by this

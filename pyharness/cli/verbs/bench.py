@@ -26,15 +26,15 @@ _OPTION_OF = {"method": "--method", "peer": "--peers"}
 OPTIONS = {
     "--case N": "Measure only this case of Table 1 of the thesis, 1 to 7 (default: Cases 2 to 7, "
     "with --attitude also Case 1).",
-    "--horizon T": "End time of each integration, in s, above 0, up to 1000. Default: 3, and also "
-    "100 in Cases 3 and 4 (with --attitude, in all cases except 6).",
+    "--horizon T": "End time of each integration, in s, above 0, up to 1000. Default: 3 s in all "
+    "cases, and also 100 s in Cases 3 and 4; with --attitude, also 100 s in all cases except 6.",
     "--draws N": "Instead of the cases, measure N random scenes, 1 to 10000, with all kinds of "
     "torque and body.",
     "--ensemble": "Instead of single trajectories, measure calls that solve many bodies at once: "
     "bodies per second, time per body as a function of the number of bodies, and memory.",
-    "--terms": "Instead of the cases, measure torques that depend on omega (angular velocity), "
-    "time and attitude, for one body and many. Some are ready-made (pyharness.torques), others are "
-    "Python functions.",
+    "--terms": "Instead of the cases, measure scenes whose torques depend on omega (angular "
+    "velocity), time and attitude, for one body and many. Some torques are ready-made "
+    "(pyharness.torques), others are Python functions.",
     "--bodies N": f"Number of bodies of --ensemble or --terms, 1 to {_MOST_BODIES} (default "
     f"{_BODIES} with --ensemble, {_TERM_BODIES} with --terms).",
     "--seed S": "Seed, any text, of the random scenes of --draws or the bodies of --ensemble or "
@@ -46,7 +46,7 @@ OPTIONS = {
     "column of the result or by package (heyoka, numba, scipy), or none (default: all installed).",
     "--compiled": "With --terms, compile all torques with the C compiler first.",
     "--plan": "Instead of comparing solvers, measure run times with and without each computation "
-    "that `pyharness plan` can omit.",
+    "that `pyharness plan` can omit, such as the translational velocity.",
     "--growth": "Instead of comparing solvers, measure how the error of the Taylor method grows "
     "with the integration time, up to 1e5 s, in Cases 3 and 4.",
     **shared.outputs(),

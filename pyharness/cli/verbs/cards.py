@@ -24,9 +24,9 @@ _LARGEST_SCAN = 1 << 24  # largest size (bytes) of a text
 _KINDS = ("--format tei", "--classes", "--collate", "--origins", "--second-reading", "--scan")
 FORMATS = (*shared.FORMATS, "tei")
 OPTIONS = {
-    "cards CARDS": "Cards (program lines) to show, separated by commas: programs, numbers or "
-    "ranges, as in two-term, 1660, 1040-1090 or two-term:1660 (default: a table of contents; in "
-    "JSON, CSV and Markdown, all cards).",
+    "cards CARDS": "Cards to show, separated by commas: programs, numbers or ranges, as in "
+    "two-term, 1660, 1040-1090 or two-term:1660 (default: a table of contents; in JSON, CSV and "
+    "Markdown, all cards).",
     "--classes": "For each kind of note (defect, doubtful reading, ...), count the notes, the "
     "cards that they name, and the differences between cards and scan that they explain.",
     "--collate": "Compare the operations of the three programs with each other and with sections "
@@ -35,8 +35,8 @@ OPTIONS = {
     "suggests about the origin of a fault.",
     "--second-reading": "Compare our text of a random sample of cards with a second reading of "
     "the scan, and estimate how many misreadings remain.",
-    "--scan FILE": "Compare our text of the cards, character by character, with a scan of the "
-    "thesis: this file has its text, made by character recognition (OCR).",
+    "--scan FILE": "Compare our text of the cards, character by character, with the text in this "
+    "file, made by character recognition (OCR) of a scan of the thesis.",
     **shared.outputs(FORMATS, plot=""),
     "--format F": f"Output format: {', '.join(FORMATS)} (default {FORMATS[0]}). tei has all cards "
     "and notes in TEI, the XML format of text editions.",

@@ -19,13 +19,13 @@ OPTIONS = {
     "--explain ID": "Explain the verdict on one claim (statement of the thesis), with the "
     "numbers behind it. ID is the claim's name in the output of `pyharness claims`.",
     "--assignments": "For each case whose initial angular velocity the thesis omits, show for "
-    "which assumed values the claims about this case hold (formats: table, json).",
+    "which assumed values the claims about this case hold (only with --format table or json).",
     "--word W": f"Floating-point arithmetic of the programs: {', '.join(WORD_NAMES)} (default "
     f"{WORD_NAMES[0]}). cdc48 is the arithmetic of CDC computers, which truncates results; "
     "cdc48-rounded rounds them. Not with --assignments, --evidence or --atlas.",
-    "--evidence": "Count the claims that hold for each combination of initial angular velocity, "
-    "interpretation of doubtful statements, assumptions about missing statements, and number of "
-    "steps.",
+    "--evidence": "For each combination of initial angular velocity, interpretation of doubtful "
+    "program lines, assumptions about missing lines, and number of steps, count the claims that "
+    "hold.",
     "--atlas STORE": "Show from which initial angular velocities the claims hold. STORE is the "
     "folder in which `pyharness sweep` stored the results; needs --sweep.",
     "--sweep FILE.toml": "Sweep file from which `pyharness sweep` computed the results in STORE; "

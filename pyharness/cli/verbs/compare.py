@@ -17,8 +17,8 @@ from pyharness.thesis.programs import BINARY64, WORD_NAMES
 OPTIONS = {
     **shared.SCENE,
     **shared.LISTING,
-    "--listing L": "Version of the programs: original, or corrected, without defects (faults of "
-    "their author); default: both.",
+    "--listing L": "Version of the programs: original, or corrected (without the defects, which "
+    "are faults of their author); default: both.",
     "--program P": f"Compare only this program: {', '.join(PROGRAMS)} (default: all three). The "
     "first two use collocation.",
     "--method M,...": "Compare these methods instead of the programs, such as auto,taylor,dop853 "
@@ -33,9 +33,10 @@ OPTIONS = {
     "rad.",
     "--ablate": "Run each program with every subset of its defects, and list the subsets, largest "
     "error first. Errors are compared up to the last step that all runs reached.",
-    "--numerics": "Show also the drifts of energy and momentum, the differences between Fortran "
-    "and Python in units in the last place, the error amplification, the errors of SciPy's "
-    "solve_ivp, and the run times. JSON and CSV always have them.",
+    "--numerics": "Show also the drifts of energy and momentum, the differences between the "
+    "Fortran and the Python version of each program (in units in the last place), the error "
+    "amplification, the errors of SciPy's solve_ivp, and the run times. JSON and CSV always have "
+    "them.",
     **shared.STRICT,
     **shared.EFFORT,
     **shared.outputs(),

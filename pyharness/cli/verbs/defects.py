@@ -13,9 +13,9 @@ OPTIONS = {
     "that change numbers.",
     "--all": "List all entries, also those that change no number (JSON always has all); not with "
     "NAME.",
-    "--kind K": "List only entries of this kind, such as defect (fault of the author), reading "
-    "(line that can be read in two ways) or conjecture (assumption about a missing line); not with "
-    "NAME.",
+    "--kind K": "List only entries of this kind: defect (fault of the author of the programs), "
+    "reading (line that can be read in two ways), conjecture (assumption about a missing line), or "
+    "another kind that --all shows. Not with NAME.",
     **shared.outputs(FORMATS, plot=""),
 }
 EXAMPLE = "defects stage-base"

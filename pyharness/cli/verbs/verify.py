@@ -42,7 +42,7 @@ OPTIONS = {
     "docs/how-to/external.md).",
     "--listing-output FILE": "Find the floating-point arithmetic of an unknown computer. FILE is a "
     "page that one of the three programs printed on it; we compare the page with our runs in each "
-    "arithmetic (formats: table, json).",
+    "arithmetic (only with --format table or json).",
     "--port COMMAND": "Compare your port of the programs (their version in another language) bit "
     "for bit with our Python programs. COMMAND starts it (protocol: docs/how-to/ports.md).",
     "--integrator COMMAND": "Compare your integrator of rigid-body motion with the true solutions "

@@ -201,9 +201,9 @@ def execution_time(
 
 
 def seconds(lab: Laboratory) -> Judged:
-    """Return "not testable" for claims on run times, with each program's operations in 100 steps.
+    """Return "not testable" for claims on run times, with the number of operations in 100 steps.
 
-    Present run times are no evidence on the original machine.
+    Run times of a present computer are no evidence on the original machine's.
     """
     counts = {program: operations_per_step(lab.listing(program)).written for program in PROGRAMS}
     numbers = {f"{program}: operations in 100 steps": 100.0 * n for program, n in counts.items()}

@@ -1,4 +1,4 @@
-"""Tests of the thesis's claims about history, theory and orders, mostly in sections I to IV.
+"""Tests of the thesis's claims about history, theory and orders.
 
 Each function is the `test` of one or more claims in `data/claims.toml`, whose `rule` describes the
 decision; `lab` runs the programs. An error is the largest deviation of any omega component from the
@@ -48,7 +48,8 @@ def by_sources(lab: Laboratory, holds: bool) -> Judged:
 def hamilton_ordinary(lab: Laboratory, cases: list[int], limit: float) -> Judged:
     """Judge the claim that Hamilton's equations of a rigid body are partial differential equations.
 
-    The test solves the case by six ordinary equations, in Euler angles and their momenta.
+    The test solves six ordinary equations, in Euler angles and their momenta. The claim is false if
+    the error of omega is at most `limit`.
     """
     from scipy.integrate import solve_ivp
 

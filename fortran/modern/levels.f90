@@ -6,8 +6,9 @@ module levels
   implicit none(type, external)
   private
 
-  public :: choose_level, fits_lanes, many_fixed, many_free, many_taylor, quick_solve, ready_leaves, &
-            run_lanes, tape_bodies, tape_solve, tape_step, tape_variation, taylor_solve
+  public :: choose_level, fits_lanes, many_fixed, many_free, many_taylor, quick_solve, &
+            ready_leaves, run_lanes, tape_bodies, tape_solve, tape_step, tape_variation, &
+            taylor_solve
 
   interface
     integer(c_int) function choose_level(highest) bind(c, name="choose_level")

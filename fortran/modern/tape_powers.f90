@@ -277,8 +277,8 @@ contains
   end subroutine resolve
 
   pure subroutine show(terms, factor, slots, shown)
-    !! Compute the sums of the absolute terms of some slots, and their mean orders. No addition waits
-    !! for that of another slot.
+    !! Compute the sums of the absolute terms of some slots, and their mean orders. No addition
+    !! waits for that of another slot.
     real(dp), intent(in) :: terms(0:, :)
     real(dp), intent(in) :: factor        !! on the step
     integer, intent(in) :: slots(:)       !! at most TOGETHER

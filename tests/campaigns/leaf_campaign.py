@@ -89,7 +89,7 @@ def compare_many(tally: Tally, scene: Scene, time: float, source: Random) -> Non
     ]
     tally.counts[str(found[1].leaves)] += 1
     both = found[0].has_result & found[1].has_result
-    sizes = np.abs(found[0].omega).max(axis=1)
+    sizes = np.maximum(np.abs(omega), np.abs(found[0].omega)).max(axis=1)
     apart = np.abs(found[0].omega - found[1].omega).max(axis=1) / sizes
     errors = [each.error for each in found]
     for k in np.flatnonzero(both & np.isfinite(errors[0] + errors[1])):

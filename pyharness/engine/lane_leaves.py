@@ -25,13 +25,14 @@ from pyharness.model.codes import Storage
 _UNKNOWNS = (3, 7)  # without and with attitude: the bodies that have lanes
 _TOGETHER = 4  # sums
 _N_INPUTS = 8  # time, omega and attitude; parameters follow
+_MOST_INLINED = 60  # sums; many more would take a minute to compile
 _TERMS_AMID = 5  # terms of a series amid a step
 _ROW = 7  # length of a row of the Jacobian
 
 _HEADER = (
     f"""
 #undef A
-#define A(slot, k) a[(slot - 1) * {Storage.LANE_TERMS} + k]"""
+#define A(slot, k) a[((slot) - 1) * {Storage.LANE_TERMS} + k]"""
     + """
 #if defined(__AVX512F__)
 enum { IN_REGISTER = 8 };
@@ -54,16 +55,8 @@ static reg sum_in_lanes(const reg *x, const reg *y, int k)
   for (int j = 1; j < k; j++) sum += x[j] * y[k - j];
   return sum;
 }
-/* The sum, whose part of products of terms before k - late is known. */
-static inline reg late_sum(const reg *x, const reg *y, int k, int late, const reg *sums)
-{
-  if (k == late) return sum_in_lanes(x, y, k);
-  reg sum = sums[late];
-  for (int j = 1; j <= late; j++) sum += x[k - j] * y[j] + y[k - j] * x[j];
-  return sum;
-}
 /* The parts of four such sums, from number k, of products of terms before k. */
-static __attribute__((noinline)) void sums_in_lanes(const reg *x, const reg *y, int k, reg *sums)
+static void sums_in_lanes(const reg *x, const reg *y, int k, reg *sums)
 {
   reg y1 = y[k - 3], y2 = y[k - 2], y3 = y[k - 1];
   reg a = x[1] * y3 + x[3] * y1, b = x[2] * y3, c = x[3] * y3, d = {0.0};
@@ -78,6 +71,24 @@ static __attribute__((noinline)) void sums_in_lanes(const reg *x, const reg *y, 
   }
   sums[0] = a + a2, sums[1] = b + b2, sums[2] = c + c2, sums[3] = d + d2;
 }
+/* Begin four such sums, or compute one of few products. */
+static __attribute__((noinline))
+void begin_sums(const reg *x, const reg *y, int k, int late, reg *sums)
+{
+  if (k == late) sums[late] = sum_in_lanes(x, y, k);
+  else if (late == 0) sums_in_lanes(x, y, k, sums);
+}
+/* The sum, of which `sums` has the part of products of terms before k - late. */
+static SHORT reg late_sum(const reg *x, const reg *y, int k, int late, const reg *sums)
+{
+  reg sum = sums[late];
+  if (k == late || late == 0) return sum;
+  sum += x[k - 1] * y[1] + y[k - 1] * x[1];
+  if (late == 1) return sum;
+  sum += x[k - 2] * y[2] + y[k - 2] * x[2];
+  if (late == 2) return sum;
+  return sum + (x[k - 3] * y[3] + y[k - 3] * x[3]);
+}
 """
 )
 
@@ -89,7 +100,9 @@ def whole_source(tape: Structure) -> str:
     if not _has_parameters(tape):
         functions, lines = "(void *)expand, (void *)set_jacobian", [source(tape)]
     if tape.n_unknowns in _UNKNOWNS:
-        lines += [_HEADER, *_expand(tape), *_set_jacobian(tape)]
+        is_short = len(recurrences(tape)[1]) <= _MOST_INLINED
+        how = "inline" if is_short else "__attribute__((noinline))"
+        lines += [f"#define SHORT {how}", _HEADER, *_expand(tape), *_set_jacobian(tape)]
         functions += ", (void *)expand_lanes, (void *)set_lane_jacobian, (void *)IN_REGISTER"
     return "\n".join([*lines, f"const void *const leaves[5] = {{{functions}}};"]) + "\n"
 
@@ -135,7 +148,7 @@ def _expand(tape: Structure) -> Iterator[str]:
     yield "void expand_lanes(reg *restrict a, const double *restrict c, const double *restrict d,"
     yield "                  const reg *restrict step, int order)\n{"
     yield "  const reg h = *step;"
-    yield f"  reg sums[{max(1, len(pairs))}][{_TOGETHER}];"
+    yield f"  reg sum[{max(1, len(pairs))}], sums[{max(1, len(pairs))}][{_TOGETHER}];"
     for slot in slots_read(terms + first):
         yield f"  const reg z{slot} = {place(slot, '0')};"
     for slot, rate in zip(unknowns_of(tape), first, strict=True):
@@ -144,14 +157,12 @@ def _expand(tape: Structure) -> Iterator[str]:
     yield f"    const int late = k % {_TOGETHER};"
     yield "    const double whole = k, i = 1.0/whole;"
     yield "    const reg part = h/(whole + 1.0);"
-    yield "    if (k > late && late == 0) {"
-    for n, (x, y) in enumerate(pairs):
-        yield f"      sums_in_lanes(&{place(x, '0')}, &{place(y, '0')}, k, sums[{n}]);"
+    yield "    if (k == late || late == 0) {"
+    both = [f"&A({x}, 0), &A({y}, 0), k, late, sums[{n}]" for n, (x, y) in enumerate(pairs)]
+    yield from (f"      begin_sums({each});" for each in both)
     yield "    }"
-    for n, (x, y) in enumerate(pairs):
-        both = f"&{place(x, '0')}, &{place(y, '0')}"
-        yield f"    const reg sum{n} = late_sum({both}, k, late, sums[{n}]);"
-    yield from ("    " + re.sub(r"\bsum\[(\d+)\]", r"sum\1", each) for each in body)
+    yield from (f"    sum[{n}] = late_sum({each});" for n, each in enumerate(both))
+    yield from (f"    {each}" for each in body)
     yield "  }\n}"
 
 

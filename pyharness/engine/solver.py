@@ -304,7 +304,7 @@ def prepare(
     attitude : bool
         Whether calls return the attitude too, as in `solve`.
     compiled : bool
-        Whether a C compiler translates a recorded torque, in up to a second, unless the user's
+        Whether a C compiler translates a recorded torque, mostly within a second, unless the user's
         cache has the result; without a compiler it is interpreted. `Solver.leaves` says which.
 
     Returns

@@ -48,6 +48,7 @@ def save_ensemble(found: "Ensemble", path: str | os.PathLike[str]) -> None:
         "refusals": None if found.refusals is None else list(found.refusals.items()),
         "sensitivities": None if found.sensitivities is None else names,
         "names": found.names,
+        "leaves": found.leaves,
     }
     name = checked_file(_FILE, path)
     write_files({name: archive_of({**arrays, "header": json.dumps(header)})}, _FILE)
@@ -69,6 +70,8 @@ def _attributes(arrays: dict[str, Any], header: dict[str, Any]) -> dict[str, Any
     given: dict[str, Any] = {name: arrays.get(name) for name in _ARRAYS}
     rows = given["status"].shape
     given["names"] = tuple(map(str, header["names"]))
+    leaves = header.get("leaves")  # files of earlier versions have none
+    given["leaves"] = None if leaves is None else str(leaves)
     for name, width in {**_WIDTHS, "own": len(given["names"])}.items():
         array = given[name]
         if array is not None and (array.dtype, array.shape) != ("f8", (*rows, width)):

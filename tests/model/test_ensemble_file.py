@@ -58,13 +58,14 @@ def test_bodies_without_events_are_kept(tmp_path: Path) -> None:
     none: list[list[Any]] = [[np.array([1.0, 2.0]), None, np.zeros(0)]]
     states: list[list[Any]] = [[np.ones((2, 3)), None, np.zeros((0, 3))]]
     found = Ensemble(
-        np.ones((3, 3)), np.zeros(3, np.int8), t_events=none, y_events=states, refusals={1: "why"}
-    )
+        np.ones((3, 3)), np.zeros(3, np.int8), t_events=none, y_events=states, refusals={1: "why"},
+        leaves="compiled",
+    )  # fmt: skip
     found.save(tmp_path / "x.npz")
     again = Ensemble.load(tmp_path / "x.npz")
     assert same(again.t_events, none)
     assert same(again.y_events, states)
-    assert again.refusals == {1: "why"}
+    assert (again.refusals, again.leaves) == ({1: "why"}, "compiled")
 
 
 def test_wrong_files_are_refused(tmp_path: Path) -> None:

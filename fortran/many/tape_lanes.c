@@ -15,7 +15,7 @@ enum { SIDE_BY_SIDE = IN_REGISTER };
 typedef reg lanes;
 typedef reg_bits bits;
 
-enum { LEAST_ORDER = 14, TERMS = LANE_TERMS, MOST_ORDER = TERMS - 1 };
+enum { LEAST_ORDER = 8, TERMS = LANE_TERMS, MOST_ORDER = TERMS - 1 };
 enum { MANY = 3 };                            /* factors of a product that may not show early */
 enum { FEW_TERMS = 5 };                       /* of values amid a step */
 enum { CARRIED = 6 };                         /* terms of an exponential */

@@ -125,3 +125,18 @@ def test_many_scenes_have_estimates() -> None:
     found = MANY(scenes, 2.0, estimates=True)
     alone = [MANY(each, 2.0, estimates=True).estimates[0] for each in scenes]
     np.testing.assert_array_equal(found.estimates, alone)
+
+
+def test_long_steps_hide_no_amplification() -> None:
+    omega, end, tolerance = (0.18674826, -3.25642659, -1.20781679), 38.05315613443448, 5.8e-5
+
+    def torque(t: Any, w: Any) -> Any:
+        first = 0.2 / (1.0 + w[0] ** 2) - 0.1 * w[0]
+        return [first, w[2] / (1.2 + np.sin(t)), -0.2 * np.tanh(3.0 * w[2])]
+
+    scene = Scene("amplified", omega, moments=(1.0, 2.0, 2.5), torque=torque)
+    found = solve_many(scene, end, omega=[omega], tolerance=tolerance, estimates=True)
+    truth = solve(scene, end, tolerance=1e-12).omega[-1]
+    assert np.abs(found.omega[0] - truth).max() <= tolerance * np.abs(omega).max()
+    assert found.growth is not None
+    assert found.growth[0] > 1e4

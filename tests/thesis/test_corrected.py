@@ -122,4 +122,4 @@ def test_compare_tells_what_is_in_vain(case: int, capsys: pytest.CaptureFixture[
     # Case 1 has only rounding errors at every step.
     assert case == 1 or all(each is not None for each in orders)
     for name in ("c1-for-c", "do-variable", "initial-torque"):
-        assert f"'{name}'; --keep {name}" in told.err
+        assert f"'{name}' has no effect on corrected statements; --keep {name}" in told.err

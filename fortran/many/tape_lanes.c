@@ -98,6 +98,7 @@ struct group {
 };
 
 extern int interrupt_raised(void);
+extern int fits_lanes(int64_t address);
 
 static inline lanes all_of(double x) { return (lanes){0.0} + x; }
 static inline lanes select_of(bits mask, lanes a, lanes b)
@@ -868,8 +869,7 @@ void OF_LEVEL(solve_tape_bodies, LEVEL)(struct bodies *all)
   memset(memory, 0, n_slots * of_slot * sizeof(lanes));
   g.all = all;
   g.n = all->tape.n_unknowns;
-  g.leaves = all->tape.leaves;
-  if (g.leaves && (g.leaves->expand_lanes == NULL || g.leaves->width != SIDE_BY_SIDE)) g.leaves = NULL;
+  g.leaves = fits_lanes((intptr_t)all->tape.leaves) ? all->tape.leaves : NULL;
   g.a = (series *)memory;
   g.middle = memory + n_slots * TERMS;
   g.tangents = g.middle + n_slots;

@@ -25,8 +25,8 @@ class Growth:
 
     time: float  # s
     # Relative to the largest omega: `error` is the largest difference from the closed form, from
-    # `_STARTS` initial states of the same motion; `conditioning` is the change by one rounding of
-    # the time.
+    # `_STARTS` initial states of the same motion; `conditioning` is the change by a rounding error
+    # of the time.
     error: float
     conditioning: float
     steps: int  # number of steps of one integration

@@ -31,9 +31,6 @@ _FLAGS = ("-O2", "-ffp-contract=fast", "-fPIC", "-shared")
 _NATIVE = "-march=native"
 
 
-_LIBRARIES: list[CDLL] = []  # a library must not be closed
-
-
 class LeavesError(Exception):
     """The reason why leaves can't be compiled or loaded, in one line."""
 
@@ -98,7 +95,6 @@ def loaded(tape: Structure, place: str) -> int:
     try:
         text = whole_source(tape)
         library = CDLL(str(_found(Path(place), _key(text)) or compiled_file(Path(place), text)))
-        _LIBRARIES.append(library)
         return ctypes.addressof(ctypes.c_void_p.in_dll(library, "leaves"))
     except (OSError, AttributeError, ValueError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__

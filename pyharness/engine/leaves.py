@@ -207,10 +207,8 @@ def recurrences(tape: Structure) -> tuple[list[str], list[tuple[int, int]]]:
 
 def rates_of_term(tape: Structure) -> tuple[list[str], list[str]]:
     """Return the rates of the unknowns: term 0, and term k, as C."""
-    return (
-        [combined(tape, number, "z", is_value=True) for number in _rates(tape)],
-        [combined(tape, number, "t", is_value=False) for number in _rates(tape)],
-    )
+    first = [combined(tape, number, "z", is_value=True) for number in _rates(tape)]
+    return first, [combined(tape, number, "t", is_value=False) for number in _rates(tape)]
 
 
 def slots_read(lines: list[str]) -> list[int]:

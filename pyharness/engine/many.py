@@ -331,7 +331,8 @@ def _solve_groups(
             found.attitude[rows] = part.attitude
         if found.estimates is not None:
             found.estimates[rows] = part.estimates
-    return replace(found, leaves="; ".join(sorted(filter(None, leaves))) or None)
+    texts = "; ".join(sorted(filter(None, leaves))) or None
+    return found if found.leaves == texts else replace(found, leaves=texts)
 
 
 def _choose_kernel(method: str, tolerance: Number | None) -> tuple[int, float]:

@@ -98,7 +98,7 @@ def rescaling_factor(scene: Scene, time: float) -> float:
 
     This omega is the initial omega, or the omega that the torque may cause until `time` (s) if that
     is larger. The latter is a bound; for a torque that depends on the state, an estimate. The
-    factor is 1 if no rescaling is needed, or if none is possible, as for an opaque torque.
+    factor is 1 if no rescaling is needed or possible, as for an opaque torque.
     """
     if is_ordinary(scene.omega):
         return 1.0

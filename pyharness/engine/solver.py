@@ -300,7 +300,7 @@ def prepare(
         fixed step and of Gauss collocation. If the motion amplifies perturbations by a factor K, no
         method has a relative error below some 1e-15 K.
     effort : float
-        Factor on the work limit of a call (some ten seconds); beyond it the status is `gave up`.
+        Factor on the work limit of a call (about ten seconds); beyond it the status is `gave up`.
     attitude : bool
         Whether calls return the attitude too, as in `solve`.
     compiled : bool

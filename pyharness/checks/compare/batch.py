@@ -215,7 +215,7 @@ class Batch:
             return self._solve_each(method, tolerance, t_end)
         hidden = OF_PROGRAMS if self.scene.torque.needs_attitude else (*OF_PROGRAMS, "attitude")
         options: dict[str, Any] = {k: x for k, x in self.arrays.items() if k not in hidden} | more
-        options["compiled"] = self.solver.compiled and by_state
+        options["compiled"] = self.solver.compiled
         return solve_many(self._shared, t_end, method=method, tolerance=tolerance, **options)
 
     def _solve_each(self, method: str, tolerance: float, t_end: Array) -> Ensemble:

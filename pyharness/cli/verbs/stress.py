@@ -15,7 +15,8 @@ OPTIONS = {
     "--only ID,...": f"Run only these trials: {', '.join(TRIALS)}; or only the checks whose ids "
     "begin with this text, as in shapes/auto. The output says what each trial tests.",
     "--scene FILE": f"Run only the trials {', '.join(SCENE_TRIALS[:-1])} and {SCENE_TRIALS[-1]}, "
-    "with the scene in this TOML file instead of ours. Its torque may depend on omega or attitude.",
+    "with the scene in this TOML file instead of the built-in one. Its torque may depend on omega "
+    "or attitude.",
     "--save DIR": "Save, for each method in each trial, the scene with the worst result as a TOML "
     "file in this folder (default: save only scenes of failed checks, in the folder worst).",
     **shared.outputs(FORMATS, plot="the one trial that --only names"),

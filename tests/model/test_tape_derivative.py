@@ -10,7 +10,7 @@ import pytest
 from pyharness.checks.scenes.state_scenes import READY, STEADY, TURNING, draw, ready
 from pyharness.engine.recorded import system_of
 from pyharness.model.dual import with_derivatives
-from pyharness.model.state_torque import StateTorque, recorded, replayed
+from pyharness.model.state_torque import StateTorque, recorded, replayed, torque_of
 from pyharness.model.tape import ATTITUDE, FLOATS, OMEGA, TIME, Functions, Table, evaluate
 from pyharness.torques import table
 
@@ -107,3 +107,12 @@ def test_derivatives_of_the_equations_of_motion() -> None:
             each[slot] += sign * 1e-5
         above, below = (np.array(evaluate(tape, each, FLOATS)) for each in moved)
         assert slopes[:, column] == pytest.approx((above - below) / 2e-5, rel=1e-6, abs=1e-6)
+
+
+def test_a_replayed_torque_takes_shifted_arguments() -> None:
+    torque = recorded(lambda t, w: [2.0 * w[0] + 3.0 * w[1] + 1.0, w[0] * w[1], t - w[2]])
+    tape, shift, rest = torque.tape, np.array([0.5, -0.25, 2.0]), (1.0, 0.0, 0.0, 0.0)
+    assert tape is not None
+    moved = replayed(lambda t, w, q: torque_of(tape, t + 3.0, w + shift, q))
+    shifted = (0.1 + shift).tolist()
+    assert moved.at(0.4, [0.1] * 3, rest) == pytest.approx(torque.at(3.4, shifted, rest))

@@ -9,7 +9,7 @@ module tape_march
   use statuses, only: COMPLETE, INTERRUPTED, OVERFLOW, SLIDING
   use step_nodes, only: AT_ONCE, parts_from, powers_of, sum_at_nodes
   use step_limit, only: check_steps, limit_of, step_limit_t
-  use tape, only: FIRST_UNKNOWN, N_INPUTS, next_break, tape_arrays_t, tape_t, TIME_SLOT
+  use tape, only: FIRST_UNKNOWN, next_break, tape_arrays_t, tape_t, TIME_SLOT
   use tape_growth, only: begin, count_step, find_growth, MOST_UNKNOWNS, transitions_t
   use tape_live, only: keep_live, settle
   use tape_plan, only: converge, fitting, LEAST_LOCAL_TOLERANCE, local_tolerance_of, &
@@ -140,10 +140,7 @@ contains
     solution%n_steps = 0
     sum_of_noise = 0.0_dp
     noise_of_block = 0.0_dp
-    s%a(:, :min(N_INPUTS, tape%n_slots)) = 0.0_dp
     if (switches%n > 0) s%a = 0.0_dp
-    ! tape_terms.c leaves half of the lanes out, and tiny numbers in them would cost time.
-    if (n == 3) s%blocks = 0.0_dp
     call begin(n, transitions)
     call begin_lanes()
     live = tape

@@ -10,7 +10,7 @@ module tape_series
                         SELECT_OF => SELECT, SINE_COSINE, SQUARE_ROOT => SQRT, SWITCH, TABLE, &
                         TANGENT => TANH
   use storage, only: PERTURBATION_LENGTH, SERIES_LENGTH
-  use tape, only: arrays_of, FIRST_UNKNOWN, piece_at, tape_arrays_t, tape_t, TIME_SLOT
+  use tape, only: arrays_of, FIRST_UNKNOWN, N_INPUTS, piece_at, tape_arrays_t, tape_t, TIME_SLOT
   use tape_growth, only: MOST_UNKNOWNS
   use tape_powers, only: find_powers, powers_t
   use two_words, only: sine_cosine_of
@@ -172,7 +172,7 @@ contains
     type(c_ptr) :: perturbations, work
     integer(c_intptr_t) :: address ! in numbers
     integer(int64) :: at, n_terms, n_perturbations, n_work
-    integer :: failed, n_products
+    integer :: failed, n_given, n_products
 
     ! Results that nobody needs have a slot too.
     n_terms = (LAST_TERM + 1)*(1 + int(tape%n_slots, int64))
@@ -198,7 +198,11 @@ contains
         memory(at:at + n_perturbations - 1)
       perturbations = c_loc(s%blocks)
     end if
+    ! Of three unknowns, tape_terms.c leaves half of the lanes out; tiny numbers there cost time.
+    if (tape%n_unknowns == 3) memory(at:at + n_perturbations - 1) = 0.0_dp
     at = at + n_perturbations + SIDE_BY_SIDE - 1
+    n_given = (LAST_TERM + 1)*min(N_INPUTS, tape%n_slots)
+    memory(at:at + n_given - 1) = 0.0_dp
     s%a(0:LAST_TERM, 1:tape%n_slots) => memory(at:at + n_terms - LAST_TERM - 2)
     s%arrays = arrays_of(tape, c_loc(s%a), perturbations, work)
     call begin_work(s%arrays, tape%n_slots)

@@ -78,7 +78,8 @@ struct operation {
 struct group {
   const struct bodies *all;
   int n, order;
-  int body[SIDE_BY_SIDE], steps[SIDE_BY_SIDE], tries[SIDE_BY_SIDE]; /* body: -1 for none */
+  int body[SIDE_BY_SIDE];         /* -1 for none */
+  bits steps, tries;
   series *a;                      /* terms of each slot */
   struct operation *operations;
   lanes **terms;                  /* series of each term of the combinations */
@@ -126,7 +127,8 @@ static inline lanes each_of(double (*function)(double), lanes x)
 static inline lanes ratio_of(int order, lanes allowed, lanes last)
 {
   const bits difference = (bits)allowed - (bits)larger(last, all_of(LEAST));
-  return (lanes)(difference / order + (bits)all_of(1.0));
+  const lanes part = __builtin_convertvector(difference, lanes) * (1.0 / order);
+  return (lanes)(__builtin_convertvector(part, bits) + (bits)all_of(1.0));
 }
 
 static inline lanes combined(const struct group *g, int n, int k)
@@ -526,7 +528,9 @@ static inline __attribute__((always_inline)) void carry_of(const int n,
                                                            lanes vectors[][WITH_ATTITUDE])
 {
   lanes sums[VECTORS][WITH_ATTITUDE], next[VECTORS][WITH_ATTITUDE];
+#pragma GCC unroll 4
   for (int v = 0; v < VECTORS; v++)
+#pragma GCC unroll 7
     for (int i = 0; i < n; i++) sums[v][i] = vectors[v][i];
   for (int k = CARRIED; k > 0; k--) {
     const double part = 1.0 / k;
@@ -546,10 +550,14 @@ static inline __attribute__((always_inline)) void carry_of(const int n,
       next[2][i] = vectors[2][i] + part * c;
       next[3][i] = vectors[3][i] + part * d;
     }
+#pragma GCC unroll 4
     for (int v = 0; v < VECTORS; v++)
+#pragma GCC unroll 7
       for (int i = 0; i < n; i++) sums[v][i] = next[v][i];
   }
+#pragma GCC unroll 4
   for (int v = 0; v < VECTORS; v++)
+#pragma GCC unroll 7
     for (int i = 0; i < n; i++) vectors[v][i] = sums[v][i];
 }
 
@@ -599,6 +607,30 @@ static lanes ended(const struct group *g, lanes factor, bits *arrives, bits *at_
   return select_of(*arrives, whole, factor);
 }
 
+/* Sum the terms of some unknowns from 1 on, those of their derivatives times the step, and the
+   absolute values of the latter. */
+static inline __attribute__((always_inline)) void sum_up(const struct group *g, const int first,
+                                                         const int count, lanes factor, lanes *change,
+                                                         lanes *slope, lanes *size)
+{
+  lanes sums[4] = {{0.0}}, of_slopes[4] = {{0.0}}, of_sizes[4] = {{0.0}};
+  for (int k = g->order; k > 0; k--) {
+#pragma GCC unroll 4
+    for (int i = 0; i < count; i++) {
+      const lanes term = g->a[FIRST_UNKNOWN + first + i][k], weighted = (double)k * term;
+      sums[i] = factor * sums[i] + term;
+      of_slopes[i] = factor * of_slopes[i] + weighted;
+      of_sizes[i] = factor * of_sizes[i] + absolute(weighted);
+    }
+  }
+#pragma GCC unroll 4
+  for (int i = 0; i < count; i++) {
+    change[first + i] = factor * sums[i];
+    slope[first + i] = factor * of_slopes[i];
+    size[first + i] = absolute(factor * of_sizes[i]);
+  }
+}
+
 /* Take a step in each lane, or shorten the step that the lane tries next. */
 static void step(struct group *g)
 {
@@ -642,18 +674,9 @@ static void step(struct group *g)
   const lanes h = factor * g->h;
   set_noise(g, noise);
   lanes reached = g->scale, terms = {0.0}, turned = {0.0}, rounded = all_of(1.0), noises = {0.0};
+  sum_up(g, 0, 3, factor, change, slope, size);
+  if (n == WITH_ATTITUDE) sum_up(g, 3, 4, factor, change, slope, size);
   for (int i = 0; i < n; i++) {
-    const lanes *a = g->a[FIRST_UNKNOWN + i];
-    lanes sum = {0.0}, of_slopes = {0.0}, of_sizes = {0.0};
-    for (int k = order; k > 0; k--) {
-      const lanes weighted = (double)k * a[k];
-      sum = factor * sum + a[k];
-      of_slopes = factor * of_slopes + weighted;
-      of_sizes = factor * of_sizes + absolute(weighted);
-    }
-    change[i] = factor * sum;
-    slope[i] = factor * of_slopes;
-    size[i] = absolute(factor * of_sizes);
     if (i < 3) {
       reached = larger(reached, absolute(g->y[i] + change[i]));
       terms = larger(terms, size[i]);
@@ -672,8 +695,10 @@ static void step(struct group *g)
     for (int j = 0; j < n; j++) jacobian[i][j] *= factor / tried;
   lanes vectors[VECTORS][WITH_ATTITUDE], worst = {0.0}, growth = {0.0};
   lanes *const error = vectors[PROBES];
-  memcpy(vectors, g->probes, sizeof g->probes);
-  memcpy(vectors[PROBES], g->error, sizeof g->error);
+  for (int i = 0; i < n; i++) {
+    for (int j = 0; j < PROBES; j++) vectors[j][i] = g->probes[j][i];
+    error[i] = g->error[i];
+  }
   carry(n, jacobian, vectors);
   for (int j = 0; j < PROBES; j++) {
     for (int i = 0; i < n; i++) {
@@ -715,12 +740,9 @@ static void step(struct group *g)
   g->is_first &= ~accepted;
   /* The derivatives may jump at a breakpoint. */
   g->is_checked = g->all->n_tables > 0 ? accepted & ~arrives : accepted;
-  for (int i = 0; i < SIDE_BY_SIDE; i++) {
-    if (accepted[i]) g->tries[i] = 0;
-    g->steps[i] += accepted[i] ? 1 : 0;
-    if (!accepted[i] && ++g->tries[i] > MOST_TRIES) g->fails[i] = -1;
-    if (g->steps[i] > MOST_STEPS) g->fails[i] = -1;
-  }
+  g->steps -= accepted;
+  g->tries = (g->tries + 1) & ~accepted;
+  g->fails |= (g->tries > MOST_TRIES) | (g->steps > MOST_STEPS);
 }
 
 /* Set the inputs of the tape that are parameters, and return whether they are finite. */

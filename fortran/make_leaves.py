@@ -16,7 +16,7 @@ def main(root: str, target: str, header: str) -> None:
     # The finder of an editable installation, an instance, would start a build.
     sys.meta_path[:] = [each for each in sys.meta_path if isinstance(each, type)]
     from pyharness import Scene, TorqueLaw, torques
-    from pyharness.engine.leaves import key, source, structure
+    from pyharness.engine.leaves import key, names, source, structure
     from pyharness.engine.recorded import listing, system_of
     from pyharness.model.constant_body import with_constant_body
 
@@ -53,8 +53,11 @@ def main(root: str, target: str, header: str) -> None:
         text = source(shape, f"_{number}")
         # Common definitions are written once.
         texts.append(text if number == 0 else text[text.index("static void expand") :])
-    names = [f"{{expand_{number}, set_jacobian_{number}}}" for number in range(len(structures))]
-    texts.append(f"const struct leaves OF_LEVEL(ready_leaves, LEVEL)[] = {{{', '.join(names)}}};")
+    each = [
+        f"{{{', '.join(names(shape, f'_{number}'))}}}"
+        for number, shape in enumerate(structures.values())
+    ]
+    texts.append(f"const struct leaves OF_LEVEL(ready_leaves, LEVEL)[] = {{{', '.join(each)}}};")
     Path(target).write_text("\n".join(texts) + "\n")
     keys = ", ".join(f"INT64_C({each})" for each in structures)
     Path(header).write_text(f"static const int64_t ready_keys[] = {{{keys}}};\n")

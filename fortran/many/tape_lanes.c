@@ -195,6 +195,10 @@ static void set_wave(struct group *g, double frequency, lanes *sine, lanes *cosi
 static void set_values(struct group *g)
 {
   const struct tape *tape = &g->all->tape;
+  if (g->leaves && g->leaves->set_lane_values) {
+    g->leaves->set_lane_values(*g->a, tape->coefficients, tape->constants);
+    return;
+  }
   for (int n = 0; n < tape->n_operations; n++) {
     const int *operation = tape->operations[n];
     const lanes x = g->a[operation[1] - 1][0], y = g->a[operation[2] > 0 ? operation[2] - 1 : 0][0];
@@ -359,6 +363,10 @@ static lanes converged(const struct group *g, lanes factor)
 static void set_noise(struct group *g, lanes *noise)
 {
   const struct tape *tape = &g->all->tape;
+  if (g->leaves) {
+    g->leaves->set_lane_noise(*g->a, tape->coefficients, tape->constants, noise);
+    return;
+  }
   for (int i = 0; i < FIRST_UNKNOWN + g->n; i++) g->noises[i] = all_of(0.0);
   for (int n = 0; n < tape->n_operations + g->n; n++) {
     lanes sum = {0.0};

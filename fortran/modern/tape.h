@@ -32,10 +32,16 @@ struct leaves {
   /* As set_columns of tape_terms.c, for all columns at four parts of the step. */
   void (*set_jacobian)(const double *terms, const double *, const double *, const double *parts,
                        double h, double *jacobian);
-  /* As expand and set_jacobian of tape_lanes.c, for registers of `width` numbers; or NULL. */
+  /* Term 0 of all slots; or NULL, and the operations are interpreted. */
+  void (*set_values)(double *terms, const double *, const double *);
+  /* As noise_of of tape_series.f90. */
+  void (*set_noise)(const double *terms, const double *, const double *, double *noise);
+  /* The same of tape_lanes.c, for registers of `width` numbers; or NULL. */
   void (*expand_lanes)(reg *terms, const double *, const double *, const reg *h, int order);
   void (*set_lane_jacobian)(const reg *terms, const double *, const double *, const reg *factor,
                             const reg *h, reg (*jacobian)[WITH_ATTITUDE]);
+  void (*set_lane_values)(reg *terms, const double *, const double *);
+  void (*set_lane_noise)(const reg *terms, const double *, const double *, reg *noise);
   intptr_t width;
 };
 

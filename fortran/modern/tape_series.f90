@@ -85,6 +85,21 @@ module tape_series
       integer(c_int), intent(in), value :: n_slots
     end subroutine begin_work
 
+    integer(c_int) function begin_values(tape) bind(c, name="begin_values_level")
+      !! Compute term 0 of all slots, and return 1; or return 0, if it is not compiled.
+      import :: c_int, tape_arrays_t
+      implicit none(type, external)
+      type(tape_arrays_t), intent(in) :: tape
+    end function begin_values
+
+    integer(c_int) function bound_noise(tape, noise) bind(c, name="bound_noise_level")
+      !! Bound the rounding errors of the rates, and return 1; or return 0, if it is not compiled.
+      import :: c_int, dp, tape_arrays_t
+      implicit none(type, external)
+      type(tape_arrays_t), intent(in) :: tape
+      real(dp), intent(inout) :: noise(tape%n_unknowns)
+    end function bound_noise
+
     subroutine expand_tape(tape, h, order) bind(c, name="expand_tape_level")
       !! Compute all terms of all slots from their terms 0, and from the time and the tables.
       import :: c_int, dp, tape_arrays_t
@@ -217,11 +232,11 @@ contains
     logical, intent(in) :: has_values !! whether terms 0 of all slots, and the tables, are inputs
     type(series_t), intent(inout) :: s
 
-    if (.not. has_values) call set_values(tape, t_low, s%h, s%a)
+    if (.not. has_values) call set_values(tape, t_low, s%h, s)
     call expand_tape(s%arrays, s%h, s%order)
   end subroutine expand
 
-  pure subroutine derivatives_at(tape, t, y, h, s, derivatives)
+  subroutine derivatives_at(tape, t, y, h, s, derivatives)
     !! Compute the derivatives of the unknowns. Terms 0 of all slots, and the terms of the tables,
     !! are overwritten.
     type(tape_t), intent(in) :: tape
@@ -234,21 +249,22 @@ contains
 
     s%a(0, TIME_SLOT) = t(1)
     s%a(0, FIRST_UNKNOWN:FIRST_UNKNOWN + size(y) - 1) = y
-    call set_values(tape, t(2), h, s%a)
+    call set_values(tape, t(2), h, s)
     do i = 1, size(y)
       derivatives(i) = value_of(tape, size(tape%constants) - size(y) + i, s%a)
     end do
   end subroutine derivatives_at
 
-  pure subroutine set_values(tape, t_low, h, a)
+  subroutine set_values(tape, t_low, h, s)
     !! Compute term 0 of all slots, and all terms of the tables.
     type(tape_t), intent(in) :: tape
     real(dp), intent(in) :: t_low, h  !! s
-    real(dp), intent(inout) :: a(0:LAST_TERM, tape%n_slots)
+    type(series_t), intent(inout) :: s
     logical :: is_large
 
-    call set_values_with(tape, t_low, h, NONE, a, is_large)
-    if (is_large) call saturate(tape, t_low, h, a)
+    if (begin_values(s%arrays) /= 0) return
+    call set_values_with(tape, t_low, h, NONE, s%a, is_large)
+    if (is_large) call saturate(tape, t_low, h, s%a)
   end subroutine set_values
 
   pure subroutine saturate(tape, t_low, h, a)
@@ -446,7 +462,7 @@ contains
     end do
   end function value_of
 
-  pure subroutine noise_of(tape, s, noise, of_unknowns)
+  subroutine noise_of(tape, s, noise, of_unknowns)
     !! Compute bounds of the rounding errors of the derivatives of the unknowns, in units of the
     !! rounding error of 1, by running error analysis of terms 0 (Higham 2002, section 3.3). The
     !! time counts as exact, and so do the unknowns without `of_unknowns`.
@@ -456,6 +472,9 @@ contains
     real(dp), intent(in), optional :: of_unknowns(:) !! their rounding errors, in units
     integer :: i, n, out
 
+    if (.not. present(of_unknowns)) then
+      if (bound_noise(s%arrays, noise) /= 0) return
+    end if
     s%noise = 0.0_dp
     if (present(of_unknowns)) s%noise(FIRST_UNKNOWN:FIRST_UNKNOWN + size(noise) - 1) = of_unknowns
     do n = 1, tape%n_operations

@@ -253,6 +253,22 @@ void OF_LEVEL(expand_tape, LEVEL)(const struct tape *tape, double h, int order)
   }
 }
 
+/* Compute term 0 of all slots, and return whether the leaves can. */
+int OF_LEVEL(begin_values, LEVEL)(const struct tape *tape)
+{
+  if (!tape->leaves || !tape->leaves->set_values) return 0;
+  tape->leaves->set_values(tape->a, tape->coefficients, tape->constants);
+  return 1;
+}
+
+/* Bound the rounding errors of the rates, and return whether the leaves can. */
+int OF_LEVEL(bound_noise, LEVEL)(const struct tape *tape, double *noise)
+{
+  if (!tape->leaves) return 0;
+  tape->leaves->set_noise(tape->a, tape->coefficients, tape->constants, noise);
+  return 1;
+}
+
 /* For the part `factor` of the step, sum the terms of the unknowns from 1 on (`changes`), the terms
    of their derivatives times the step (`slopes`), and the absolute terms of these (`sizes`). */
 void OF_LEVEL(sum_terms, LEVEL)(const struct tape *tape, int order, double factor, double *changes,
@@ -405,21 +421,20 @@ static inline lanes largest_terms(const struct tape *tape, int k, const double *
   return most;
 }
 
-/* Return the largest term k of the first perturbations, whose units may be 0. */
+/* Return the largest term k of the first perturbations, whose units may be 0: a sum over unknowns. */
 static inline double largest(const struct tape *tape, int k, const double *weights,
                              const double *units, int count)
 {
   const reg_bits magnitude = ~(reg_bits)(-(reg){0.0});
   double found = 0.0;
   for (int p = 0; p < count; p += IN_REGISTER) {
-    reg most = {0.0};
+    reg most = {0.0}, others = {0.0};
     for (int i = 0; i < tape->n_unknowns; i++) {
       const reg term = *(const reg *)(perturbations_of(tape)[FIRST_UNKNOWN + i][k] + p);
-      const reg x = weights[i] * (reg)((reg_bits)term & magnitude);
-      const reg_bits is_larger = x > most;
-      most = (reg)(((reg_bits)x & is_larger) | ((reg_bits)most & ~is_larger));
+      const reg sum = most + weights[i] * (reg)((reg_bits)term & magnitude);
+      most = others, others = sum;
     }
-    most *= *(const reg_anywhere *)(units + p);
+    most = (most + others) * *(const reg_anywhere *)(units + p);
     /* A unit of 0 makes an infinite term NaN, which does not count. */
     double lanes[IN_REGISTER];
     const reg_bits counts = most > (reg){0.0};

@@ -13,9 +13,13 @@ from pyharness.engine.leaves import (
     TIME,
     Structure,
     derivatives,
+    first_values,
+    kept_values,
+    names,
     place,
     rates_of_term,
     recurrences,
+    roundings,
     slots_read,
     source,
     unknowns_of,
@@ -46,6 +50,12 @@ typedef long long reg_bits __attribute__((vector_size(8 * IN_REGISTER)));
 static reg half_in_lanes(reg x, reg root)
 {
   return (reg)((reg_bits)(x / (2.0 * root)) & (x != 0.0));
+}
+static reg size_in_lanes(reg x) { return (reg)((reg_bits)x & 0x7fffffffffffffffLL); }
+static reg root_in_lanes(reg x)
+{
+  for (int i = 0; i < IN_REGISTER; i++) x[i] = __builtin_sqrt(x[i]);
+  return x;
 }
 static reg root_slope_in_lanes(reg root) { return (reg)((reg_bits)(0.5 / root) & (root != 0.0)); }
 /* The sum of the products of terms 1 to k - 1. */
@@ -96,15 +106,19 @@ static SHORT reg late_sum(const reg *x, const reg *y, int k, int late, const reg
 @lru_cache(maxsize=64)
 def whole_source(tape: Structure) -> str:
     """Return the C source of all leaves of a tape, with `leaves`, a structure of tape.h."""
-    functions, lines = "0, 0", [HEADER]
+    functions, lines = ["0"] * 4, [HEADER]
     if not _has_parameters(tape):
-        functions, lines = "(void *)expand, (void *)set_jacobian", [source(tape)]
+        functions, lines = names(tape), [source(tape)]
     if tape.n_unknowns in _UNKNOWNS:
         is_short = len(recurrences(tape)[1]) <= _MOST_INLINED
         how = "inline" if is_short else "__attribute__((noinline))"
         lines += [f"#define SHORT {how}", _HEADER, *_expand(tape), *_set_jacobian(tape)]
-        functions += ", (void *)expand_lanes, (void *)set_lane_jacobian, (void *)IN_REGISTER"
-    return "\n".join([*lines, f"const void *const leaves[5] = {{{functions}}};"]) + "\n"
+        lines += [*_set_values(tape), *_set_noise(tape)]
+        functions += ["expand_lanes", "set_lane_jacobian"]
+        functions += ["set_lane_values" if first_values(tape) else "0", "set_lane_noise"]
+        functions += ["IN_REGISTER"]
+    table = ", ".join(f"(void *){each}" for each in functions)
+    return "\n".join([*lines, f"const void *const leaves[9] = {{{table}}};"]) + "\n"
 
 
 def _in_lanes(text: str) -> str:
@@ -113,11 +127,14 @@ def _in_lanes(text: str) -> str:
         "const double t": "const reg t",
         "halved(": "half_in_lanes(",
         "slope_of_root(": "root_slope_in_lanes(",
+        "slope_at_root(": "root_slope_in_lanes(",
+        "root_of(": "root_in_lanes(",
         "= 0.0;": "= {0.0};",
     }.items():
         text = text.replace(old, new)
     # An exponential in lanes is never constant.
     text = re.sub(r"\bz\d+ \? 0\.0 : ", "", text)
+    text = re.sub(r"\bsize\((?![cd]\[)", "size_in_lanes(", text)
     return re.sub(r"\bk\*", "whole*", text)
 
 
@@ -183,3 +200,32 @@ def _set_jacobian(tape: Structure) -> Iterator[str]:
         for j, slot in enumerate(unknowns_of(tape)):
             yield f"  jacobian[{i}][{j}] = h*({texts.get(slot, 'zero')});"
     yield "}"
+
+
+def _set_values(tape: Structure) -> Iterator[str]:
+    """Yield the function that computes term 0 of all slots, if there is one."""
+    if lines := first_values(tape):
+        yield "void set_lane_values(reg *restrict a, const double *restrict c,"
+        yield "                     const double *restrict d)\n{"
+        yield "  const reg zero = {0.0};"
+        yield from kept_values([_of_registers(each) for each in lines], "reg")
+        yield "}"
+
+
+def _set_noise(tape: Structure) -> Iterator[str]:
+    """Yield the function that bounds the rounding errors of the rates."""
+    yield "void set_lane_noise(const reg *restrict a, const double *restrict c,"
+    yield "                    const double *restrict d, reg *restrict noise)\n{"
+    yield "  const reg zero = {0.0};"
+    lines, rates = roundings(tape)
+    for slot in slots_read(lines + rates):
+        yield f"  const reg z{slot} = {place(slot, '0')};"
+    yield from (f"  const reg {_of_registers(each)};" for each in lines)
+    for i, each in enumerate(rates):
+        yield f"  noise[{i}] = {_of_registers(f'= {each}')[2:]};"
+    yield "}"
+
+
+def _of_registers(text: str) -> str:
+    """Return a definition of a register, which may be the sum of numbers alone."""
+    return _in_lanes(text).replace("= ", "= zero + ", 1)

@@ -1,4 +1,6 @@
-"""Compiled leaves: C code for the Taylor series and the Jacobian of a tape (recorded operations).
+"""Compiled leaves: C code for values, series, Jacobian and rounding errors of a tape.
+
+A tape is a list of recorded operations.
 
 They replace the interpreter, fortran/modern/tape_terms.c. Numerical coefficients are read from
 memory, so that tapes that differ only in them share their leaves.
@@ -32,6 +34,9 @@ enum {{ PARTS = {_NODES}, SIZE = {_SIZE} }};
     + """
 typedef double abreast __attribute__((vector_size(32)));
 typedef long long bits __attribute__((vector_size(32)));
+static double size(double x) { return __builtin_fabs(x); }
+static double root_of(double x) { return __builtin_sqrt(x); }
+static double slope_at_root(double root) { return 0.5 / (root > 0x1p-1022 ? root : 0x1p-1022); }
 static double halved(double x, double root) { return x ? x / (2.0 * root) : 0.0; }
 static abreast slope_of_root(abreast root)
 {
@@ -56,7 +61,8 @@ class Operation(NamedTuple):
     The letters o, p and q stand for the slots of its results, x and y for the slots of its
     operands. For each slot, such as o, t_o is term k of the series (l_o if known before), b_o term
     k - 1, z_o term 0, f_o term 1, and m_o the value at a node. i is 1/k. s0 and s1 are sums of
-    products of terms 1 to k - 1 of the slots in `pairs`.
+    products of terms 1 to k - 1 of the slots in `pairs`. The rounding error of a result is its own
+    and those of the operands, times the absolute slopes.
     """
 
     series: tuple[str, ...]
@@ -64,24 +70,29 @@ class Operation(NamedTuple):
     value: str = ""  # of slot o at a node; without it the series is summed
     slopes: tuple[str, ...] = ()  # of slot o by x and by y
     second: str = ""  # slope of slot p by x, if another operation may read that slot
+    first: str = ""  # z_o; without it the interpreter computes it
+    rounding: str = "2.0*size(z_o)"  # own, in units
 
 
 _OF_ANGLE = Operation(("t_p = k*t_x", "t_o = i*(s0 + t_p*z_y)"), ("py",), slopes=("m_y",))
 _SINE = Operation(
     ("t_q = k*t_x", "t_o = i*(s0 + t_q*z_p)", "t_p = -i*(s1 + t_q*z_o)"), ("qp", "qo"),
-    slopes=("m_p",), second="-m_o",
+    slopes=("m_p",), second="-m_o", rounding="2.0",
 )  # fmt: skip
 _WAVE = -1  # sine and cosine of an angle proportional to time
 OPERATIONS = {
     Operations.PRODUCT: Operation(
-        ("t_o = s0 + z_x*t_y + z_y*t_x",), ("xy",), "m_x*m_y", ("m_y", "m_x")
+        ("t_o = s0 + z_x*t_y + z_y*t_x",), ("xy",), "m_x*m_y", ("m_y", "m_x"),
+        first="z_x*z_y", rounding="size(z_o)",
     ),
     Operations.QUOTIENT: Operation(
-        ("t_o = (t_x - s0 - t_y*z_o)/z_y",), ("yo",), "m_x/m_y", ("1.0/m_y", "-m_o/m_y")
+        ("t_o = (t_x - s0 - t_y*z_o)/z_y",), ("yo",), "m_x/m_y", ("1.0/m_y", "-m_o/m_y"),
+        first="z_x/z_y", rounding="size(z_o)",
     ),
     # A root of 0, such as a norm at rest, is constant: its terms would be 0/0.
     Operations.SQRT: Operation(
-        ("t_o = halved(t_x - s0, z_o)",), ("oo",), slopes=("slope_of_root(m_o)",)
+        ("t_o = halved(t_x - s0, z_o)",), ("oo",), slopes=("slope_of_root(m_o)",),
+        first="root_of(z_x)", rounding="size(z_o)",
     ),
     # Term 0 of the second slot says that the exponential is constant.
     Operations.EXP: Operation(
@@ -126,14 +137,21 @@ def key(tape: Structure) -> int:
 
 @lru_cache(maxsize=64)
 def source(tape: Structure, suffix: str = "") -> str:
-    """Return the C source of the functions `expand` and `set_jacobian` of tape.h.
+    """Return the C source of the functions of tape.h for a single body.
 
     With a suffix to their names they are static.
     """
-    text = "\n".join([HEADER, *chain(_expand(tape), _set_jacobian(tape))]) + "\n"
+    parts = chain(_expand(tape), _set_jacobian(tape), _set_values(tape), _set_noise(tape))
+    text = "\n".join([HEADER, *parts]) + "\n"
     if suffix:
-        text = re.sub(r"^void (expand|set_jacobian)", rf"static void \1{suffix}", text, flags=re.M)
+        text = re.sub(r"^void (\w+)", rf"static void \1{suffix}", text, flags=re.M)
     return text
+
+
+def names(tape: Structure, suffix: str = "") -> list[str]:
+    """Return the names of these functions in the order of tape.h; 0 for one that is missing."""
+    values = f"set_values{suffix}" if first_values(tape) else "0"
+    return [f"expand{suffix}", f"set_jacobian{suffix}", values, f"set_noise{suffix}"]
 
 
 def _of(operation: _Listed) -> Operation:
@@ -282,6 +300,91 @@ def _set_jacobian(tape: Structure) -> Iterator[str]:
             begin = (column // _BLOCK * Storage.MOST_UNKNOWNS + i) * _BLOCK + column % _BLOCK
             row = [texts.get(FIRST_UNKNOWN + column + j, "zero") for j in range(_ABREAST)]
             yield f"  put(jacobian + {begin}, h, {', '.join(row)});"
+    yield "}"
+
+
+def first_values(tape: Structure) -> list[str]:
+    """Return definitions of term 0 of all results; none if the interpreter computes one of them."""
+    lines = []
+    for operation in tape.operations:
+        if operation[0] == Operations.LINEAR:
+            text = combined(tape, operation[1], "z", is_value=True)
+        elif not (text := _written(_of(operation).first, operation)):
+            return []
+        lines.append(f"z{operation[3]} = {text}")
+    return lines
+
+
+def _set_values(tape: Structure) -> Iterator[str]:
+    """Yield the function that computes term 0 of all slots, if there is one."""
+    if lines := first_values(tape):
+        yield "void set_values(double *restrict a, const double *restrict c,"
+        yield "                const double *restrict d)\n{"
+        yield from kept_values(lines, "double")
+        yield "}"
+
+
+def kept_values(lines: list[str], number: str) -> Iterator[str]:
+    """Yield the statements that compute term 0 of results, of a C type, and store it."""
+    results = [int(each[1 : each.index(" ")]) for each in lines]
+    for slot in slots_read([each.partition("=")[2] for each in lines]):
+        if slot not in results:
+            yield f"  const {number} z{slot} = {place(slot, '0')};"
+    for slot, line in zip(results, lines, strict=True):
+        yield f"  const {number} {line};"
+        yield f"  {place(slot, '0')} = z{slot};"
+
+
+def roundings(tape: Structure) -> tuple[list[str], list[str]]:
+    """Return definitions of the rounding errors of results, and those of the rates, in units.
+
+    This is the running error analysis of `noise_of` in tape_series.f90.
+    """
+    # Inputs have none.
+    known: set[int] = set()
+    lines = []
+
+    def of_combination(number: int) -> str:
+        parts = [
+            f"size(c[{i}])*" + (f"(size(z{slot}) + e{slot})" if slot in known else f"size(z{slot})")
+            for i, slot in _terms(tape, number)
+        ]
+        return " + ".join([*parts, f"size(d[{number - 1}])"] if parts else ["0.0"])
+
+    for operation in tape.operations:
+        kind, x, y, out = operation
+        if kind == Operations.LINEAR:
+            texts = {out: of_combination(x)}
+        else:
+            rule = _of(operation)
+            slopes = {out: [*zip((x, y), rule.slopes, strict=False)]}
+            if rule.second:
+                slopes[out + 1] = [(x, rule.second)]
+            texts = {
+                slot: " + ".join(
+                    [_written(rule.rounding, operation).replace(f"z{out}", f"z{slot}")]
+                    + [
+                        f"size({_written(of.replace('m_', 'z_'), operation)})*e{operand}"
+                        for operand, of in each
+                        if operand in known
+                    ]
+                ).replace("slope_of_root", "slope_at_root")
+                for slot, each in slopes.items()
+            }
+        lines += [f"e{slot} = {text}" for slot, text in texts.items()]
+        known |= set(texts)
+    return lines, [of_combination(number) for number in _rates(tape)]
+
+
+def _set_noise(tape: Structure) -> Iterator[str]:
+    """Yield the function that bounds the rounding errors of the rates."""
+    yield "void set_noise(const double *restrict a, const double *restrict c,"
+    yield "               const double *restrict d, double *restrict noise)\n{"
+    lines, rates = roundings(tape)
+    for slot in slots_read(lines + rates):
+        yield f"  const double z{slot} = {place(slot, '0')};"
+    yield from (f"  const double {each};" for each in lines)
+    yield from (f"  noise[{i}] = {each};" for i, each in enumerate(rates))
     yield "}"
 
 

@@ -256,8 +256,9 @@ def _expand(tape: Structure) -> Iterator[str]:
     yield f"  double t{TIME} = {place(TIME, '1')};"
     yield "  for (int k = 1; k < order; k++) {"
     yield "    const double i = 1.0/k, part = h/(k + 1);"
-    for begin in range(0, len(groups), _CHUNK):
-        chunk = range(begin, min(len(groups), begin + _CHUNK))
+    n_chunks = -(-len(groups) // _CHUNK)
+    for c in range(n_chunks):
+        chunk = range(c * len(groups) // n_chunks, (c + 1) * len(groups) // n_chunks)
         yield from (f"    abreast s{g} = {{0.0}};" for g in chunk)
         # The newest terms come last, so that the processor need not wait for them.
         yield "    for (int j = 2; j < k - 1; j++) {"

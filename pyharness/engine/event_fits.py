@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from pyharness.engine.event_functions import EventFunction
-from pyharness.engine.event_roots import POINTS, TO_COEFFICIENTS, Fits, Index, Roots, together
+from pyharness.engine.event_roots import POINTS, TO_COEFFICIENTS, Fits, Index, Roots, together, transformed
 from pyharness.model import dense_output
 from pyharness.model.array_type import Array
 from pyharness.model.dense_output import DenseOutput, Pieces, nodes, sizes_of
@@ -115,7 +115,8 @@ class Solution:
     @cached_property
     def _sizes(self) -> Array:
         """For each polynomial, the sizes (by `sizes_of`) of the unknowns from time 0 to its end."""
-        largest = np.abs(self.pieces.values).max(axis=1)
+        # The nodes come first, because many short columns are slow.
+        largest = np.abs(self.pieces.values.swapaxes(0, 1), order="C").max(axis=0)
         count = np.searchsorted(self.pieces.edges[:-1], 0.0)
         for side in (largest[:count][::-1], largest[count:]):
             np.maximum.accumulate(side, out=side)
@@ -135,7 +136,7 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
     done: list[Fits] = []
     rough = [Roots.bare(np.zeros(0), 0)]
     for level in range(_MOST_DIVISIONS + 1):
-        c = values @ TO_COEFFICIENTS.T
+        c = transformed(values, TO_COEFFICIENTS)
         largest = np.abs(values).max(axis=1)
         tail = np.abs(c[:, -_TAIL:]).max(axis=1)
         is_done = tail <= _LAST * largest

@@ -41,7 +41,14 @@ def _transforms() -> tuple[Array, Array, Array]:
 
 
 _DERIVATIVE, _LEFT, _RIGHT = _transforms()
+_AT_ONCE = 256  # rows; for many more, the linear algebra library would start threads
 _ORDERS = np.arange(NODES)
+
+
+def transformed(rows: Array, matrix: Array) -> Array:
+    """Return the products of a matrix and each row."""
+    parts = [rows[k : k + _AT_ONCE] @ matrix.T for k in range(0, len(rows), _AT_ONCE)]
+    return np.concatenate(parts) if parts else rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +164,7 @@ def isolated(fits: Fits) -> Roots:
         if not number.size:
             break
         sign = np.where(last < 0.0, -1, 1)
-        slopes = c @ _DERIVATIVE.T
+        slopes = transformed(c, _DERIVATIVE)
         is_tiny = (np.abs(c[:, 0]) + rest <= smallest[number]) | (level == _MOST_DIVISIONS)
         is_monotone = ~is_tiny & _has_no_root(slopes)
         middle, half = 0.5 * (low + high), 0.5 * (high - low)

@@ -6,6 +6,8 @@ module tape_growth
   implicit none(type, external)
   private
 
+  integer, parameter :: SIDE = 8 ! rows of a matrix that are computed side by side
+  integer, parameter :: ROWS = SIDE*((MOST_UNKNOWNS + SIDE - 1)/SIDE) ! the last are 0
   integer, parameter :: STEPS_IN_BLOCK = 4
   integer, parameter :: MOST_BLOCKS = 64 ! even
   integer, parameter :: MOST_STEPS_IN_BLOCK = 2**28 ! within the range of the counter
@@ -15,7 +17,7 @@ module tape_growth
   ! Matrices of blocks of steps; element (i, j) is the derivative of unknown i at a block's end by
   ! unknown j at its beginning. Blocks are merged in pairs when the array is full.
   type, public :: transitions_t
-    real(dp) :: matrices(MOST_UNKNOWNS, MOST_UNKNOWNS, MOST_BLOCKS)
+    real(dp) :: matrices(ROWS, MOST_UNKNOWNS, MOST_BLOCKS)
     real(dp) :: noise(MOST_UNKNOWNS, MOST_BLOCKS) !! squares of the rounding errors in a block
     logical :: has_row(MOST_BLOCKS) !! whether it has a row of the output before the last
     integer :: n                    !! number of unknowns
@@ -58,12 +60,12 @@ contains
       if (.not. is_full) return
       t%steps = 0
       t%closed = t%closed + 1
-      t%matrices(:n, :n, t%closed) = bounded(matrix(:n, :n))
+      t%matrices(:, :n, t%closed) = padded(n, matrix)
       t%noise(:n, t%closed) = noise(:n)
       if (t%closed == MOST_BLOCKS) then
         do m = 1, MOST_BLOCKS/2
-          t%matrices(:n, :n, m) = bounded(composed(n, t%matrices(:, :, 2*m), &
-                                                   t%matrices(:, :, 2*m - 1)))
+          t%matrices(:, :n, m) = bounded(composed(n, t%matrices(:, :, 2*m), &
+                                                  t%matrices(:, :, 2*m - 1)))
           t%noise(:n, m) = t%noise(:n, 2*m - 1) + t%noise(:n, 2*m)
           t%has_row(m) = t%has_row(2*m - 1) .or. t%has_row(2*m)
         end do
@@ -83,16 +85,15 @@ contains
     real(dp), intent(in) :: sizes(:)
     type(transitions_t), intent(in) :: transitions
     real(dp), intent(out) :: growth, blur !! relative
-    real(dp) :: unit(MOST_UNKNOWNS, MOST_UNKNOWNS), open_block(MOST_UNKNOWNS, MOST_UNKNOWNS)
+    real(dp) :: unit(ROWS, MOST_UNKNOWNS), open_block(ROWS, MOST_UNKNOWNS)
     integer :: i, m
 
     unit = 0.0_dp
     do i = 1, MOST_UNKNOWNS
       unit(i, i) = 1.0_dp
     end do
-    open_block = unit
     associate (n => transitions%n)
-      open_block(:n, :n) = bounded(matrix(:n, :n))
+      open_block(:, :n) = padded(n, matrix)
       growth = 1.0_dp
       blur = 0.0_dp
       call grow(transitions%closed, open_block, sum_of_squares(n, unit, sqrt(noise), sizes) &
@@ -107,9 +108,9 @@ contains
     subroutine grow(last, behind, noise_behind)
       !! Update both for the end of block `last`, or for a later time.
       integer, intent(in) :: last
-      real(dp), intent(in) :: behind(MOST_UNKNOWNS, MOST_UNKNOWNS) !! from this end to the time
+      real(dp), intent(in) :: behind(ROWS, MOST_UNKNOWNS) !! from this end to the time
       real(dp), intent(in) :: noise_behind
-      real(dp) :: product(MOST_UNKNOWNS, MOST_UNKNOWNS), noise_of_block(MOST_UNKNOWNS), squares
+      real(dp) :: product(ROWS, MOST_UNKNOWNS), noise_of_block(MOST_UNKNOWNS), squares
       integer :: m
 
       associate (t => transitions, n => transitions%n)
@@ -121,7 +122,7 @@ contains
           ! The errors of a block are at its beginning or its end.
           noise_of_block(:n) = sqrt(t%noise(:n, m))
           squares = squares + sum_of_squares(n, product, noise_of_block, sizes)
-          product(:n, :n) = composed(n, product, t%matrices(:, :, m))
+          product(:, :n) = composed(n, product, t%matrices(:, :, m))
           squares = squares + sum_of_squares(n, product, noise_of_block, sizes)
           growth = max(growth, norm(n, product, sizes))
         end do
@@ -135,7 +136,7 @@ contains
     !! Return nearly the largest singular value of a matrix of relative perturbations; 1 for a
     !! rotation, and for damped motions.
     integer, intent(in) :: n
-    real(dp), intent(in) :: a(MOST_UNKNOWNS, MOST_UNKNOWNS)
+    real(dp), intent(in) :: a(ROWS, MOST_UNKNOWNS)
     real(dp), intent(in) :: sizes(:)
 
     norm = real(1 - count(sizes(:n) > 0.0_dp), dp) + sum_of_squares(n, a, sizes, sizes)
@@ -145,19 +146,22 @@ contains
   pure real(dp) function sum_of_squares(n, a, perturbations, sizes)
     !! Return the square of the relative perturbation to which a matrix changes independent ones.
     integer, intent(in) :: n
-    real(dp), intent(in) :: a(MOST_UNKNOWNS, MOST_UNKNOWNS)
+    real(dp), intent(in) :: a(ROWS, MOST_UNKNOWNS)
     real(dp), intent(in) :: perturbations(:)
     real(dp), intent(in) :: sizes(:)
-    integer :: i, j
+    real(dp) :: weights(ROWS), squares(SIDE)
+    integer :: first, j
 
-    sum_of_squares = 0.0_dp
+    weights = 0.0_dp
+    where (sizes(:n) > 0.0_dp) weights(:n) = 1.0_dp/sizes(:n)
+    squares = 0.0_dp
     do j = 1, n
-      do i = 1, n
-        if (sizes(i) > 0.0_dp) then
-          sum_of_squares = sum_of_squares + (a(i, j)*(perturbations(j)/sizes(i)))**2
-        end if
+      do first = 0, n - 1, SIDE
+        squares = squares + (a(first + 1:first + SIDE, j) &
+                             *(perturbations(j)*weights(first + 1:first + SIDE)))**2
       end do
     end do
+    sum_of_squares = sum(squares)
   end function sum_of_squares
 
   elemental real(dp) function bounded(x)
@@ -168,19 +172,31 @@ contains
     if (abs(x) <= LARGEST) bounded = x
   end function bounded
 
+  pure function padded(n, matrix) result(rows_too)
+    !! Return a bounded matrix with rows of zeros.
+    integer, intent(in) :: n
+    real(dp), intent(in) :: matrix(:, :)
+    real(dp) :: rows_too(ROWS, n)
+
+    rows_too = 0.0_dp
+    rows_too(:n, :) = bounded(matrix(:n, :n))
+  end function padded
+
   pure function composed(n, a, b) result(c)
     !! Compute the product of two matrices: the motion of b, then that of a.
     integer, intent(in) :: n
-    real(dp), intent(in) :: a(MOST_UNKNOWNS, MOST_UNKNOWNS), b(MOST_UNKNOWNS, MOST_UNKNOWNS)
-    real(dp) :: c(n, n)
-    integer :: i, j, k
+    real(dp), intent(in) :: a(ROWS, MOST_UNKNOWNS), b(ROWS, MOST_UNKNOWNS)
+    real(dp) :: c(ROWS, n), column(SIDE)
+    integer :: first, j, k
 
     c = 0.0_dp
     do j = 1, n
-      do k = 1, n
-        do i = 1, n
-          c(i, j) = c(i, j) + a(i, k)*b(k, j)
+      do first = 0, n - 1, SIDE
+        column = 0.0_dp
+        do k = 1, n
+          column = column + a(first + 1:first + SIDE, k)*b(k, j)
         end do
+        c(first + 1:first + SIDE, j) = column
       end do
     end do
   end function composed

@@ -104,7 +104,7 @@ contains
     real(dp) :: own_sizes(tape%n_unknowns)    ! of own states: the largest so far
     real(dp) :: sizes(tape%n_unknowns)        ! of all unknowns
     real(dp) :: t(2), t_next(2)               ! time and its rounding error, s
-    real(dp) :: t_end, rest, factor, local_tolerance, scale, power
+    real(dp) :: t_end, rest, factor, local_tolerance, scale
     real(dp) :: break_time                    ! next breakpoint of a table, or t_end, s
     real(dp) :: to_stop                       ! time to it, s
     logical :: arrives, at_end, from_rest, is_full, has_guess
@@ -519,13 +519,13 @@ contains
     subroutine estimate_truncation()
       !! Estimate the sum of the terms that the step leaves out. One pair of poles is fitted to the
       !! last four terms by least squares: x(k + 1) = p x(k) - q x(k - 1).
-      real(dp) :: uu, vv, uv, ux, vx, p, q, determinant, powers(FITTED), x(FITTED)
+      real(dp) :: uu, vv, uv, ux, vx, p, q, determinant, powers(2*FEW), x(FITTED)
       real(dp) :: near, far
       integer :: i, k
 
-      powers(FITTED) = factor**s%order
-      do k = FITTED - 1, 1, -1
-        powers(k) = powers(k + 1)/factor
+      powers(1) = factor**(s%order - 2*FEW + 1)
+      do k = 2, 2*FEW
+        powers(k) = powers(k - 1)*factor
       end do
       uu = 0.0_dp
       vv = 0.0_dp
@@ -534,7 +534,7 @@ contains
       vx = 0.0_dp
       do i = 1, n
         x = weights(i)/local_tolerance &
-            *powers*s%a(s%order - FITTED + 1:s%order, FIRST_UNKNOWN - 1 + i)
+            *powers(2*FEW - FITTED + 1:)*s%a(s%order - FITTED + 1:s%order, FIRST_UNKNOWN - 1 + i)
         uu = uu + (x(3)*x(3) + x(2)*x(2))
         vv = vv + (x(2)*x(2) + x(1)*x(1))
         uv = uv + (x(3)*x(2) + x(2)*x(1))
@@ -550,23 +550,18 @@ contains
       q = q/determinant
       do i = 1, n
         associate (slot => FIRST_UNKNOWN - 1 + i)
-          left(i) = p*(s%a(s%order, slot)*powers(FITTED)) &
-                    - q*(s%a(s%order - 1, slot)*powers(FITTED - 1))
+          left(i) = p*(s%a(s%order, slot)*powers(2*FEW)) &
+                    - q*(s%a(s%order - 1, slot)*powers(2*FEW - 1))
         end associate
       end do
       ! The fit may be small by chance.
       near = 0.0_dp
       far = 0.0_dp
-      power = factor**(s%order - 2*FEW + 1)
-      do k = s%order - 2*FEW + 1, s%order
-        do i = 1, n
-          if (k > s%order - FEW) then
-            near = near + weights(i)*abs(s%a(k, FIRST_UNKNOWN - 1 + i))*power
-          else
-            far = far + weights(i)*abs(s%a(k, FIRST_UNKNOWN - 1 + i))*power
-          end if
-        end do
-        power = power*factor
+      do i = 1, n
+        associate (last => s%a(s%order - 2*FEW + 1:s%order, FIRST_UNKNOWN - 1 + i))
+          far = far + weights(i)*sum(abs(last(:FEW))*powers(:FEW))
+          near = near + weights(i)*sum(abs(last(FEW + 1:))*powers(FEW + 1:))
+        end associate
       end do
       found%least = max(found%least, near*min(0.5_dp, near/max(far, tiny(far))))
     end subroutine estimate_truncation

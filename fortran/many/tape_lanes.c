@@ -109,12 +109,6 @@ static inline lanes select_of(bits mask, lanes a, lanes b)
 static inline lanes absolute(lanes x) { return (lanes)((bits)x & 0x7fffffffffffffffLL); }
 static inline lanes larger(lanes a, lanes b) { return select_of(a > b, a, b); }
 static inline lanes smaller(lanes a, lanes b) { return select_of(a < b, a, b); }
-static inline int any(bits mask)
-{
-  long long found = 0;
-  for (int i = 0; i < SIDE_BY_SIDE; i++) found |= mask[i];
-  return found != 0;
-}
 
 static inline lanes each_of(double (*function)(double), lanes x)
 {

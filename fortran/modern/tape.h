@@ -3,6 +3,9 @@
 #define TAPE_H
 
 #include <stdint.h>
+#ifdef __AVX__
+#include <immintrin.h>
+#endif
 
 #include "codes.h"
 
@@ -20,6 +23,20 @@ enum { IN_REGISTER = 2 };
 typedef double reg __attribute__((vector_size(8 * IN_REGISTER)));
 typedef long long reg_bits __attribute__((vector_size(8 * IN_REGISTER)));
 
+/* Return whether a comparison holds for any number of a register. */
+static inline int any(reg_bits mask)
+{
+#if defined(__AVX512DQ__)
+  return _mm512_movepi64_mask((__m512i)mask) != 0;
+#elif defined(__AVX__) && !defined(__AVX512F__)
+  return _mm256_movemask_pd((__m256d)mask) != 0;
+#else
+  long long found = 0;
+  for (int i = 0; i < IN_REGISTER; i++) found |= mask[i];
+  return found != 0;
+#endif
+}
+
 enum { WITH_ATTITUDE = 7 }; /* number of unknowns */
 enum { FIRST_UNKNOWN = 1 }; /* the slot of omega's first component, from 0 */
 enum { N_INPUTS = 8 };      /* time, omega and attitude; parameters follow */
@@ -32,8 +49,8 @@ struct leaves {
   /* As set_columns of tape_terms.c, for all columns at four parts of the step. */
   void (*set_jacobian)(const double *terms, const double *, const double *, const double *parts,
                        double h, double *jacobian);
-  /* Term 0 of all slots; or NULL, and the operations are interpreted. */
-  void (*set_values)(double *terms, const double *, const double *);
+  /* Term 0 of all slots, and the rates; or NULL, and the operations are interpreted. */
+  void (*set_values)(double *terms, const double *, const double *, double *rates);
   /* As noise_of of tape_series.f90. */
   void (*set_noise)(const double *terms, const double *, const double *, double *noise);
   /* The same of tape_lanes.c, for registers of `width` numbers; or NULL. */

@@ -26,7 +26,7 @@ module tape_growth
     integer :: steps_a_block
   end type transitions_t
 
-  public :: begin, count_step, find_growth, MOST_UNKNOWNS
+  public :: begin, close_block, count_step, find_growth, MOST_UNKNOWNS
 
 contains
 
@@ -42,22 +42,29 @@ contains
     transitions%has_row(1) = .false.
   end subroutine begin
 
-  pure subroutine count_step(with_row, matrix, noise, transitions, is_full)
-    !! Count one more step. When its block is full or has a row, store the matrix of the block.
+  pure subroutine count_step(with_row, transitions, is_full)
+    !! Count one more step.
     logical, intent(in) :: with_row        !! whether the step has a row before the last
-    real(dp), intent(in) :: matrix(:, :)   !! of the open block
-    real(dp), intent(in) :: noise(:)       !! squares of the rounding errors in it
     type(transitions_t), intent(inout) :: transitions
-    logical, intent(out) :: is_full        !! the caller then starts a new matrix
-    integer :: m, n
+    logical, intent(out) :: is_full        !! whether the caller must close the block
 
     associate (t => transitions)
-      n = t%n
       t%steps = t%steps + 1
       t%has_row(t%closed + 1) = t%has_row(t%closed + 1) .or. with_row
       ! Perturbations may be larger at a row than at later times.
       is_full = t%steps >= t%steps_a_block .or. with_row
-      if (.not. is_full) return
+    end associate
+  end subroutine count_step
+
+  pure subroutine close_block(matrix, noise, transitions)
+    !! Store the matrix of the open block; the caller starts a new matrix.
+    real(dp), intent(in) :: matrix(:, :)
+    real(dp), intent(in) :: noise(:)       !! squares of the rounding errors in it
+    type(transitions_t), intent(inout) :: transitions
+    integer :: m, n
+
+    associate (t => transitions)
+      n = t%n
       t%steps = 0
       t%closed = t%closed + 1
       t%matrices(:, :n, t%closed) = padded(n, matrix)
@@ -74,7 +81,7 @@ contains
       end if
       t%has_row(t%closed + 1) = .false.
     end associate
-  end subroutine count_step
+  end subroutine close_block
 
   subroutine find_growth(matrix, noise, sizes, transitions, growth, blur)
     !! Find the largest norm from the beginning of any block to any requested time, and the largest

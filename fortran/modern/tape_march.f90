@@ -10,7 +10,7 @@ module tape_march
   use step_nodes, only: AT_ONCE, parts_from, powers_of, sum_at_nodes
   use step_limit, only: check_steps, limit_of, step_limit_t
   use tape, only: FIRST_UNKNOWN, next_break, tape_arrays_t, tape_t, TIME_SLOT
-  use tape_growth, only: begin, count_step, find_growth, MOST_UNKNOWNS, transitions_t
+  use tape_growth, only: begin, close_block, count_step, find_growth, MOST_UNKNOWNS, transitions_t
   use tape_live, only: keep_live, settle
   use tape_plan, only: converge, fitting, LEAST_LOCAL_TOLERANCE, local_tolerance_of, &
                        MOST_TRIES, order_for
@@ -274,9 +274,11 @@ contains
         solution%status = OVERFLOW
         exit
       end if
-      call count_step(solution%n_rows > n_before, transposed(n, lanes), noise_of_block, &
-                      transitions, is_full)
-      if (is_full) call begin_block()
+      call count_step(solution%n_rows > n_before, transitions, is_full)
+      if (is_full) then
+        call close_block(transposed(n, lanes), noise_of_block, transitions)
+        call begin_block()
+      end if
       t = t_next
       has_values = size(tape%table_starts) == 1 .and. verdict == STAYS .and. .not. is_compared
       from_rest = .not. scale > 0.0_dp
@@ -381,7 +383,7 @@ contains
 
       do block = 1, n_blocks
         do i = 1, n
-          s%blocks(:, 0, FIRST_UNKNOWN - 1 + i, block) = lanes(:, i, block)
+          s%blocks(1:SIDE_BY_SIDE, 0, FIRST_UNKNOWN - 1 + i, block) = lanes(:, i, block)
         end do
       end do
     end subroutine set_lanes

@@ -85,11 +85,13 @@ module tape_series
       integer(c_int), intent(in), value :: n_slots
     end subroutine begin_work
 
-    integer(c_int) function begin_values(tape) bind(c, name="begin_values_level")
-      !! Compute term 0 of all slots, and return 1; or return 0, if it is not compiled.
-      import :: c_int, tape_arrays_t
+    integer(c_int) function begin_values(tape, rates) bind(c, name="begin_values_level")
+      !! Compute term 0 of all slots, and the derivatives of the unknowns, and return 1; or return
+      !! 0, if it is not compiled.
+      import :: c_int, dp, tape_arrays_t
       implicit none(type, external)
       type(tape_arrays_t), intent(in) :: tape
+      real(dp), intent(inout) :: rates(tape%n_unknowns)
     end function begin_values
 
     integer(c_int) function bound_noise(tape, noise) bind(c, name="bound_noise_level")
@@ -231,8 +233,9 @@ contains
     real(dp), intent(in) :: t_low  !! rounding error of the time, s
     logical, intent(in) :: has_values !! whether terms 0 of all slots, and the tables, are inputs
     type(series_t), intent(inout) :: s
+    real(dp) :: rates(tape%n_unknowns)
 
-    if (.not. has_values) call set_values(tape, t_low, s%h, s)
+    if (.not. has_values) call set_values(tape, t_low, s%h, s, rates)
     call expand_tape(s%arrays, s%h, s%order)
   end subroutine expand
 
@@ -245,26 +248,27 @@ contains
     real(dp), intent(in) :: h     !! points to the side of which the pieces of tables are taken
     type(series_t), intent(inout) :: s
     real(dp), intent(out) :: derivatives(:)
-    integer :: i
 
     s%a(0, TIME_SLOT) = t(1)
     s%a(0, FIRST_UNKNOWN:FIRST_UNKNOWN + size(y) - 1) = y
-    call set_values(tape, t(2), h, s)
-    do i = 1, size(y)
-      derivatives(i) = value_of(tape, size(tape%constants) - size(y) + i, s%a)
-    end do
+    call set_values(tape, t(2), h, s, derivatives)
   end subroutine derivatives_at
 
-  subroutine set_values(tape, t_low, h, s)
-    !! Compute term 0 of all slots, and all terms of the tables.
+  subroutine set_values(tape, t_low, h, s, derivatives)
+    !! Compute term 0 of all slots, all terms of the tables, and the derivatives of the unknowns.
     type(tape_t), intent(in) :: tape
     real(dp), intent(in) :: t_low, h  !! s
     type(series_t), intent(inout) :: s
+    real(dp), intent(out) :: derivatives(:)
     logical :: is_large
+    integer :: i
 
-    if (begin_values(s%arrays) /= 0) return
+    if (begin_values(s%arrays, derivatives) /= 0) return
     call set_values_with(tape, t_low, h, NONE, s%a, is_large)
     if (is_large) call saturate(tape, t_low, h, s%a)
+    do i = 1, tape%n_unknowns
+      derivatives(i) = value_of(tape, size(tape%constants) - tape%n_unknowns + i, s%a)
+    end do
   end subroutine set_values
 
   pure subroutine saturate(tape, t_low, h, a)

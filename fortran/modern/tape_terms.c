@@ -1,6 +1,7 @@
 /* Taylor series of all slots of a tape, order by order, and those of eight perturbations side by
    side. A term includes its power of the step. This is C because no Fortran compiler keeps eight
    sums in registers. Registers of fewer than eight numbers work too: the compiler divides them. */
+#include <math.h>
 #include <stdint.h>
 #include <string.h>
 
@@ -20,6 +21,7 @@ struct block {
   double sizes[SIDE_BY_SIDE];
 };
 
+enum { FIRST_CHECKED = 5 }; /* term of a perturbation: most steps need it and the next one */
 enum { SMALL_TERMS = 3, MOST_TRIES = 60 }; /* last terms of derivatives that are small; cuts of a step */
 #define SHORTER 0.7        /* factor of a cut */
 #define MOST_CANCELLED 1e3 /* largest term over the size of a derivative */
@@ -253,11 +255,11 @@ void OF_LEVEL(expand_tape, LEVEL)(const struct tape *tape, double h, int order)
   }
 }
 
-/* Compute term 0 of all slots, and return whether the leaves can. */
-int OF_LEVEL(begin_values, LEVEL)(const struct tape *tape)
+/* Compute term 0 of all slots and the rates, and return whether the leaves can. */
+int OF_LEVEL(begin_values, LEVEL)(const struct tape *tape, double *rates)
 {
   if (!tape->leaves || !tape->leaves->set_values) return 0;
-  tape->leaves->set_values(tape->a, tape->coefficients, tape->constants);
+  tape->leaves->set_values(tape->a, tape->coefficients, tape->constants, rates);
   return 1;
 }
 
@@ -421,32 +423,26 @@ static inline lanes largest_terms(const struct tape *tape, int k, const double *
   return most;
 }
 
-/* Return the largest term k of the first perturbations, whose units may be 0: a sum over unknowns. */
-static inline double largest(const struct tape *tape, int k, const double *weights,
-                             const double *units, int count)
+/* Return the sizes of terms k of the perturbations from lane p on: weighted sums over unknowns. */
+static inline reg sizes_of(const struct tape *tape, int k, const double *weights, int p)
 {
   const reg_bits magnitude = ~(reg_bits)(-(reg){0.0});
-  double found = 0.0;
-  for (int p = 0; p < count; p += IN_REGISTER) {
-    reg most = {0.0}, others = {0.0};
-    for (int i = 0; i < tape->n_unknowns; i++) {
-      const reg term = *(const reg *)(perturbations_of(tape)[FIRST_UNKNOWN + i][k] + p);
-      const reg sum = most + weights[i] * (reg)((reg_bits)term & magnitude);
-      most = others, others = sum;
-    }
-    most = (most + others) * *(const reg_anywhere *)(units + p);
-    /* A unit of 0 makes an infinite term NaN, which does not count. */
-    double lanes[IN_REGISTER];
-    const reg_bits counts = most > (reg){0.0};
-    *(reg_anywhere *)lanes = (reg)((reg_bits)most & counts);
-#pragma GCC unroll 3
-    for (int half = IN_REGISTER / 2; half > 0; half /= 2)
-#pragma GCC unroll 4
-      for (int lane = 0; lane < half; lane++)
-        if (lanes[lane + half] > lanes[lane]) lanes[lane] = lanes[lane + half];
-    if (lanes[0] > found) found = lanes[0];
+  reg sum = {0.0}, others = {0.0};
+  for (int i = 0; i < tape->n_unknowns; i++) {
+    const reg term = *(const reg *)(perturbations_of(tape)[FIRST_UNKNOWN + i][k] + p);
+    const reg next = sum + weights[i] * (reg)((reg_bits)term & magnitude);
+    sum = others, others = next;
   }
-  return found;
+  return sum + others;
+}
+
+/* Return whether terms k are small; a perturbation without a limit does not count. */
+static inline int are_small(const struct tape *tape, int k, const double *weights, double power,
+                            const double *limits, int count)
+{
+  for (int p = 0; p < count; p += IN_REGISTER)
+    if (any(power * sizes_of(tape, k, weights, p) > *(const reg_anywhere *)(limits + p))) return 0;
+  return 1;
 }
 
 /* Return a series at the nodes, the `parts` of the step. */
@@ -628,26 +624,30 @@ int OF_LEVEL(perturb_tape, LEVEL)(const struct tape *tape, int number, double h,
   const int n = tape->n_unknowns;
   /* Perturbation n was a unit of unknown n when it began. The error, perturbation 0, does not count,
      because it may be zero. */
-  double units[SIDE_BY_SIDE] = {0.0};
   const int count = n + 1 - number < SIDE_BY_SIDE ? n + 1 - number : SIDE_BY_SIDE;
+  double limits[SIDE_BY_SIDE], first = 0.0, power = 1.0;
+  for (int p = 0; p < count; p += IN_REGISTER)
+    *(reg_anywhere *)(limits + p) = sizes_of(tape, 0, weights, p);
   for (int i = number ? 0 : 1; i < count; i++) {
-    /* The weight of an own state that stays 0 is 0. */
     const double weight = weights[number + i - 1];
-    units[i] = weight > 0.0 ? 1.0 / weight : 0.0;
+    if (weight > 0.0 && limits[i] > first * weight) first = limits[i] / weight;
   }
-  const double first = largest(tape, 0, weights, units, count);
-  double before = first, power = 1.0;
-  int k = 0, is_short;
+  for (int i = 0; i < SIDE_BY_SIDE; i++) {
+    /* The weight of an own state that stays 0 is 0. */
+    const double weight = i >= count || number + i == 0 ? 0.0 : weights[number + i - 1];
+    limits[i] = weight > 0.0 ? tolerance * first * weight : HUGE_VAL;
+  }
+  int k = 0, was_small, is_small = 0, is_short;
   if (is_long) set_blocks(tape, NODES, h, factor, jacobian);
   else set_blocks(tape, FEW_NODES, h, factor, jacobian);
   do {
     if (is_long) perturb_all(n, NODES, v, jacobian, k++);
     else perturb_all(n, FEW_NODES, v, jacobian, k++);
     power *= factor;
-    const double size = power * largest(tape, k, weights, units, count);
+    was_small = is_small;
+    is_small = k >= FIRST_CHECKED && are_small(tape, k, weights, power, limits, count);
     /* Every other term may be zero. */
-    is_short = !(size <= tolerance * first && before <= tolerance * first);
-    before = size;
+    is_short = !(is_small && was_small);
   } while (is_short && k < order);
   return is_short ? -k : k;
 }

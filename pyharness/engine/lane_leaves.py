@@ -208,7 +208,7 @@ def _set_values(tape: Structure) -> Iterator[str]:
         yield "void set_lane_values(reg *restrict a, const double *restrict c,"
         yield "                     const double *restrict d)\n{"
         yield "  const reg zero = {0.0};"
-        yield from kept_values([_of_registers(each) for each in lines], "reg")
+        yield from kept_values([_of_registers(each) for each in lines], [], "reg")
         yield "}"
 
 

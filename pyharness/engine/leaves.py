@@ -320,15 +320,20 @@ def _set_values(tape: Structure) -> Iterator[str]:
     """Yield the function that computes term 0 of all slots, if there is one."""
     if lines := first_values(tape):
         yield "void set_values(double *restrict a, const double *restrict c,"
-        yield "                const double *restrict d)\n{"
-        yield from kept_values(lines, "double")
+        yield "                const double *restrict d, double *restrict rates)\n{"
+        rates, _ = rates_of_term(tape)
+        yield from kept_values(lines, rates, "double")
+        yield from (f"  rates[{i}] = {each};" for i, each in enumerate(rates))
         yield "}"
 
 
-def kept_values(lines: list[str], number: str) -> Iterator[str]:
-    """Yield the statements that compute term 0 of results, of a C type, and store it."""
+def kept_values(lines: list[str], rates: list[str], number: str) -> Iterator[str]:
+    """Yield the statements that compute term 0 of results, of a C type, and store it.
+
+    They define all that `rates` read.
+    """
     results = [int(each[1 : each.index(" ")]) for each in lines]
-    for slot in slots_read([each.partition("=")[2] for each in lines]):
+    for slot in slots_read([each.partition("=")[2] for each in lines] + rates):
         if slot not in results:
             yield f"  const {number} z{slot} = {place(slot, '0')};"
     for slot, line in zip(results, lines, strict=True):

@@ -3,7 +3,7 @@
 
 #include "tape.h"
 
-enum { REGISTERS = AT_ONCE / IN_REGISTER, TOGETHER = 12 / REGISTERS };
+enum { REGISTERS = AT_ONCE / IN_REGISTER, FITTING = 12 / REGISTERS, TOGETHER = FITTING < 4 ? FITTING : 4 };
 
 /* Compute the sums of `count` unknowns, whose additions need not wait for each other. */
 static inline __attribute__((always_inline)) void add(const int count, const double *terms, int to_next_term,

@@ -20,21 +20,40 @@ module step_nodes
     end subroutine sum_at_nodes
   end interface
 
-  public :: AT_ONCE, parts_from, powers_of, sum_at_nodes
+  ! What is computed once for the nodes of all steps, without the first node, where the step begins.
+  type, public :: nodes_t
+    real(dp) :: parts(AT_ONCE)  !! of the step
+    real(dp) :: powers(AT_ONCE) !! of the parts: the truncation error's share there
+    !! Weights of the errors and their rates at the ends, for Hermite's cubic, and of the rates of
+    !! an angle and their changes, for its integral.
+    real(dp) :: values(AT_ONCE, 4), integrals(AT_ONCE, 4)
+  end type nodes_t
+
+  public :: AT_ONCE, nodes_of, powers_of, sum_at_nodes
 
 contains
 
-  pure function parts_from(first, nodes) result(parts)
-    !! Return the nodes from number `first` on; the last is repeated.
-    integer, intent(in) :: first
-    real(dp), intent(in) :: nodes(:)
-    real(dp) :: parts(AT_ONCE)
-    integer :: i
+  pure function nodes_of(parts, order) result(found)
+    !! Compute the weights for nodes of steps whose series have the order.
+    real(dp), intent(in) :: parts(AT_ONCE)
+    integer, intent(in) :: order
+    type(nodes_t) :: found
+    real(dp) :: to_go(AT_ONCE), cube(AT_ONCE), fourth(AT_ONCE)
 
-    do i = 1, AT_ONCE
-      parts(i) = nodes(min(first + i - 1, size(nodes)))
-    end do
-  end function parts_from
+    to_go = 1.0_dp - parts
+    cube = parts*parts*parts
+    fourth = parts*cube
+    found%parts = parts
+    found%powers = powers_of(parts, order + 1)
+    found%values(:, 1) = (to_go*to_go)*(1.0_dp + 2.0_dp*parts)
+    found%values(:, 2) = (to_go*to_go)*parts
+    found%values(:, 3) = (parts*parts)*(1.0_dp + 2.0_dp*to_go)
+    found%values(:, 4) = -(parts*parts)*to_go
+    found%integrals(:, 1) = parts - cube + 0.5_dp*fourth
+    found%integrals(:, 2) = 0.5_dp*parts*parts - 2.0_dp/3.0_dp*cube + 0.25_dp*fourth
+    found%integrals(:, 3) = cube - 0.5_dp*fourth
+    found%integrals(:, 4) = 0.25_dp*fourth - cube/3.0_dp
+  end function nodes_of
 
   pure function powers_of(x, exponent) result(powers)
     !! Return whole powers, each by the same products as if computed alone.

@@ -7,7 +7,7 @@ module tape_march
   use kinds, only: dp
   use problem, only: request_t, solution_t
   use statuses, only: COMPLETE, INTERRUPTED, OVERFLOW, SLIDING
-  use step_nodes, only: AT_ONCE, parts_from, powers_of, sum_at_nodes
+  use step_nodes, only: AT_ONCE, powers_of, sum_at_nodes
   use step_limit, only: check_steps, limit_of, step_limit_t
   use tape, only: FIRST_UNKNOWN, next_break, tape_arrays_t, tape_t, TIME_SLOT
   use tape_growth, only: begin, close_block, count_step, find_growth, MOST_UNKNOWNS, transitions_t
@@ -803,15 +803,20 @@ contains
     subroutine add_nodes()
       !! Compute the unknowns at the nodes of the step, as `evaluate` and `correct`, side by side.
       real(dp) :: parts(AT_ONCE), powers(AT_ONCE), errors(AT_ONCE, n)
-      real(dp) :: changes(AT_ONCE, n), sizes(AT_ONCE), low
-      integer :: first, i, k, lane
+      real(dp) :: changes(AT_ONCE, n), sizes(AT_ONCE), value(AT_ONCE)
+      integer :: i, k
 
       solution%n_steps = solution%n_steps + 1
       if (solution%n_steps >= size(solution%ends)) return
-      solution%ends(solution%n_steps + 1) = t_next(1)
-      do first = 1, size(solution%nodes), AT_ONCE
-        parts = factor*parts_from(first, solution%nodes)
-        powers = powers_of(parts/factor, s%order + 1)
+      associate (at_nodes => solution%at_nodes(:, :, solution%n_steps))
+        solution%ends(solution%n_steps + 1) = t_next(1)
+        if (solution%n_steps > 1) then
+          at_nodes(:, 1) = solution%at_nodes(:, 1 + AT_ONCE, solution%n_steps - 1)
+        else
+          at_nodes(:, 1) = y
+        end if
+        parts = factor*solution%nodes(2:)
+        powers = powers_of(solution%nodes(2:), s%order + 1)
         sizes = 0.0_dp
         call sum_at_nodes(s%a(:, FIRST_UNKNOWN:FIRST_UNKNOWN - 1 + n), n*(LAST_TERM + 1), 1, &
                           LAST_TERM + 1, n, s%order, parts, changes)
@@ -823,15 +828,17 @@ contains
           errors(:, i) = errors(:, i) - powers*left(i)
           sizes = max(sizes, weights(i)*abs(errors(:, i)))
         end do
-        do k = first, min(first + AT_ONCE - 1, size(solution%nodes))
-          lane = k - first + 1
-          if (.not. sizes(lane) <= found%error) found%error = sizes(lane)
-          do i = 1, n
-            low = y_low(i) + changes(lane, i)
-            if (sizes(lane) <= min(LINEAR_RANGE, request%tolerance)) low = low - errors(lane, i)
-            solution%at_nodes(i, k, solution%n_steps) = y(i) + low
+        do i = 1, n
+          value = y_low(i) + changes(:, i)
+          value = y(i) + merge(value - errors(:, i), value, &
+                               sizes <= min(LINEAR_RANGE, request%tolerance))
+          do k = 1, AT_ONCE
+            at_nodes(i, 1 + k) = value(k)
           end do
         end do
+      end associate
+      do k = 1, AT_ONCE
+        if (.not. sizes(k) <= found%error) found%error = sizes(k)
       end do
     end subroutine add_nodes
 

@@ -5,7 +5,7 @@ module taylor_attitude
   use, intrinsic :: iso_c_binding, only: c_int
   use kinds, only: dp
   use series, only: MOST_ORDER
-  use step_nodes, only: AT_ONCE, powers_of
+  use step_nodes, only: AT_ONCE, nodes_t
   use taylor_error, only: rise, take_thirds
   use taylor_series, only: expand, MORE_TURNS, series_t
   use two_words, only: two_sum
@@ -173,25 +173,21 @@ contains
     row = row/sqrt(dot_product(row, row))
   end subroutine add_attitude_row
 
-  pure subroutine add_attitudes(small, order, parts, known, now, rows)
+  pure subroutine add_attitudes(small, nodes, known, now, rows)
     !! Compute attitudes within the step, as `add_attitude_row`, side by side.
     real(dp), intent(in) :: small(AT_ONCE, 4) !! added to the attitude
-    integer, intent(in) :: order
-    real(dp), intent(in) :: parts(AT_ONCE)
+    type(nodes_t), intent(in) :: nodes
     real(dp), intent(in) :: known             !! largest error that may be subtracted, rad
     type(attitude_t), intent(inout) :: now
     real(dp), intent(out) :: rows(:, :)
     real(dp) :: turns(3, 4), v(AT_ONCE, 3), q(AT_ONCE, 4), r(AT_ONCE, 4)
-    real(dp) :: cube(AT_ONCE), fourth(AT_ONCE), powers(AT_ONCE), sizes(AT_ONCE), norms(AT_ONCE)
+    real(dp) :: sizes(AT_ONCE), norms(AT_ONCE)
     integer :: i, k
 
     turns(:, 1) = in_space(now%ends(:, 1), now%rates(:, 1))
     turns(:, 2) = in_space(now%ends(:, 1), now%slopes(:, 1))
     turns(:, 3) = in_space(now%ends(:, 2), now%rates(:, 2))
     turns(:, 4) = in_space(now%ends(:, 2), now%slopes(:, 2))
-    cube = parts*parts*parts
-    fourth = parts*cube
-    powers = powers_of(parts, order + 1)
     do i = 1, 4
       q(:, i) = now%q(i) + small(:, i)
     end do
@@ -201,10 +197,10 @@ contains
       v(:, 3) = p(4)*q(:, 1) - p(1)*q(:, 4) + p(3)*q(:, 2) - p(2)*q(:, 3)
     end associate
     do i = 1, 3
-      v(:, i) = now%before(i) + (parts - cube + 0.5_dp*fourth)*turns(i, 1) &
-                + (0.5_dp*parts*parts - 2.0_dp/3.0_dp*cube + 0.25_dp*fourth)*turns(i, 2) &
-                + (cube - 0.5_dp*fourth)*turns(i, 3) &
-                + (0.25_dp*fourth - cube/3.0_dp)*turns(i, 4) - powers*v(:, i)
+      v(:, i) = now%before(i) &
+                + (nodes%integrals(:, 1)*turns(i, 1) + nodes%integrals(:, 2)*turns(i, 2)) &
+                + (nodes%integrals(:, 3)*turns(i, 3) + nodes%integrals(:, 4)*turns(i, 4)) &
+                - nodes%powers*v(:, i)
     end do
     sizes = 2.0_dp*sqrt(v(:, 1)*v(:, 1) + v(:, 2)*v(:, 2) + v(:, 3)*v(:, 3))
     r(:, 1) = -(v(:, 1)*q(:, 2) + v(:, 2)*q(:, 3) + v(:, 3)*q(:, 4))
@@ -212,14 +208,17 @@ contains
     r(:, 3) = v(:, 2)*q(:, 1) + v(:, 3)*q(:, 2) - v(:, 1)*q(:, 4)
     r(:, 4) = v(:, 3)*q(:, 1) + v(:, 1)*q(:, 3) - v(:, 2)*q(:, 2)
     do i = 1, 4
-      where (sizes <= known) q(:, i) = now%q(i) + (small(:, i) - r(:, i))
+      q(:, i) = merge(now%q(i) + (small(:, i) - r(:, i)), q(:, i), sizes <= known)
     end do
-    norms = sqrt(q(:, 1)*q(:, 1) + q(:, 2)*q(:, 2) + q(:, 3)*q(:, 3) + q(:, 4)*q(:, 4))
-    do k = 1, size(rows, 2)
-      if (.not. sizes(k) <= now%worst) now%worst = sizes(k)
-      do i = 1, 4
-        rows(i, k) = q(k, i)/norms(k)
+    norms = 1.0_dp/sqrt(q(:, 1)*q(:, 1) + q(:, 2)*q(:, 2) + q(:, 3)*q(:, 3) + q(:, 4)*q(:, 4))
+    do i = 1, 4
+      q(:, i) = q(:, i)*norms
+      do k = 1, AT_ONCE
+        rows(i, k) = q(k, i)
       end do
+    end do
+    do k = 1, AT_ONCE
+      if (.not. sizes(k) <= now%worst) now%worst = sizes(k)
     end do
   end subroutine add_attitudes
 

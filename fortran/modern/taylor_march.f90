@@ -10,6 +10,7 @@ module taylor_march
   use taylor_attitude, only: begin_attitude, expand_both, turn_error, turn_on
   use taylor_error, only: begin, count_step, estimate_truncation, &
                           estimate_truncation_from_rest, growths_of, likely_remainder
+  use step_nodes, only: nodes_of
   use taylor_plan, only: order_of_variations, plan
   use taylor_rows, only: add_last_row, add_nodes, add_rows, outcome_t, room_t, state_t
   use taylor_series, only: expand, fitting, predict_step, propagate_precisely, &
@@ -115,6 +116,7 @@ contains
                     0.0_dp, 0.0_dp, 0)
       call plan(problem, now%scale, attempt%tolerance, rest, with_attitude, order, &
                 local_tolerance, h)
+      if (associated(solution%nodes)) room%nodes = nodes_of(solution%nodes(2:), order)
       found%finest = local_tolerance <= LEAST_LOCAL_TOLERANCE
       part = 65536/order
       coupling = coupling_of(problem%coefficients)

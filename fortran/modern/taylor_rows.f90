@@ -6,7 +6,7 @@ module taylor_rows
   use kinds, only: dp
   use problem, only: request_t, solution_t
   use statuses, only: INTERRUPTED, OVERFLOW
-  use step_nodes, only: AT_ONCE, parts_from, powers_of, sum_at_nodes
+  use step_nodes, only: AT_ONCE, nodes_t, sum_at_nodes
   use taylor_attitude, only: add_attitude_row, add_attitudes, attitude_t
   use taylor_error, only: blocks_t, rise
   use taylor_series, only: evaluate, series_t
@@ -36,6 +36,7 @@ module taylor_rows
     type(blocks_t) :: blocks
     type(state_t) :: now
     type(attitude_t) :: attitude
+    type(nodes_t) :: nodes !! where the solution is requested in each step
   end type room_t
 
   ! The outcome of an integration, beside its rows and status.
@@ -112,60 +113,62 @@ contains
     real(dp), intent(in) :: tolerance
     type(solution_t), intent(inout) :: solution
     real(dp) :: ends(3, 4)
-    real(dp) :: parts(AT_ONCE), changes(AT_ONCE, 4)
-    integer :: first, i, n
+    real(dp) :: changes(AT_ONCE, 4)
+    integer :: i
 
     solution%n_steps = solution%n_steps + 1
     if (solution%n_steps >= size(solution%ends)) return
-    associate (s => room%s, now => room%now)
-      solution%ends(solution%n_steps + 1) = now%t + (now%t_low + h)
+    associate (s => room%s, now => room%now, n => solution%n_steps, parts => room%nodes%parts, &
+               at_nodes => solution%at_nodes)
+      solution%ends(n + 1) = now%t + (now%t_low + h)
+      if (n > 1) then
+        at_nodes(:, 1, n) = at_nodes(:, 1 + AT_ONCE, n - 1)
+      else
+        at_nodes(:3, 1, 1) = now%w(:3)
+        if (associated(solution%attitudes)) at_nodes(4:, 1, 1) = solution%attitudes(:, 0)
+      end if
       ends = errors_at_ends(s, now, before, left)
-      do first = 1, size(solution%nodes), AT_ONCE
-        n = min(AT_ONCE, size(solution%nodes) - first + 1)
-        parts = parts_from(first, solution%nodes)
-        call sum_at_nodes(s%terms, 4*(order + 1), 4, 1, 3, order, parts, changes(:, :3))
-        call add_states(now, order, parts, changes(:, :3), ends, left, tolerance, &
-                        solution%at_nodes(:3, first:first + n - 1, solution%n_steps))
-        if (.not. associated(solution%attitudes)) cycle
-        call sum_at_nodes(s%turns, 4*(order + 1), 4, 1, 4, order, parts, changes)
-        do i = 1, 4
-          changes(:, i) = room%attitude%q_low(i) + changes(:, i)
-        end do
-        call add_attitudes(changes, order, parts, min(LINEAR, tolerance), room%attitude, &
-                           solution%at_nodes(4:7, first:first + n - 1, solution%n_steps))
+      call sum_at_nodes(s%terms, 4*(order + 1), 4, 1, 3, order, parts, changes(:, :3))
+      call add_states(now, room%nodes, changes(:, :3), ends, left, tolerance, at_nodes(:3, 2:, n))
+      if (.not. associated(solution%attitudes)) return
+      call sum_at_nodes(s%turns, 4*(order + 1), 4, 1, 4, order, parts, changes)
+      do i = 1, 4
+        changes(:, i) = room%attitude%q_low(i) + changes(:, i)
       end do
+      call add_attitudes(changes, room%nodes, min(LINEAR, tolerance), room%attitude, &
+                         at_nodes(4:7, 2:, n))
     end associate
   end subroutine add_nodes
 
-  pure subroutine add_states(now, order, parts, changes, ends, left, tolerance, rows)
+  pure subroutine add_states(now, nodes, changes, ends, left, tolerance, rows)
     !! Compute omega within the step, as `add_row_within`, side by side.
     type(state_t), intent(inout) :: now
-    integer, intent(in) :: order
-    real(dp), intent(in) :: parts(AT_ONCE)      !! of the step
+    type(nodes_t), intent(in) :: nodes
     real(dp), intent(in) :: changes(AT_ONCE, 3) !! from its beginning, rad/s
     real(dp), intent(in) :: ends(3, 4)          !! of errors_at_ends
     real(dp), intent(in) :: left(3)
     real(dp), intent(in) :: tolerance
     real(dp), intent(out) :: rows(:, :)         !! rad/s
-    real(dp) :: to_go(AT_ONCE), powers(AT_ONCE), sizes(AT_ONCE), errors(AT_ONCE, 3), small
+    real(dp) :: sizes(AT_ONCE), errors(AT_ONCE, 3), omega(AT_ONCE)
     integer :: i, k
 
-    to_go = 1.0_dp - parts
-    powers = powers_of(parts, order + 1)
     sizes = 0.0_dp
     do i = 1, 3
-      errors(:, i) = &
-        (to_go*to_go)*((1.0_dp + 2.0_dp*parts)*ends(i, 1) + parts*ends(i, 2)) &
-        + (parts*parts)*((1.0_dp + 2.0_dp*to_go)*ends(i, 3) - to_go*ends(i, 4)) - powers*left(i)
+      errors(:, i) = (nodes%values(:, 1)*ends(i, 1) + nodes%values(:, 2)*ends(i, 2)) &
+                     + (nodes%values(:, 3)*ends(i, 3) + nodes%values(:, 4)*ends(i, 4)) &
+                     - nodes%powers*left(i)
       sizes = max(sizes, abs(errors(:, i)))
     end do
-    do k = 1, size(rows, 2)
-      if (.not. sizes(k) <= now%worst) now%worst = sizes(k)
-      do i = 1, 3
-        small = now%w_low(i) + changes(k, i)
-        if (sizes(k) <= min(LINEAR, tolerance)*now%scale) small = small - errors(k, i)
-        rows(i, k) = now%w(i) + small
+    do i = 1, 3
+      omega = now%w_low(i) + changes(:, i)
+      omega = now%w(i) + merge(omega - errors(:, i), omega, &
+                               sizes <= min(LINEAR, tolerance)*now%scale)
+      do k = 1, AT_ONCE
+        rows(i, k) = omega(k)
       end do
+    end do
+    do k = 1, AT_ONCE
+      if (.not. sizes(k) <= now%worst) now%worst = sizes(k)
     end do
   end subroutine add_states
 

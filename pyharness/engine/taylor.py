@@ -74,7 +74,9 @@ def taylor(
     if is_tape and ended in ("sliding", "sensitive"):
         more["reason"] = reason_of(ended, work[1], int(work[5]))
     if 0 < kept <= most and ended in WITH_ALL_ROWS:
-        edges, values = ends[: kept + 1].copy(), at_nodes[:, :, :kept].T.copy()
+        edges, values = ends[: kept + 1].copy(), at_nodes[:, :, :kept].T
+        # A few steps must not hold the memory of many.
+        values = values.copy() if kept < most // 16 else values
         if times[-1] < 0.0:
             edges, values = edges[::-1], values[::-1, ::-1]
         more["sol"] = steps_output(scene, Pieces(edges, values))

@@ -85,7 +85,7 @@ class Storage:
     LANE_TERMS = 28  # terms of a slot of many bodies
     PERTURBATION_LENGTH = 29  # terms of a perturbation
     MOST_UNKNOWNS = 15
-    AT_ONCE = 24  # nodes of a step, which are evaluated together
+    AT_ONCE = 16  # nodes of a step but the first, which are evaluated together
 
 
 class Operations:

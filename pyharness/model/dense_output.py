@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.model.array_type import Array
+from pyharness.model.codes import Storage
 from pyharness.model.errors import InputError
 
 
@@ -40,7 +41,7 @@ def nodes(low: Array, high: Array, at: Array) -> Array:
     return found
 
 
-NODES = 17  # of a polynomial
+NODES = Storage.AT_ONCE + 1  # of a polynomial
 POINTS = points(NODES)
 TO_COEFFICIENTS = to_coefficients(NODES)
 _BLOCK = 20_000  # times that are evaluated together; limits the memory

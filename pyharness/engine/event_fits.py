@@ -11,7 +11,15 @@ from functools import cached_property
 import numpy as np
 
 from pyharness.engine.event_functions import EventFunction
-from pyharness.engine.event_roots import POINTS, TO_COEFFICIENTS, Fits, Index, Roots, together, transformed
+from pyharness.engine.event_roots import (
+    POINTS,
+    TO_COEFFICIENTS,
+    Fits,
+    Index,
+    Roots,
+    together,
+    transformed,
+)
 from pyharness.model import dense_output
 from pyharness.model.array_type import Array
 from pyharness.model.dense_output import DenseOutput, Pieces, nodes, sizes_of

@@ -95,11 +95,11 @@ contains
     real(dp) :: unit(ROWS, MOST_UNKNOWNS), open_block(ROWS, MOST_UNKNOWNS)
     integer :: i, m
 
-    unit = 0.0_dp
-    do i = 1, MOST_UNKNOWNS
-      unit(i, i) = 1.0_dp
-    end do
     associate (n => transitions%n)
+      unit(:, :n) = 0.0_dp
+      do i = 1, n
+        unit(i, i) = 1.0_dp
+      end do
       open_block(:, :n) = padded(n, matrix)
       growth = 1.0_dp
       blur = 0.0_dp

@@ -107,8 +107,6 @@ static inline lanes select_of(bits mask, lanes a, lanes b)
   return (lanes)(((bits)a & mask) | ((bits)b & ~mask));
 }
 static inline lanes absolute(lanes x) { return (lanes)((bits)x & 0x7fffffffffffffffLL); }
-static inline lanes larger(lanes a, lanes b) { return select_of(a > b, a, b); }
-static inline lanes smaller(lanes a, lanes b) { return select_of(a < b, a, b); }
 
 static inline lanes each_of(double (*function)(double), lanes x)
 {
@@ -493,15 +491,23 @@ static void set_jacobian(struct group *g, lanes factor, lanes jacobian[][WITH_AT
   }
 }
 
+static lanes power_of(lanes x, int exponent)
+{
+  lanes power = all_of(1.0);
+  for (; exponent > 0; exponent /= 2, x *= x)
+    if (exponent % 2) power *= x;
+  return power;
+}
+
 /* Return the truncation error of each unknown, as estimate_truncation in tape_march.f90. */
 static void set_truncation(const struct group *g, lanes factor, lanes *left)
 {
   const int order = g->order;
-  lanes uu = {0.0}, vv = {0.0}, uv = {0.0}, ux = {0.0}, vx = {0.0}, power = all_of(1.0);
-  for (int k = 0; k < order - 3; k++) power *= factor;
+  lanes uu = {0.0}, vv = {0.0}, uv = {0.0}, ux = {0.0}, vx = {0.0};
+  const lanes power = power_of(factor, order - 3), per_local = 1.0 / g->local;
   const lanes second = power * factor, third = second * factor, fourth = third * factor;
   for (int i = 0; i < g->n; i++) {
-    const lanes *a = g->a[FIRST_UNKNOWN + i] + order, weight = g->weights[i] / g->local;
+    const lanes *a = g->a[FIRST_UNKNOWN + i] + order, weight = g->weights[i] * per_local;
     const lanes x1 = weight * power * a[-3], x2 = weight * second * a[-2];
     const lanes x3 = weight * third * a[-1], x4 = weight * fourth * a[0];
     uu += x3 * x3 + x2 * x2;
@@ -516,8 +522,9 @@ static void set_truncation(const struct group *g, lanes factor, lanes *left)
   lanes determinant = larger((uu * vv - uv * uv - p) + q, absolute(p - q));
   /* A series that converges has no poles within the step, or nearly within. */
   determinant = larger(larger(determinant, absolute(q)), all_of(LEAST));
-  p = (p - q) / determinant;
-  q = q / determinant;
+  determinant = 1.0 / determinant;
+  p = (p - q) * determinant;
+  q = q * determinant;
   for (int i = 0; i < g->n; i++) {
     const lanes *a = g->a[FIRST_UNKNOWN + i] + order;
     left[i] = p * (a[0] * fourth) - q * (a[-1] * third);
@@ -662,7 +669,7 @@ static void step(struct group *g)
   }
   factor = converged(g, factor);
   set_jacobian(g, factor, jacobian);
-  for (int j = 0; j < n; j++) size[j] = 1.0 / g->weights[j];
+  for (int j = 0; j < n; j++) size[j] = j < 3 ? g->scale : all_of(0.5);
   for (int i = 0; i < n; i++) {
     lanes row = {0.0};
     for (int j = 0; j < n; j++) row += absolute(jacobian[i][j]) * size[j];

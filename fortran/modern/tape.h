@@ -37,6 +37,21 @@ static inline int any(reg_bits mask)
 #endif
 }
 
+/* Return the larger number in each lane; the second if one is NaN. */
+static inline reg larger(reg a, reg b)
+{
+#if defined(__AVX512F__)
+  return (reg)_mm512_max_pd((__m512d)a, (__m512d)b);
+#elif defined(__AVX__)
+  return (reg)_mm256_max_pd((__m256d)a, (__m256d)b);
+#else
+  const reg_bits is_larger = a > b;
+  return (reg)(((reg_bits)a & is_larger) | ((reg_bits)b & ~is_larger));
+#endif
+}
+/* Return the smaller number in each lane; the second if one is NaN. */
+static inline reg smaller(reg a, reg b) { return -larger(-a, -b); }
+
 enum { WITH_ATTITUDE = 7 }; /* number of unknowns */
 enum { FIRST_UNKNOWN = 1 }; /* the slot of omega's first component, from 0 */
 enum { N_INPUTS = 8 };      /* time, omega and attitude; parameters follow */

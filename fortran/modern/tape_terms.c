@@ -396,7 +396,7 @@ static void perturb(const struct tape *tape, double h, int k)
 }
 
 /* Return the larger of two numbers in each lane; NaN in the second is not lost. */
-static inline lanes larger(lanes first, lanes second)
+static inline lanes larger_lanes(lanes first, lanes second)
 {
   const bits is_smaller = second <= first;
   return (lanes)(((bits)first & is_smaller) | ((bits)second & ~is_smaller));
@@ -418,7 +418,7 @@ static inline lanes largest_terms(const struct tape *tape, int k, const double *
   lanes most = {0.0};
   for (int i = 0; i < tape->n_unknowns; i++) {
     const lanes x = (lanes)((bits)loaded(perturbations_of(tape)[FIRST_UNKNOWN + i][k]) & magnitude);
-    most = larger(most, weights[i] * units * x);
+    most = larger_lanes(most, weights[i] * units * x);
   }
   return most;
 }
@@ -679,8 +679,8 @@ static int suffice(const lanes *terms, int last, double factor, lanes size, doub
   for (int k = 0; k <= last; k++, power *= factor) {
     const lanes term = power * terms[k];
     size = begun(size, term);
-    largest = larger(largest, term);
-    if (k > last - SMALL_TERMS) tail = larger(tail, term);
+    largest = larger_lanes(largest, term);
+    if (k > last - SMALL_TERMS) tail = larger_lanes(tail, term);
   }
   return all_below(tail, tolerance * size) && all_below(largest, MOST_CANCELLED * size);
 }
@@ -710,14 +710,14 @@ double OF_LEVEL(vary_tape, LEVEL)(struct block *block, double h, int order, doub
   /* The largest part of any later term that does not depend on the derivatives. */
   beyond[order + 1] = zero;
   for (int j = order; j > 0; j--)
-    beyond[j] = larger(beyond[j + 1], powers[j] * largest_terms(tape, j, weights, one));
+    beyond[j] = larger_lanes(beyond[j + 1], powers[j] * largest_terms(tape, j, weights, one));
   for (;; k++) {
     if (k > 0) perturb(tape, h, k - 1);
     sizes[k] = largest_terms(tape, k, weights, one);
     const lanes term = powers[k] * sizes[k];
     size = begun(size, term);
     /* One or two terms may be zero between others. */
-    small = all_below(larger(term, beyond[k + 1]), tolerance * size) ? small + 1 : 0;
+    small = all_below(larger_lanes(term, beyond[k + 1]), tolerance * size) ? small + 1 : 0;
     if (small == SMALL_TERMS || k == order) break;
   }
   block->last_term = k;

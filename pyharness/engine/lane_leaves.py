@@ -127,7 +127,7 @@ def _in_lanes(text: str) -> str:
         "const double t": "const reg t",
         "halved(": "half_in_lanes(",
         "slope_of_root(": "root_slope_in_lanes(",
-        "slope_at_root(": "root_slope_in_lanes(",
+        "slope_at_root(": "0.5/(",
         "root_of(": "root_in_lanes(",
         "= 0.0;": "= {0.0};",
     }.items():

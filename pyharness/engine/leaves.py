@@ -366,13 +366,15 @@ def roundings(tape: Structure) -> tuple[list[str], list[str]]:
             slopes = {out: [*zip((x, y), rule.slopes, strict=False)]}
             if rule.second:
                 slopes[out + 1] = [(x, rule.second)]
+            # An angle proportional to time has no rounding error.
+            is_exact = rule is OPERATIONS[_WAVE]
             texts = {
                 slot: " + ".join(
                     [_written(rule.rounding, operation).replace(f"z{out}", f"z{slot}")]
                     + [
                         f"size({_written(of.replace('m_', 'z_'), operation)})*e{operand}"
                         for operand, of in each
-                        if operand in known
+                        if operand in known and not is_exact
                     ]
                 ).replace("slope_of_root", "slope_at_root")
                 for slot, each in slopes.items()

@@ -8,6 +8,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -21,6 +22,7 @@ from pyharness.engine import leaf_cache
 from pyharness.engine.lane_leaves import whole_source
 from pyharness.engine.leaves import structure
 from pyharness.engine.recorded import kernel_tape, listing, system_of, taylor_step
+from pyharness.model.codes import Statuses
 from pyharness.model.constant_body import with_constant_body
 from pyharness.model.extension import extension
 from pyharness.model.principal import principal
@@ -107,6 +109,7 @@ ROUNDED = {
     "exponentials": lambda t, w: 5.0 * np.exp(-w[::-1]) - 2.0 * w,
     "tangents": lambda t, w: 5.0 * np.tanh(w[::-1]) - 2.0 * w - 5.0 * np.arctan(w - 1.0),
     "sines": lambda t, w: 5.0 * np.sin(w[::-1]) - 2.0 * w + 5.0 * np.cos(w),
+    "waves": lambda t, w: 9.0 * np.sin(50.0 * t) * w[::-1] + np.cos(40.0 * t) - 2.0 * w,
 }
 
 
@@ -125,6 +128,24 @@ def test_rounding_errors_are_those_of_the_interpreter(name: str) -> None:
         assert found.has_result.all()
         errors.append([solver.error, *found.error])
     assert errors[1] == pytest.approx(errors[0], rel=1e-3, abs=0.0)
+
+
+def test_a_root_of_a_rounded_zero_is_not_known() -> None:
+    total = 0.7
+    first = next(
+        x
+        for x in np.linspace(0.1, 0.2, 1000)
+        if Fraction(x) - Fraction(total) - Fraction(x - total) > Fraction(4, 10**17)
+    )
+    omega = (first, total - first, 0.5)
+
+    def torque(t: Any, w: Any) -> Any:
+        return [0.0, 0.0, np.sqrt(w[0] + w[1] - total)]
+
+    scene = Scene("root", omega, (1.0, 1.0, 1.0), torque=torque)
+    for compiled in (False, True):
+        found = solve_many(scene, 100.0, omega=[omega] * 3, tolerance=1e-9, compiled=compiled)
+        assert (found.status == Statuses.SENSITIVE).all()
 
 
 @pytest.mark.parametrize("attitude", [None, (1.0, 0.2, 0.3, 0.4)])

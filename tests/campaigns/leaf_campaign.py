@@ -3,7 +3,7 @@
 The command is ``python -m tests.campaigns.leaf_campaign COUNT SEED [FIRST]``. Both compute the
 terms of the Taylor series in one step. The terms of an unknown may differ by 4 units in the last
 place of its largest term or, if larger, of the step times the summands of its derivative. Five
-bodies side by side may differ by the sum of their estimated errors.
+bodies side by side may differ by the sum of their estimated errors, and these by a tenth.
 """
 
 import sys
@@ -34,6 +34,7 @@ from tests.campaigns import driver
 from tests.campaigns.driver import Tally
 
 _UNITS = 4.0
+_CHANGED = 0.1  # relative change of an estimated error
 _LEAVES = 7  # the place of the address of leaves in a tape's array
 
 
@@ -96,6 +97,8 @@ def compare_many(tally: Tally, scene: Scene, time: float, source: Random) -> Non
         allowed = max(tolerance, 4e-15 * found[0].growth[k])
         tally.judge("many, tolerances", apart[k] / allowed, 1.0, f", {scene.name}")
         tally.judge("many, errors", apart[k] / (errors[0] + errors[1])[k], 1.0, f", {scene.name}")
+        changed = abs(errors[1][k] / errors[0][k] - 1.0)
+        tally.judge("many, estimates", changed, _CHANGED, f", {scene.name}")
 
 
 if __name__ == "__main__":

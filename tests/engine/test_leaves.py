@@ -122,7 +122,7 @@ def test_rounding_errors_are_those_of_the_interpreter(name: str) -> None:
         solver = prepare(scene, tolerance=1e-14, compiled=compiled)
         solver(scene.omega, 3.0)
         omega = start_many(scene, 5)
-        found = solve_many(
+        found: Any = solve_many(
             scene, 3.0, omega=omega, tolerance=1e-12, estimates=True, compiled=compiled
         )
         assert found.has_result.all()

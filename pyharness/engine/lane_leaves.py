@@ -16,10 +16,10 @@ from pyharness.engine.leaves import (
     first_values,
     kept_values,
     names,
+    noises,
     place,
     rates_of_term,
     recurrences,
-    roundings,
     slots_read,
     source,
     unknowns_of,
@@ -217,12 +217,7 @@ def _set_noise(tape: Structure) -> Iterator[str]:
     yield "void set_lane_noise(const reg *restrict a, const double *restrict c,"
     yield "                    const double *restrict d, reg *restrict noise)\n{"
     yield "  const reg zero = {0.0};"
-    lines, rates = roundings(tape)
-    for slot in slots_read(lines + rates):
-        yield f"  const reg z{slot} = {place(slot, '0')};"
-    yield from (f"  const reg {_of_registers(each)};" for each in lines)
-    for i, each in enumerate(rates):
-        yield f"  noise[{i}] = {_of_registers(f'= {each}')[2:]};"
+    yield from noises(tape, "reg", _of_registers)
     yield "}"
 
 

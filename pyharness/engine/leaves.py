@@ -1,13 +1,11 @@
-"""Compiled leaves: C code for values, series, Jacobian and rounding errors of a tape.
-
-A tape is a list of recorded operations.
+"""Compiled leaves: C code for values, series, Jacobian and rounding errors of recorded operations.
 
 They replace the interpreter, fortran/modern/tape_terms.c. Numerical coefficients are read from
 memory, so that tapes that differ only in them share their leaves.
 """
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import lru_cache
 from hashlib import sha256
 from itertools import chain
@@ -70,7 +68,7 @@ class Operation(NamedTuple):
     value: str = ""  # of slot o at a node; without it the series is summed
     slopes: tuple[str, ...] = ()  # of slot o by x and by y
     second: str = ""  # slope of slot p by x, if another operation may read that slot
-    first: str = ""  # z_o; without it the interpreter computes it
+    first: str = ""  # z_o, if not as m_o; without both the interpreter computes it
     rounding: str = "2.0*size(z_o)"  # own, in units
 
 
@@ -83,11 +81,11 @@ _WAVE = -1  # sine and cosine of an angle proportional to time
 OPERATIONS = {
     Operations.PRODUCT: Operation(
         ("t_o = s0 + z_x*t_y + z_y*t_x",), ("xy",), "m_x*m_y", ("m_y", "m_x"),
-        first="z_x*z_y", rounding="size(z_o)",
+        rounding="size(z_o)",
     ),
     Operations.QUOTIENT: Operation(
         ("t_o = (t_x - s0 - t_y*z_o)/z_y",), ("yo",), "m_x/m_y", ("1.0/m_y", "-m_o/m_y"),
-        first="z_x/z_y", rounding="size(z_o)",
+        rounding="size(z_o)",
     ),
     # A root of 0, such as a norm at rest, is constant: its terms would be 0/0.
     Operations.SQRT: Operation(
@@ -310,7 +308,10 @@ def first_values(tape: Structure) -> list[str]:
     for operation in tape.operations:
         if operation[0] == Operations.LINEAR:
             text = combined(tape, operation[1], "z", is_value=True)
-        elif not (text := _written(_of(operation).first, operation)):
+        else:
+            rule = _of(operation)
+            text = _written(rule.first or rule.value.replace("m_", "z_"), operation)
+        if not text:
             return []
         lines.append(f"z{operation[3]} = {text}")
     return lines
@@ -341,7 +342,7 @@ def kept_values(lines: list[str], rates: list[str], number: str) -> Iterator[str
         yield f"  {place(slot, '0')} = z{slot};"
 
 
-def roundings(tape: Structure) -> tuple[list[str], list[str]]:
+def _roundings(tape: Structure) -> tuple[list[str], list[str]]:
     """Return definitions of the rounding errors of results, and those of the rates, in units.
 
     This is the running error analysis of `noise_of` in tape_series.f90.
@@ -388,12 +389,20 @@ def _set_noise(tape: Structure) -> Iterator[str]:
     """Yield the function that bounds the rounding errors of the rates."""
     yield "void set_noise(const double *restrict a, const double *restrict c,"
     yield "               const double *restrict d, double *restrict noise)\n{"
-    lines, rates = roundings(tape)
-    for slot in slots_read(lines + rates):
-        yield f"  const double z{slot} = {place(slot, '0')};"
-    yield from (f"  const double {each};" for each in lines)
-    yield from (f"  noise[{i}] = {each};" for i, each in enumerate(rates))
+    yield from noises(tape, "double", str)
     yield "}"
+
+
+def noises(tape: Structure, number: str, written: Callable[[str], str]) -> Iterator[str]:
+    """Yield the statements that bound the rounding errors of the rates, for a C type.
+
+    `written` translates a definition, such as "e9 = 2.0".
+    """
+    lines, rates = _roundings(tape)
+    for slot in slots_read(lines + rates):
+        yield f"  const {number} z{slot} = {place(slot, '0')};"
+    yield from (f"  const {number} {written(each)};" for each in lines)
+    yield from (f"  {written(f'noise[{i}] = {each}')};" for i, each in enumerate(rates))
 
 
 def derivatives(tape: Structure, count: int) -> tuple[list[str], list[dict[int, str]]]:

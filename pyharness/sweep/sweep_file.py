@@ -76,7 +76,7 @@ def _sweep(data: dict[str, Any], path: Path, text: str, claims: Mapping[str, Cla
         raise InputError(f"axis: {len(tables)} of them; allowed: up to {_MOST_AXES}")
     axes = tuple(axis_of(table, number) for number, table in enumerate(tables, 1))
     solver = _solver(data.get("solve", {}), axes)
-    _check_axes(axes, scene, solver)
+    _check_axes(axes, scene)
     entries = data.get("reductions", ["end", "status"])
     if not isinstance(entries, list) or not entries:
         raise InputError(f"reductions is {kind_of(entries)}; allowed: a list, not empty")
@@ -192,7 +192,7 @@ def _reduction(entry: object, claims: Mapping[str, Claim]) -> ReductionSpec:
     return ReductionSpec(title, name, tuple(given.items()), function)
 
 
-def _check_axes(axes: tuple[Axis, ...], scene: Scene, solver: Solver) -> None:
+def _check_axes(axes: tuple[Axis, ...], scene: Scene) -> None:
     fields = [axis.field for axis in axes]
     lengths: dict[str, Axis] = {}
     for axis in axes:
@@ -229,8 +229,6 @@ def _check_axes(axes: tuple[Axis, ...], scene: Scene, solver: Solver) -> None:
                 f"axis {field}: the omega of the scene is 0 and has no direction; give "
                 "another omega"
             )
-        if field == "lipschitz" and solver.program is None:
-            raise InputError(f"axis {field} has no meaning without a program")
 
 
 def _check_names(sweep: Sweep) -> None:

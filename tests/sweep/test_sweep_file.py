@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pyharness.model.errors import InputError
 from pyharness.model.scene_file import case_scene
 from pyharness.sweep.axes import axis_of
 from pyharness.sweep.batches import batches
@@ -161,3 +162,46 @@ def test_two_axes_of_one_seed_have_numbers_of_their_own() -> None:
         axis_of({**table, "field": f"omega.{axis}"}, 1).coordinates() for axis in (1, 2)
     )
     assert abs(np.corrcoef(first, second)[0, 1]) < 0.1
+
+
+CASE = "[scene]\ncase = 3\n"
+OMEGA = axis("omega.1", [1.0])
+PLACED = '[[axis]]\nfield = "omega.1"\n'
+DRAWN = PLACED + "draw = 'normal'\nmean = 0.0\ncount = 2\n"
+# The content of a sweep file, and a part of the message.
+REFUSED = {
+    f"name = 3\n{CASE}{OMEGA}": "name is a whole number; it must be text",
+    CASE + "".join(axis(f"constants.{n}", [1.0]) for n in range(40)): "axis: 40 of them",
+    f"reductions = []\n{CASE}{OMEGA}": "reductions is a list; allowed: a list, not empty",
+    f"scene = 3\n{OMEGA}": "scene is a whole number; it must be a table [scene]",
+    f"[scene]\ncase = 3\nfile = 'a.toml'\n{OMEGA}": "[scene]: allowed: case, or file, or",
+    f"[scene]\nfile = 3\n{OMEGA}": "[scene] file is a whole number; it must be text",
+    f"solve = 3\n{CASE}{OMEGA}": "solve is a whole number; it must be a table [solve]",
+    f"{CASE}[solve]\nmethod = 'rk4'\n{axis('method', ['rk4'])}": "[solve] method: it is given here",
+    f"{CASE}[solve]\nmethod = 3\n{OMEGA}": "[solve] method is a whole number; it must be text",
+    f"{CASE}[solve]\nprogram = 'two-term'\nlipschitz = -1\n{OMEGA}": "[solve] lipschitz is -1",
+    f"reductions = [3]\n{CASE}{OMEGA}": "reductions: allowed: names, and tables",
+    f"reductions = [{{name = 'end', of = 3}}]\n{CASE}{OMEGA}": "unknown parameter",
+    f"reductions = [{{name = 'end', as = '?'}}]\n{CASE}{OMEGA}": "reductions: end as: allowed",
+    f"{CASE}{OMEGA}{axis('omega.2', [1, 2])}dimension = 'omega.1'\n": "omega.1 has 1 values",
+    CASE + OMEGA + OMEGA: "omega.1: two axes vary this field; give one axis",
+    f"{CASE}{axis('lipschitz', [1.0])}": "lipschitz has no meaning without a program",
+    f"axis = 3\n{CASE}": "axis is missing; give at least one table [[axis]]",
+    f"axis = [3]\n{CASE}": "[[axis]] 1 is a whole number; it must be a table [[axis]]",
+    f"{CASE}{OMEGA}dimension = 3\n": "(omega.1): dimension must be text",
+    f"{CASE}{OMEGA}dimension = '.a'\n": "(omega.1): dimension '.a'; allowed: a name without '/'",
+    f'{CASE}[[axis]]\nfield = "method"\n': "(method): values is missing; give a list of names",
+    f"{CASE}{axis('method', [3])}": "(method): a whole number where a name belongs",
+    f"{CASE}{axis('method', ['rk4', 'rk4'])}": "(method): a name is given twice",
+    f"{CASE}{DRAWN}deviation = -1.0\nseed = 1\n": "(omega.1): deviation -1; allowed",
+    f"{CASE}{DRAWN}deviation = 1.0\nseed = -1\n": "(omega.1): seed is out of range; allowed",
+    f"{CASE}{DRAWN}deviation = 1.0\n": "(omega.1): seed is missing; give a whole number from 0",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("content", "message"), REFUSED.items(), ids=REFUSED.values())
+def test_what_a_sweep_file_may_not_say(tmp_path: Path, content: str, message: str) -> None:
+    with pytest.raises(InputError) as refused:
+        read_sweep(written(tmp_path, content))
+    assert message in str(refused.value)
+    assert "\n" not in str(refused.value)

@@ -1,5 +1,6 @@
 """The problems and contenders of `bench --terms`, for torques that depend on the state."""
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -21,6 +22,7 @@ from pyharness.bench.measure import Workload
 from pyharness.bench.peers import Formula, heyoka_maker, peers
 from pyharness.checks.scenes.random_scenes import text_generator
 from pyharness.engine import field_terms, terms
+from pyharness.engine.solver import prepare
 from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.values import Triple
@@ -224,6 +226,13 @@ def term_methods(compiled: bool = False) -> list[SceneContender]:
     own = (each for each in list_own_contenders() if each.name == OURS)
     prepare = partial(prepared_maker, OURS, compiled=compiled)
     return [replace(each, prepare=prepare, settings=_TOLERANCES[:-1]) for each in own]
+
+
+def term_leaves(scenes: Sequence[TermScene], compiled: bool) -> Counter[str]:
+    """Return what computes the Taylor terms of single bodies (`Solver.leaves`), by torques."""
+    own: Any = partial(prepare, compiled=compiled)
+    solvers = [own(each.scene, attitude=each.scene.attitude is not None) for each in scenes]
+    return Counter(str(each.leaves) for each in solvers)
 
 
 def term_peers(scenes: Sequence[TermScene]) -> list[SceneContender]:

@@ -6,7 +6,7 @@ A ratio is heyoka's run time divided by our run time, at equal error.
 import statistics
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from operator import attrgetter
 from typing import Any
@@ -52,6 +52,7 @@ class Terms:
 
     single: Finding
     many: Rates
+    leaves: Counter[str] = field(default_factory=Counter)  # numbers of torques by `Solver.leaves`
 
 
 @dataclass(frozen=True)
@@ -219,6 +220,8 @@ def _notes(found: Terms) -> list[str]:
         "the largest |omega| at 0 and T, or the angle between the attitudes (rad) if it is larger. "
         "prepare: time of the first prepare(), ms."
     ]
+    if found.leaves:
+        lines.append(f"Taylor terms of single bodies: {_counted(found.leaves)}.")
     if _has(found, HEYOKA):
         lines.append(
             "ratio: heyoka's time / ours at the same error, above 1: ours is faster. heyoka's "
@@ -248,8 +251,11 @@ def _notes(found: Terms) -> list[str]:
 
 def _batches(rates: Rates) -> str:
     counts = Counter(row.note for row in rates.rows if row.method == MANY_HEYOKA)
-    told = ", ".join(f"{note} ({n} of {counts.total()})" for note, n in counts.most_common())
-    return f" heyoka's fastest: {told}." if told else ""
+    return f" heyoka's fastest: {_counted(counts)}." if counts else ""
+
+
+def _counted(counts: Counter[str]) -> str:
+    return ", ".join(f"{name} ({n} of {counts.total()})" for name, n in counts.most_common())
 
 
 def _data(found: Terms) -> Table:
@@ -279,5 +285,6 @@ def _record(found: Terms) -> dict[str, Any]:
         refused.append(where | {"method": method, "setting": setting, "reason": reason})
     told: dict[str, Any] = {"rows": rows, "refused": refused}
     told["means"] = list(map(asdict, summaries(found)))
+    told["leaves"] = found.leaves
     told |= {"reference_error": found.single.doubt, "seed": many.seed, "bodies": many.bodies}
     return told

@@ -52,6 +52,13 @@ def solve_points(sweep: Sweep, where: list[Indices]) -> Arrays:
     return found
 
 
+def leaves_of_sweep(sweep: Sweep) -> str | None:
+    """Return `Ensemble.leaves` of the first scene."""
+    first = [np.zeros(1, dtype=np.intp) for _ in sweep.shape]
+    ((_, batch),) = batches(sweep, first)
+    return batch.leaves
+
+
 def listing_of(program: str, listing: str, reading: str) -> Listing:
     """Return the listing that the fields `listing` and `reading` of a sweep describe.
 

@@ -11,6 +11,7 @@ from pyharness.model.errors import unknown
 from pyharness.model.report import Column, Picture, Report, Table, digits, format_duration, words
 from pyharness.model.trajectory import Array
 from pyharness.sweep.axes import Axis, units_of
+from pyharness.sweep.batches import leaves_of_sweep
 from pyharness.sweep.reductions import REDUCTIONS
 from pyharness.sweep.run import Outcome
 from pyharness.sweep.store import Store
@@ -95,6 +96,9 @@ def sweep_report(store: Store, outcome: Outcome, path: str) -> Report:
     text: list[list[Any]] = [[f"{sweep.name}: {_did(outcome)}; store {path}"]]
     if outcome.estimate is not None:
         text[0].append(f"estimated: {outcome.estimate.text}")
+    leaves = leaves_of_sweep(sweep) if sweep.solver.compiled and outcome.computed else None
+    if leaves is not None:
+        text[0].append(f"Taylor terms of the torque: {leaves}")
     axes = [_axis_row(axis) for axis in sweep.axes]
     text.append([Table(_AXES, axes)])
     if found:
@@ -105,6 +109,7 @@ def sweep_report(store: Store, outcome: Outcome, path: str) -> Report:
     record: dict[str, Any] = {"name": sweep.name, "store": path, "sweep_sha256": sweep.fingerprint}
     record |= {"scenes": sweep.n_scenes, "chunks": sweep.n_chunks}
     record |= {name: getattr(outcome, name) for name in ("computed", "repaired", "seconds")}
+    record["leaves"] = leaves
     record["axes"] = [dict(zip(_AXIS_KEYS, row, strict=True)) for row in axes]
     record |= {"reductions": [each._asdict() for each in found], "counts": counts}
     return Report("sweep", text, lambda: record, Table(_FOUND, found), text)

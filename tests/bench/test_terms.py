@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import math
+from collections import Counter
 from random import Random
 from typing import Any
 
@@ -23,6 +24,7 @@ from pyharness.bench.term_loads import (
     TermScene,
     body_contenders,
     term_bodies,
+    term_leaves,
     term_methods,
     term_peers,
     term_scenes,
@@ -153,7 +155,8 @@ def _terms(with_heyoka: bool = True) -> Terms:
         : 1 + with_heyoka
     ]:
         rates.append(Rate("damping", 1e-6, method, 1, 1e-6, 1000, seconds, 1e-7, note))
-    return Terms(Finding(loads, rows, [], {}, {}), Rates("seed", 1000, rates))
+    leaves = Counter({"built": 2, "interpreter": 1})
+    return Terms(Finding(loads, rows, [], {}, {}), Rates("seed", 1000, rates), leaves)
 
 
 def test_means_and_smallest_ratios_are_those_of_the_scenes() -> None:
@@ -182,6 +185,8 @@ def test_the_report_has_times_ratios_and_preparation() -> None:
     assert line.split() == [*wanted, "1", "40", "500", "15.0"]
     assert "Ready terms: 1000 bodies, T = 10 s" in shown
     assert "heyoka's fastest: batches of 8 (1 of 1)." in " ".join(shown.split())
+    told = "Taylor terms of single bodies: built (2 of 3), interpreter (1 of 3)."
+    assert told in " ".join(shown.split())
     without = render(term_report(_terms(False), ["heyoka"], "pyharness bench --terms"), "table")
     assert "ratio" not in without.replace("Geometric", "")
     assert "compile" not in without
@@ -195,6 +200,8 @@ def test_compiled_torques_are_measured() -> None:
     assert np.hstack(found) == pytest.approx(np.hstack(interpreted), rel=0.0, abs=1e-12)
     assert ready.run.func.leaves == "compiled"
     assert wanted.run.func.leaves == "interpreter"
+    assert term_leaves(SCENES[:1], compiled=True) == {"compiled": 1}
+    assert term_leaves(SCENES[:1], compiled=False) == {"built": 1}
 
 
 @pytest.fixture

@@ -15,10 +15,12 @@ from pyharness.engine.leaf_cache import folder
 from pyharness.model.codes import Statuses
 from pyharness.sweep.batches import batches, solve_points
 from pyharness.sweep.executors import EXECUTORS
+from pyharness.sweep.report import sweep_report
 from pyharness.sweep.run import places_of_a_chunk, swept
 from pyharness.sweep.store import opened
 from pyharness.sweep.sweep import Sweep, spread
 from pyharness.sweep.sweep_file import read_sweep
+from pyharness.views.render import render
 from tests.sweep.sweeps import axis, every, written
 
 SCENE = """
@@ -208,6 +210,19 @@ def test_torques_are_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     )
     assert compiled == pytest.approx(plain, rel=0.0, abs=1e-8)
     assert len(list(folder().glob("*.so"))) == 1
+
+
+def test_the_report_says_whether_torques_were_compiled(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    given = axis("torque.constants.k", [0.1, 0.2])
+    sweep = read_sweep(written(tmp_path, text(given, solver="compiled = true")))
+    with swept(sweep, str(tmp_path / "store")) as (store, outcome):
+        report = sweep_report(store, outcome, "store")
+        again = sweep_report(store, replace(outcome, computed=0), "store")
+    assert "Taylor terms of the torque: compiled" in render(report, "table")
+    assert "Taylor terms" not in render(again, "table")
 
 
 @pytest.mark.parametrize(("solver", "message"), [

@@ -104,6 +104,11 @@ class Batch:
         return (self._program if self.is_program else self._ends).status
 
     @property
+    def leaves(self) -> str | None:
+        """Return what computed the Taylor terms of a recorded torque, as `Ensemble.leaves`."""
+        return self._ends.leaves
+
+    @property
     def n_rows(self) -> NDArray[np.int32]:
         """Return the numbers of steps that a program completed, shape (n,)."""
         return self._program.n_rows

@@ -233,7 +233,8 @@ def _terms(options: argparse.Namespace) -> int:
     many = measure_ensembles(bodies, both, options.seed, shared.progress, least=n)
     shared.end_progress()
     single.refused.extend(_not_measured(missing, loads))
-    found = term_report.Terms(single, many)
+    leaves = term_loads.term_leaves(scenes, options.compiled)
+    found = term_report.Terms(single, many, leaves)
     return shared.show(term_report.term_report(found, ["heyoka"], _again(options)), options)
 
 

@@ -61,9 +61,9 @@ enum { N_INPUTS = 8 };      /* time, omega and attitude; parameters follow */
 struct leaves {
   /* As expand_tape of tape_terms.c; the last array is `unknowns` of its working storage. */
   void (*expand)(double *terms, const double *, const double *, double *unknowns, double h, int order);
-  /* As set_columns of tape_terms.c, for all columns at four parts of the step. */
+  /* As set_columns of tape_terms.c, for all columns. `parts` is of four numbers. */
   void (*set_jacobian)(const double *terms, const double *, const double *, const double *parts,
-                       double h, double *jacobian);
+                       int nodes, double h, double *jacobian);
   /* Term 0 of all slots, and the rates; or NULL, and the operations are interpreted. */
   void (*set_values)(double *terms, const double *, const double *, double *rates);
   /* As noise_of of tape_series.f90. */

@@ -11,9 +11,9 @@
 enum { SIDE_BY_SIDE = 8, TERMS = SERIES_LENGTH, TERMS_OF_PERTURBATION = PERTURBATION_LENGTH };
 typedef double row[SIDE_BY_SIDE];
 
-/* The Jacobian is computed at two or three nodes of a step, from as many terms as the least order has. */
-enum { FEW_NODES = 2, NODES = 3, TERMS_AMID = 8 };
-typedef double nodal __attribute__((vector_size(8 * (NODES + 1))));
+/* The Jacobian is computed at two or four nodes of a step, from as many terms as the least order has. */
+enum { FEW_NODES = 2, NODES = 4, TERMS_AMID = 16 };
+typedef double nodal __attribute__((vector_size(8 * NODES)));
 
 /* Terms of several slots abreast. */
 enum { ABREAST = 4, GROUPS = (MOST_UNKNOWNS + ABREAST - 1) / ABREAST };

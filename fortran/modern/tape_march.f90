@@ -105,6 +105,7 @@ contains
     real(dp) :: sizes(tape%n_unknowns)        ! of all unknowns
     real(dp) :: t(2), t_next(2)               ! time and its rounding error, s
     real(dp) :: t_end, rest, factor, local_tolerance, scale
+    real(dp) :: varied                        ! largest term of a perturbation that is left out
     real(dp) :: break_time                    ! next breakpoint of a table, or t_end, s
     real(dp) :: to_stop                       ! time to it, s
     logical :: arrives, at_end, from_rest, is_full, has_guess
@@ -390,12 +391,16 @@ contains
 
     subroutine perturb()
       !! Expand the perturbations.
+      real(dp) :: steps
       integer :: block, is_long
 
-      is_long = merge(1, 0, found%steps + rest/(factor*s%h) > FEW_STEPS)
+      steps = found%steps + rest/(factor*s%h)
+      ! Small errors of many steps would hide an amplification, or feign one.
+      is_long = merge(1, 0, steps > FEW_STEPS)
+      varied = VARIATION_TOLERANCE*min(1.0_dp, FEW_STEPS/steps)
       do block = 1, n_blocks
         last_terms(block) = perturb_tape(arrays_of_block(block), SIDE_BY_SIDE*(block - 1), s%h, &
-                                         s%order, factor, weights, VARIATION_TOLERANCE, is_long)
+                                         s%order, factor, weights, varied, is_long)
       end do
       is_short = any(last_terms(:n_blocks) < 0)
       last_terms(:n_blocks) = abs(last_terms(:n_blocks))
@@ -435,7 +440,7 @@ contains
       size_of_last = size_of_last*factor**s%order
       fitting_lanes = 0.25_dp
       if (size_of_last <= huge(s%h) .and. size_of_last > 0.0_dp .and. first > 0.0_dp) then
-        fitting_lanes = min(1.0_dp, (VARIATION_TOLERANCE*first/size_of_last)**(1.0_dp/s%order))
+        fitting_lanes = min(1.0_dp, (varied*first/size_of_last)**(1.0_dp/s%order))
       end if
     end function fitting_lanes
 

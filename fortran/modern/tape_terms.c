@@ -448,9 +448,13 @@ static inline int are_small(const struct tape *tape, int k, const double *weight
 /* Return a series at the nodes, the `parts` of the step. */
 static inline nodal summed(const double *terms, nodal parts)
 {
-  nodal sum = (nodal){0.0} + terms[TERMS_AMID - 1];
-  for (int k = TERMS_AMID - 2; k >= 0; k--) sum = terms[k] + parts * sum;
-  return sum;
+  const nodal squares = parts * parts;
+  nodal even = {0.0}, odd = {0.0};
+  for (int k = TERMS_AMID - 2; k >= 0; k -= 2) {
+    even = terms[k] + squares * even;
+    odd = terms[k + 1] + squares * odd;
+  }
+  return even + parts * odd;
 }
 
 /* Compute the derivatives of the rates by some unknowns, from `first_column` on, at so many `nodes`, the
@@ -566,31 +570,45 @@ static ALWAYS_INLINE void perturb_with(const int n, const int columns, const int
   }
 }
 
+/* The nodes of Gauss on (0, 1), and the coefficients of a polynomial through its values there. */
+static const nodal few_parts = {0.21132486540518712, 0.78867513459481288};
+static const double few_weights[][FEW_NODES] = {
+    {1.3660254037844386, -0.36602540378443865}, {-1.7320508075688773, 1.7320508075688773}};
+static const nodal many_parts = {
+    0.069431844202973712, 0.33000947820757187, 0.66999052179242813, 0.93056815579702629};
+static const double many_weights[][NODES] = {
+    {1.526788125457266, -0.8136324494869271, 0.40076152031165046, -0.11391719628198993},
+    {-8.546023607872197, 13.807166925689968, -7.4170704214626396, 2.155927103644868},
+    {14.325858354171903, -31.388222363446072, 24.998125859219108, -7.935761849944937},
+    {-7.420540068038947, 18.795449407555054, -18.795449407555054, 7.420540068038947}};
+
 /* Compute one block of columns of the Jacobian as a polynomial of the part of the step, through its
    values at the nodes of Gauss: the error of the perturbations is of order 2 nodes + 1. */
 static ALWAYS_INLINE void set_block(const struct tape *tape, const int block, const int columns,
                                     const int nodes, double h, double factor, matrix *jacobian)
 {
   const int is_few = nodes == FEW_NODES;
-  const double distance = (is_few ? 0.28867513459481288 : 0.38729833462074170) * factor;
-  const double per_slope = 0.5 / distance, per_curve = 0.5 / (distance * distance);
-  const double middle = 0.5 * factor;
-  const nodal parts = {middle - distance, is_few ? middle + distance : middle, middle + distance};
-  row *to[NODES] = {jacobian[0][block], jacobian[1][block], jacobian[2][block]};
+  const nodal parts = factor * (is_few ? few_parts : many_parts);
+  row *to[] = {jacobian[0][block], jacobian[1][block], jacobian[2][block], jacobian[3][block]};
   if (!tape->leaves) set_columns(tape, nodes, block * SIDE_BY_SIDE, columns, h, parts, to);
   else if (block == 0)
-    tape->leaves->set_jacobian(tape->a, tape->coefficients, tape->constants, (const double *)&parts, h,
-                               jacobian[0][0][0]);
+    tape->leaves->set_jacobian(tape->a, tape->coefficients, tape->constants, (const double *)&parts,
+                               nodes, h, jacobian[0][0][0]);
+  const double per_factor = 1.0 / factor;
   for (int i = 0; i < tape->n_unknowns; i++) {
     for (int p = 0; p < columns; p += IN_REGISTER) {
-      reg *const before = (reg *)(to[0][i] + p), *const amid = (reg *)(to[1][i] + p);
-      reg *const after = (reg *)(to[nodes - 1][i] + p);
-      const reg slope = per_slope * (*after - *before);
-      const reg value = is_few ? 0.5 * (*before + *after) : *amid;
-      const reg curve = is_few ? (reg){0.0} : per_curve * ((*after - *amid) + (*before - *amid));
-      *before = value - middle * (slope - middle * curve);
-      *amid = slope - 2.0 * middle * curve;
-      if (!is_few) *after = curve;
+      reg values[NODES];
+      double power = 1.0;
+#pragma GCC unroll 4
+      for (int d = 0; d < nodes; d++) values[d] = *(reg *)(to[d][i] + p);
+#pragma GCC unroll 4
+      for (int k = 0; k < nodes; k++, power *= per_factor) {
+        reg sum = {0.0};
+#pragma GCC unroll 4
+        for (int d = 0; d < nodes; d++)
+          sum += (is_few ? few_weights[k][d] : many_weights[k][d]) * values[d];
+        *(reg *)(to[k][i] + p) = power * sum;
+      }
     }
   }
 }

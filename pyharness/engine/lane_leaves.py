@@ -191,7 +191,7 @@ def _set_jacobian(tape: Structure) -> Iterator[str]:
     yield "void set_lane_jacobian(const reg *restrict a, const double *restrict c,"
     yield "                       const double *restrict d, const reg *restrict amid,"
     yield f"                       const reg *restrict step, reg (*restrict jacobian)[{_ROW}])\n{{"
-    yield "  const reg u = *amid, h = *step, zero = {0.0}, one = zero + 1.0;"
+    yield "  const reg u = *amid, w = u*u, h = *step, zero = {0.0}, one = zero + 1.0;"
     for slot in _inputs(tape, lines, "m"):
         if slot not in known:
             yield f"  const reg m{slot} = {place(slot, '0')};"

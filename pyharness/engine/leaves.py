@@ -19,15 +19,14 @@ if TYPE_CHECKING:
 _ABREAST = 4  # products side by side, and nodes of the Jacobian
 _CHUNK = 8  # groups of products that are summed together; the registers suffice for 8
 _BLOCK = 8  # columns of the Jacobian in a row of its storage
-_NODES = 3  # of the Jacobian
-_TERMS_AMID = 8  # terms of a series at a node
+_TERMS_AMID = 16  # terms of a series at a node
 _SIZE = -(-Storage.MOST_UNKNOWNS // _BLOCK) * Storage.MOST_UNKNOWNS * _BLOCK  # of a Jacobian
 _MOST_OPERATIONS = 499  # whose products fit on the stack of a thread
 TIME, FIRST_UNKNOWN = 1, 2  # slots, from 1
 
 HEADER = (
     f"""
-enum {{ PARTS = {_NODES}, SIZE = {_SIZE} }};
+enum {{ PARTS = {_ABREAST}, SIZE = {_SIZE} }};
 #define A(slot, k) a[(slot - 1) * {Storage.SERIES_LENGTH} + k]"""
     + """
 typedef double abreast __attribute__((vector_size(32)));
@@ -41,9 +40,9 @@ static abreast slope_of_root(abreast root)
   const bits is_other = root != 0.0;
   return (abreast)((bits)(0.5 / root) & is_other);
 }
-static void put(double *to, double h, abreast a, abreast b, abreast c, abreast d)
+static void put(double *to, int nodes, double h, abreast a, abreast b, abreast c, abreast d)
 {
-  for (int node = 0; node < PARTS; node++)
+  for (int node = 0; node < PARTS && node < nodes; node++)
     *(abreast *)(to + node * SIZE) = h * (abreast){a[node], b[node], c[node], d[node]};
 }
 """
@@ -289,16 +288,16 @@ def _kept(unknowns: range, k: str) -> Iterator[str]:
 def _set_jacobian(tape: Structure) -> Iterator[str]:
     """Yield the function that computes the Jacobian of the rates at the nodes."""
     yield "void set_jacobian(const double *restrict a, const double *restrict c,"
-    yield "                  const double *restrict d, const double *restrict parts, double h,"
-    yield "                  double *restrict jacobian)\n{"
-    yield "  const abreast u = *(const abreast *)parts, zero = {0.0}, one = zero + 1.0;"
+    yield "                  const double *restrict d, const double *restrict parts, int nodes,"
+    yield "                  double h, double *restrict jacobian)\n{"
+    yield "  const abreast u = *(const abreast *)parts, w = u*u, zero = {0.0}, one = zero + 1.0;"
     lines, rows = derivatives(tape, _TERMS_AMID)
     yield from (f"  const abreast {each};" for each in lines)
     for i, texts in enumerate(rows):
         for column in range(0, _BLOCK * -(-tape.n_unknowns // _BLOCK), _ABREAST):
             begin = (column // _BLOCK * Storage.MOST_UNKNOWNS + i) * _BLOCK + column % _BLOCK
             row = [texts.get(FIRST_UNKNOWN + column + j, "zero") for j in range(_ABREAST)]
-            yield f"  put(jacobian + {begin}, h, {', '.join(row)});"
+            yield f"  put(jacobian + {begin}, nodes, h, {', '.join(row)});"
     yield "}"
 
 
@@ -434,10 +433,12 @@ def derivatives(tape: Structure, count: int) -> tuple[list[str], list[dict[int, 
 
 
 def _summed(slot: int, count: int) -> str:
-    sum_of = place(slot, str(count - 1))
-    for k in reversed(range(count - 1)):
-        sum_of = f"({place(slot, str(k))} + u*{sum_of})"
-    return f"m{slot} = {sum_of}"
+    """Return the definition of a value; even and odd terms are summed side by side."""
+    sums = ["", ""]
+    for k in reversed(range(count)):
+        later = sums[k % 2]
+        sums[k % 2] = f"({place(slot, str(k))} + w*{later})" if later else place(slot, str(k))
+    return f"m{slot} = {sums[0]} + u*{sums[1]}"
 
 
 def _slopes_of_combination(

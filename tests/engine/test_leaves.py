@@ -372,7 +372,7 @@ HOSTILE: dict[str, Callable[[Path, pytest.MonkeyPatch], Any]] = {
     "empty": lambda file, _: rewritten(file, b""),
     "writable by all": lambda file, _: file.chmod(0o777),
     "a folder writable by all": lambda file, _: file.parent.chmod(0o777),
-    "another name": lambda file, _: file.rename(file.with_name(file.name[:-4] + "0.so")),
+    "another name": lambda file, _: file.rename(file.with_name(file.name[:-4] + "x.so")),
     "a folder": a_folder,
 }
 

@@ -56,6 +56,44 @@ def test_growth_of_a_spin_about_the_middle_axis_is_that_of_what_leaves_it() -> N
     assert 2.0**46 <= (motion_growth(scene, 200.0) or 0.0) <= 2.0**51
 
 
+def _rising(time: float, omega: np.ndarray) -> list[float]:
+    quick = 0.0168 * time * omega[1] * (omega @ omega) - 0.05 * omega[0]
+    return [0.005 + quick, 0.0, 0.074 + 0.124 * omega[2]]
+
+
+def _spiky(_: float, omega: np.ndarray) -> list[float]:
+    return [0.27 * omega[1] * (omega @ omega) - 0.05 * omega[0], 0.0, 0.074 + 0.124 * omega[2]]
+
+
+@pytest.mark.parametrize(
+    ("torque", "time", "least_steps"), [(_rising, 19.0, 8000), (_spiky, 3.0, 900)]
+)
+def test_growth_of_many_steps_is_that_of_a_perturbed_motion(
+    torque: Callable[..., list[float]], time: float, least_steps: int
+) -> None:
+    """An error of a thousandth in each step hides five sixths of it, or invents a hundredfold."""
+    ends = []
+    for beside in (0.0, 1e-8):
+        scene = Scene("violent", (-0.1, -3.8, 7.7 + beside), (1.0, 2.0, 2.5), torque=torque)
+        ends.append(solve(scene, time, tolerance=1e-11))
+    reached = float(np.abs(ends[1].omega[-1] - ends[0].omega[-1]).max()) / 1e-8
+    assert ends[0].steps > least_steps
+    assert 0.9 * reached <= (ends[0].growth or 0.0) <= 20.0 * reached
+
+
+def test_a_body_at_rest_under_control_waits_for_a_push() -> None:
+    """Perturbations of the attitude are relative to no omega."""
+
+    def torque(time: Any, omega: Any, q: Any) -> list[Any]:
+        push = np.where(time > 5.0, 1.0, 0.0)
+        return [push - q[0] * q[1] - omega[0], -q[0] * q[2] - omega[1], -q[0] * q[3] - omega[2]]
+
+    scene = Scene("push", (0.0, 0.0, 0.0), (1.0, 2.0, 3.0), attitude=(1, 0, 0, 0), torque=torque)
+    found = solve(scene, 20.0)
+    assert found.ended == "complete"
+    assert found.steps < 400
+
+
 @pytest.mark.parametrize("power", [-900, -300, 1, 300, 900])
 def test_growth_has_no_unit(power: int) -> None:
     factor = math.ldexp(1.0, power)

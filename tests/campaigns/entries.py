@@ -20,6 +20,7 @@ from pyharness.truth.reference import exact_coefficients
 _MORE_TIMES = np.linspace(0.0, 1.0, 26)[1:-1].tolist()
 # Digits, order and local tolerance of the reference. A test compares it with `reference`.
 _DIGITS, _ORDER, _LOCAL = 30, 26, Decimal("1e-18")
+_MOST_GROWTH = 1e16  # beyond, no result has a digit
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +45,12 @@ class Truth:
         return max(error, float(angle_between(attitude, self.attitude[rows]).max(initial=0.0)))
 
 
-def truth_of(scene: Scene, times: Sequence[float], effort: float | None = None) -> Truth:
+def truth_of(
+    scene: Scene, times: Sequence[float], effort: float | None = None, growth: float = 1.0
+) -> Truth:
     """Return the true motion of a scene at `times` (s), from one decimal Taylor series.
+
+    The local tolerance is divided by the error amplification `growth`.
 
     Raise InputError if the work limit of the reference is exceeded, on which `effort` is a factor.
     """
@@ -58,11 +63,12 @@ def truth_of(scene: Scene, times: Sequence[float], effort: float | None = None) 
         scene = replace(scene, inertia=matrices)
     every = sorted({*times, *(part * times[-1] for part in _MORE_TIMES)}, key=abs)
     with decimal.localcontext() as context:
-        context.prec = _DIGITS
+        amplified = Decimal(min(max(growth, 1.0), _MOST_GROWTH))
+        context.prec = _DIGITS + amplified.adjusted()
         context.Emax, context.Emin = decimal.MAX_EMAX, decimal.MIN_EMIN
         exact = list(map(Decimal, every))
         coefficients = exact_coefficients(scene) if scene.changing is None else []
-        rows = taylor_series(scene, coefficients, exact, False, _ORDER, _LOCAL, effort)
+        rows = taylor_series(scene, coefficients, exact, False, _ORDER, _LOCAL / amplified, effort)
     width = 3 if scene.attitude is None else 7
     state = np.array([[float(x) for x in row] for row in rows]).reshape(-1, width)
     state = state[np.isfinite(state).all(axis=1)]

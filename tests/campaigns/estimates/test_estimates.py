@@ -91,6 +91,13 @@ def test_the_truth_of_a_full_inertia_is_that_of_its_principal_axes() -> None:
     assert truth_of(scene, [time]).error(known) < 1e-14
 
 
+def test_the_truth_is_precise_where_errors_are_amplified() -> None:
+    scene, time = Scene("", (1e-10, -3.9, 1e-10), moments=(14.0, 8.7, 6.1)), 14.6
+    whole = truth_of(scene, [time])
+    assert whole.growth > 1e10
+    assert whole.error(solve(scene, time, "closed-form", 1e-9).omega) < 1e-15
+
+
 def test_truth_says_what_it_cannot_know(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(InputError, match="grows without bound"):
         truth_of(Scene("", (1.0, 1.0, 1.0), None, (1.0, 1.0, 1.0)), [2.0])

@@ -32,7 +32,7 @@ class Truth:
     @cached_property
     def exact(self) -> entries.Truth:
         """The motion; it takes longer than all else."""
-        return entries.truth_of(self.scene, self.times)
+        return entries.truth_of(self.scene, self.times, growth=self.growth)
 
     def error(self, omega: Array, attitude: Array | None = None) -> float:
         """Return the largest error; of one row, at the last time."""

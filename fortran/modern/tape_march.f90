@@ -12,8 +12,8 @@ module tape_march
   use tape, only: FIRST_UNKNOWN, next_break, tape_arrays_t, tape_t, TIME_SLOT
   use tape_growth, only: begin, close_block, count_step, find_growth, MOST_UNKNOWNS, transitions_t
   use tape_live, only: keep_live, settle
-  use tape_plan, only: converge, fitting, LEAST_LOCAL_TOLERANCE, local_tolerance_of, &
-                       MOST_TRIES, order_for
+  use tape_plan, only: converge, find_varying, fitting, LEAST_LOCAL_TOLERANCE, &
+                       local_tolerance_of, MOST_TRIES, order_for, resolving
   use tape_series, only: derivatives_at, expand, LAST_TERM, MOST_BLOCKS, MOST_ORDER, noise_of, &
                          PADDED, perturb_tape, series_t, SIDE_BY_SIDE, slot_gradient, &
                          sum_perturbations, sum_terms, VARIATION_TOLERANCE
@@ -31,7 +31,8 @@ module tape_march
   ! Largest of the last terms of an own state, relative to its guessed size.
   real(dp), parameter :: CONVERGED = 0.01_dp
   integer, parameter :: PARTS = 4 ! of a step, at whose ends the size of an own state is guessed
-  real(dp), parameter :: MUCH_LESS = 0.5_dp ! change of a local tolerance that changes the order
+  ! Change of a local tolerance that changes the order, and of a step that changes the Jacobian.
+  real(dp), parameter :: MUCH_LESS = 0.5_dp
   real(dp), parameter :: FEW_STEPS = 32.0_dp ! for which perturbations may be inaccurate
   real(dp), parameter :: RIDGE = 1.001_dp  ! makes the fit work for one pole or none
   ! Largest error for which the linearised equations hold.
@@ -104,7 +105,7 @@ contains
     real(dp) :: own_sizes(tape%n_unknowns)    ! of own states: the largest so far
     real(dp) :: sizes(tape%n_unknowns)        ! of all unknowns
     real(dp) :: t(2), t_next(2)               ! time and its rounding error, s
-    real(dp) :: t_end, rest, factor, local_tolerance, scale
+    real(dp) :: t_end, rest, factor, shortened, local_tolerance, scale
     real(dp) :: varied                        ! largest term of a perturbation that is left out
     real(dp) :: break_time                    ! next breakpoint of a table, or t_end, s
     real(dp) :: to_stop                       ! time to it, s
@@ -122,6 +123,7 @@ contains
     integer :: i, n, n_before, order, tries
     integer :: last_terms(MOST_BLOCKS)        ! of the perturbations
     integer :: first_own, n_blocks
+    integer :: varying(tape%n_slots), n_varying ! slots of `find_varying`
     integer :: verdict                        ! of `next_crossing`
     type(step_limit_t) :: limit
 
@@ -144,6 +146,7 @@ contains
     if (switches%n > 0) s%a = 0.0_dp
     call begin(n, transitions)
     call begin_lanes()
+    call find_varying(tape, varying, n_varying)
     live = tape
     switches%part = 0.0_dp
     if (switches%n > 0) call settle(tape, t, y, t_end, switches, s, live, rates)
@@ -170,7 +173,7 @@ contains
       ! The scale of a body at rest is the omega that it is about to reach.
       if (from_rest) scale = largest_terms(1, 3, 1, 4)
       call weigh()
-      factor = fitting(tape, s%order, local_tolerance, weights, s%a)
+      factor = longest_step()
       if (.not. factor > 0.0_dp) then
         call shorten()
         if (solution%status /= COMPLETE) exit
@@ -192,7 +195,7 @@ contains
           is_low = order > s%order
           s%order = order
           if (is_low .or. from_rest) cycle
-          factor = fitting(tape, s%order, local_tolerance, weights, s%a)
+          factor = longest_step()
         end if
       end if
       if (is_rejected) factor = min(1.0_dp, factor)
@@ -200,7 +203,15 @@ contains
       call set_lanes()
       call perturb()
       ! Perturbations may change faster than the motion, as about a steady rotation.
-      if (is_short) factor = factor*fitting_lanes()
+      if (is_short) then
+        shortened = fitting_lanes()
+        factor = factor*shortened
+        if (n_varying > 0 .and. shortened < MUCH_LESS) then
+          ! The polynomials of the Jacobian are those of a much longer step.
+          call perturb()
+          if (is_short) factor = factor*fitting_lanes()
+        end if
+      end if
       call converge(live, s%order, max(scale, LEAST_SCALE), s%a, s%powers, factor)
       if (switches%n > 0) call resolve_switches(nearly, switches, s, factor)
       if (.not. factor > 0.0_dp) then
@@ -340,6 +351,12 @@ contains
       sum_of_noise = sum_of_noise + squares
       noise_of_block = noise_of_block + squares
     end subroutine add_noise
+
+    real(dp) function longest_step()
+      !! Return the factor on the step that the terms of the unknowns and of the Jacobian allow.
+      longest_step = fitting(tape, s%order, local_tolerance, weights, s%a)
+      if (n_varying > 0) longest_step = resolving(varying(:n_varying), s%a, longest_step)
+    end function longest_step
 
     real(dp) function share_of(steps)
       !! Return the part of the tolerance that a step may use.

@@ -18,6 +18,7 @@ from pyharness.engine import solver as solver_module
 from pyharness.engine.rescaled import scaled, unscaled
 from pyharness.engine.sensitivity import closed_form_estimate, is_sensitive, motion_growth
 from pyharness.model.codes import Statuses
+from pyharness.model.scene import Triple
 from pyharness.model.trajectory import ROUNDING, Trajectory, digits_left
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.reference import reference
@@ -92,6 +93,20 @@ def test_a_body_at_rest_under_control_waits_for_a_push() -> None:
     found = solve(scene, 20.0)
     assert found.ended == "complete"
     assert found.steps < 400
+
+
+@pytest.mark.parametrize("omega", [(0.0, 0.0, 1.0), (1e-9, 0.0, 1.0), (0.0, 0.0, 0.0)])
+@pytest.mark.parametrize("frequency", [3.0, 10.0, 100.0])
+def test_growth_of_a_steady_motion_follows_a_torque_that_it_does_not_feel(
+    omega: Triple, frequency: float
+) -> None:
+    def torque(time: Any, omega: Any) -> list[Any]:
+        wave = 0.5 * np.cos(frequency * time)
+        return [wave * omega[1], wave * omega[0], 0.0]
+
+    found = solve(Scene("", omega, moments=(1.0, 2.0, 2.5), torque=torque), 50.0)
+    assert found.ended == "complete"
+    assert 1.0 <= found.growth < 1.3
 
 
 @pytest.mark.parametrize("power", [-900, -300, 1, 300, 900])

@@ -71,7 +71,7 @@ class Answer:
         """Return the names of the faults; a few estimates may be low."""
         complete = self.ended == "complete"
         # A closed form loses no digit to rounding: the error decides.
-        is_closed = "no torque" in self.draw.kinds and "taylor" not in self.entry
+        is_closed = self.draw.scene.torque.is_zero and "taylor" not in self.entry
         is_lost = self.error > self.draw.tolerance if is_closed else self.lost > _SURELY
         # Torques that cancel make a scene sensitive by themselves, which K does not measure. With
         # the attitude the amplification is known up to the angle by which an error of omega may

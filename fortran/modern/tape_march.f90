@@ -146,7 +146,9 @@ contains
     if (switches%n > 0) s%a = 0.0_dp
     call begin(n, transitions)
     call begin_lanes()
-    call find_varying(tape, varying, n_varying)
+    ! Slots of a branch that is not chosen may be singular.
+    n_varying = 0
+    if (switches%n == 0) call find_varying(tape, varying, n_varying)
     live = tape
     switches%part = 0.0_dp
     if (switches%n > 0) call settle(tape, t, y, t_end, switches, s, live, rates)

@@ -125,7 +125,8 @@ def _first_edges(
     bounds = sorted({*ends, *inner})
     fastest = float(np.abs(found.omega).max(initial=max(map(abs, scene.omega))))
     total = ends[-1] - ends[0]
-    share = min(_MOST_PIECES, found.steps, fastest * total / _RADIANS) / total
+    most = min(_MOST_PIECES, found.steps) if found.evaluations else _MOST_PARTS
+    share = min(most, fastest * total / _RADIANS) / total
     edges: list[float] = []
     for low, high in itertools.pairwise(bounds):
         count = max(1, math.ceil((high - low) * share))
@@ -154,11 +155,12 @@ def _fitted(
     """Return polynomials through a method's results; divide intervals where they are inaccurate."""
     # `own` are the tolerances of the rows, and `rough` is their largest error that is not smooth.
     open_pieces = [_Open(low, high) for low, high in itertools.pairwise(edges)]
-    done: dict[float, tuple[float, Array]] = {}
+    done: list[tuple[Array, Array, Array]] = []
+    n_done = 0
     largest = np.zeros(1)
     aim = max(_LAST * tolerance, _ROUNDING)
     while open_pieces:
-        if len(open_pieces) + len(done) > _MOST_PIECES:
+        if len(open_pieces) + n_done > _MOST_PIECES:
             raise InputError(
                 f"dense output and events need more than {_MOST_PIECES} polynomials; use a "
                 "shorter time or a larger tolerance, or give the times of the results"
@@ -181,25 +183,25 @@ def _fitted(
         coefficients = np.einsum("kj,pjm->pkm", TO_COEFFICIENTS, values)
         tails = np.abs(coefficients[:, -_TAIL:]).max(axis=1)
         tails /= sizes
+        tails = tails.max(axis=1)
+        shortest = 64.0 * np.spacing(np.maximum(np.abs(lows), np.abs(highs)))
+        is_done = (tails <= aim) | (highs - lows <= shortest)
         following = []
-        for piece, own_nodes, own_values, tail in zip(
-            open_pieces, each, values, tails.max(axis=1).tolist(), strict=True
-        ):
-            low, high = piece.low, piece.high
-            if (
-                tail <= aim
-                or high - low <= 64 * math.ulp(max(abs(low), abs(high)))
-                or piece.is_rough(tail, own_nodes, own_values, sizes, rough)
-            ):
-                done[low] = high, own_values
+        for k in np.flatnonzero(~is_done).tolist():
+            piece, tail = open_pieces[k], float(tails[k])
+            if piece.is_rough(tail, each[k], values[k], sizes, rough):
+                is_done[k] = True
                 continue
             parts = math.ceil(1.2 * (tail / aim) ** (1.0 / (NODES - _TAIL)))
-            cuts = np.linspace(low, high, min(max(parts, 2), _MOST_PARTS) + 1).tolist()
-            whole = Pieces(np.array([low, high]), own_values[None])
-            following += [_Open(a, b, tail, whole) for a, b in itertools.pairwise(cuts)]
+            edges = np.linspace(piece.low, piece.high, min(max(parts, 2), _MOST_PARTS) + 1).tolist()
+            whole = Pieces(np.array([piece.low, piece.high]), values[k][None])
+            following += [_Open(low, high, tail, whole) for low, high in itertools.pairwise(edges)]
+        done += [(lows[is_done], highs[is_done], values[is_done])]
+        n_done += int(is_done.sum())
         open_pieces = following
-    starts = sorted(done)
-    return Pieces(np.array([*starts, done[starts[-1]][0]]), np.array([done[t][1] for t in starts]))
+    lows, highs, values = map(np.concatenate, zip(*done, strict=True))
+    order = np.argsort(lows)
+    return Pieces(np.append(lows[order], highs.max()), values[order])
 
 
 def _of_fixed_steps(

@@ -6,7 +6,8 @@ of the last two has three amplitudes (rad/s2) and a frequency (rad/s).
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +16,9 @@ from pyharness.model.extension import ENDS, columns
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import WITH_ALL_ROWS, Array, Trajectory
+
+if TYPE_CHECKING:
+    from pyharness.model.inertia import Exact
 
 _NOT_FINITE = (
     "a coefficient A, B, C or a torque divided by its moment is not finite; use moments nearer "
@@ -49,9 +53,14 @@ def remainders(scene: Scene) -> Triple:
     found, moments = scene.euler_coefficients, scene.exact_moments
     if moments is None or not scene.torque.is_zero or not all(map(math.isfinite, found)):
         return 0.0, 0.0, 0.0
-    i1, i2, i3 = moments
+    return _exact_remainders(moments, found)
+
+
+@lru_cache(maxsize=64)
+def _exact_remainders(moments: "Exact", found: Triple) -> Triple:
     from fractions import Fraction
 
+    i1, i2, i3 = moments
     a, b, c = map(Fraction, found)
     return float((i2 - i3) / i1 - a), float((i3 - i1) / i2 - b), float((i1 - i2) / i3 - c)
 

@@ -12,11 +12,12 @@ module tape_march
   use tape, only: FIRST_UNKNOWN, next_break, tape_arrays_t, tape_t, TIME_SLOT
   use tape_growth, only: begin, close_block, count_step, find_growth, MOST_UNKNOWNS, transitions_t
   use tape_live, only: keep_live, settle
-  use tape_plan, only: converge, find_varying, fitting, LEAST_LOCAL_TOLERANCE, &
-                       local_tolerance_of, MOST_TRIES, order_for, resolving
+  use tape_plan, only: converge, fitting, LEAST_LOCAL_TOLERANCE, local_tolerance_of, &
+                       MOST_TRIES, order_for
   use tape_series, only: derivatives_at, expand, LAST_TERM, MOST_BLOCKS, MOST_ORDER, noise_of, &
                          PADDED, perturb_tape, series_t, SIDE_BY_SIDE, slot_gradient, &
                          sum_perturbations, sum_terms, VARIATION_TOLERANCE
+  use tape_steady, only: find_varying, near_zero, resolving
   use tape_switches, only: CROSSES, follow, IS_CHANGED, jump_at, next_crossing, &
                            operand_error, resolve_switches, SLIDES, STAYS, switches_t
   use two_words, only: two_sum
@@ -113,6 +114,7 @@ contains
     logical :: is_rejected                    ! whether a longer step was rejected
     logical :: has_values                     ! whether terms 0 of all slots are known
     logical :: is_short                       ! whether the terms of perturbations do not suffice
+    logical :: is_resolved                    ! whether the terms of the Jacobian were checked
     logical :: is_compared                    ! whether terms 0 are those of a touch
     logical :: is_low                         ! whether the order must be raised
     logical :: is_guessed                     ! whether the size of an own state is guessed
@@ -208,7 +210,7 @@ contains
       if (is_short) then
         shortened = fitting_lanes()
         factor = factor*shortened
-        if (n_varying > 0 .and. shortened < MUCH_LESS) then
+        if (is_resolved .and. shortened < MUCH_LESS) then
           ! The polynomials of the Jacobian are those of a much longer step.
           call perturb()
           if (is_short) factor = factor*fitting_lanes()
@@ -356,8 +358,18 @@ contains
 
     real(dp) function longest_step()
       !! Return the factor on the step that the terms of the unknowns and of the Jacobian allow.
+      logical :: near(tape%n_unknowns)
+
       longest_step = fitting(tape, s%order, local_tolerance, weights, s%a)
-      if (n_varying > 0) longest_step = resolving(varying(:n_varying), s%a, longest_step)
+      is_resolved = .false.
+      if (n_varying == 0 .or. .not. longest_step > 0.0_dp) return
+      ! Relative to no omega, any perturbation of the attitude is large.
+      if (n > 3 .and. .not. scale > 0.0_dp) return
+      near = near_zero(n, local_tolerance, weights, s)
+      is_resolved = any(near)
+      if (is_resolved) then
+        longest_step = resolving(varying(:n_varying), near, weights, s, longest_step)
+      end if
     end function longest_step
 
     real(dp) function share_of(steps)

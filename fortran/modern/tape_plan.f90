@@ -1,10 +1,8 @@
 module tape_plan
   !! The order, local tolerance and step of an integration of a tape.
   use kinds, only: dp
-  use operations, only: ARCSINE => ASIN, ARCTANGENT => ATAN, EXPONENTIAL => EXP, LINEAR, &
-                        LOGARITHM => LOG, PRODUCT, QUOTIENT, SELECT_OF => SELECT, &
-                        SQUARE_ROOT => SQRT, TABLE, TANGENT => TANH
-  use tape, only: FIRST_UNKNOWN, tape_t, TIME_SLOT
+  use operations, only: EXPONENTIAL => EXP, QUOTIENT, SQUARE_ROOT => SQRT, TANGENT => TANH
+  use tape, only: FIRST_UNKNOWN, tape_t
   use tape_powers, only: INVISIBLE, powers_t, resolve
   use tape_series, only: LARGE_ARGUMENT, LAST_TERM, MOST_ORDER
   implicit none(type, external)
@@ -19,12 +17,8 @@ module tape_plan
   real(dp), parameter :: LONGER = 16.0_dp  ! largest factor on the step that was tried
   real(dp), parameter, public :: LEAST_LOCAL_TOLERANCE = 1e-18_dp ! below rounding
   real(dp), parameter :: WITHIN_CIRCLE = 0.9_dp ! part of the distance of a zero
-  ! Last of the terms from which the Jacobian is computed, and their largest relative size.
-  integer, parameter :: LAST_AMID = 15
-  real(dp), parameter :: MOST_AMID = 1e-4_dp
-  real(dp), parameter :: ENOUGH = 0.5_dp   ! part of a limit that is aimed at
 
-  public :: converge, find_varying, fitting, local_tolerance_of, order_for, resolving
+  public :: converge, fitting, local_tolerance_of, order_for
 
 contains
 
@@ -57,96 +51,6 @@ contains
       end if
     end do
   end function fitting
-
-  subroutine find_varying(tape, slots, n_found)
-    !! Find the slots on which the Jacobian depends and which change in a steady motion, because
-    !! they depend on the time. The terms of the unknowns do not show whether their series converge.
-    type(tape_t), intent(in) :: tape
-    integer, intent(out) :: slots(:)
-    integer, intent(out) :: n_found
-    logical :: moves(1 + tape%n_slots)   ! whether a slot depends on the time
-    logical :: depends(1 + tape%n_slots) ! whether it depends on an unknown
-    logical :: varies(1 + tape%n_slots)
-    integer :: i, last, n
-
-    moves = .false.
-    depends = .false.
-    varies = .false.
-    moves(TIME_SLOT) = .true.
-    depends(FIRST_UNKNOWN:FIRST_UNKNOWN - 1 + tape%n_unknowns) = .true.
-    do n = 1, tape%n_operations
-      associate (kind => tape%operations(1, n), first => tape%operations(2, n), &
-                 second => tape%operations(3, n), out => tape%operations(4, n))
-        last = tape%n_slots
-        if (n < tape%n_operations) last = tape%operations(4, n + 1) - 1
-        select case (kind)
-        case (TABLE)
-          moves(out) = .true.
-        case (LINEAR)
-          call add_combinations(first, first)
-        case (SELECT_OF)
-          call add_combinations(second, second + 1)
-        case (PRODUCT, QUOTIENT, LOGARITHM, ARCTANGENT, ARCSINE)
-          moves(out:last) = moves(first) .or. moves(second)
-          depends(out:last) = depends(first) .or. depends(second)
-          if (depends(out)) varies([first, second]) = .true.
-          if (depends(out) .and. kind /= PRODUCT) varies(out) = .true.
-        case default
-          moves(out:last) = moves(first)
-          depends(out:last) = depends(first)
-          if (depends(out)) varies([first, out]) = .true.
-        end select
-      end associate
-    end do
-    n_found = 0
-    do i = FIRST_UNKNOWN + tape%n_unknowns, tape%n_slots
-      if (.not. (varies(i) .and. moves(i))) cycle
-      n_found = n_found + 1
-      slots(n_found) = i
-    end do
-
-  contains
-
-    subroutine add_combinations(first, last)
-      integer, intent(in) :: first, last
-      integer :: k, out
-
-      out = tape%operations(4, n)
-      do k = tape%starts(first), tape%starts(last + 1) - 1
-        moves(out) = moves(out) .or. moves(tape%slots(k))
-        depends(out) = depends(out) .or. depends(tape%slots(k))
-      end do
-    end subroutine add_combinations
-
-  end subroutine find_varying
-
-  pure real(dp) function resolving(slots, a, factor)
-    !! Return the factor on the step, reduced until the series of some slots converge at its end.
-    integer, intent(in) :: slots(:)
-    real(dp), intent(in) :: a(0:, :)
-    real(dp), intent(in) :: factor
-    real(dp) :: before, last
-    integer :: i, k, tries
-
-    resolving = factor
-    do i = 1, size(slots)
-      associate (terms => a(:, slots(i)))
-        do tries = 1, MOST_TRIES
-          last = resolving**(LAST_AMID - 1)*(abs(terms(LAST_AMID)) &
-                                             + resolving*abs(terms(LAST_AMID + 1)))
-          before = abs(terms(1)) + resolving*(abs(terms(2)) + resolving*abs(terms(3)))
-          if (.not. last > MOST_AMID*before) exit
-          before = 0.0_dp
-          do k = LAST_AMID - 2, 0, -1
-            before = abs(terms(k + 1)) + resolving*before
-          end do
-          ! The first term of a power may be the last of all.
-          if (.not. (last > MOST_AMID*before .and. before > 0.0_dp)) exit
-          resolving = resolving*max(0.25_dp, (ENOUGH*MOST_AMID*before/last)**(1.0_dp/LAST_AMID))
-        end do
-      end associate
-    end do
-  end function resolving
 
   subroutine converge(tape, order, smallest, a, powers, factor)
     !! Reduce the factor on the step so that the series of every operation converges. The last terms

@@ -44,6 +44,7 @@ module tape_series
 
   ! Blocks of perturbations: the error, and one for each unknown.
   integer, parameter, public :: MOST_BLOCKS = (MOST_UNKNOWNS + SIDE_BY_SIDE)/SIDE_BY_SIDE
+  integer, parameter, public :: BLOCKS_OF_COLUMNS = (MOST_UNKNOWNS + SIDE_BY_SIDE - 1)/SIDE_BY_SIDE
 
   ! Taylor series around the beginning of a step.
   type, public :: series_t
@@ -139,6 +140,17 @@ module tape_series
       integer(c_int), intent(in), value :: is_long !! not 0: there are many steps
     end function perturb_tape
 
+    subroutine jacobian_at(tape, h, parts, jacobian) bind(c, name="jacobian_at_level")
+      !! Compute the Jacobian of the rates, times h, at four parts of the step: element
+      !! (lane, i, block, part) is the derivative of rate i by the unknown of a lane.
+      import :: dp, BLOCKS_OF_COLUMNS, MOST_UNKNOWNS, SIDE_BY_SIDE, tape_arrays_t
+      implicit none(type, external)
+      type(tape_arrays_t), intent(in) :: tape
+      real(dp), intent(in), value :: h
+      real(dp), intent(in) :: parts(4)
+      real(dp), intent(inout) :: jacobian(SIDE_BY_SIDE, MOST_UNKNOWNS, BLOCKS_OF_COLUMNS, 4)
+    end subroutine jacobian_at
+
     subroutine slot_gradient(tape, slot, gradient) bind(c, name="slot_gradient_level")
       !! Compute the derivatives of term 0 of a slot by the unknowns.
       import :: c_int, dp, tape_arrays_t
@@ -173,8 +185,8 @@ module tape_series
     end subroutine sum_perturbations
   end interface
 
-  public :: allocate_series, begin_work, chosen, derivatives_at, expand, noise_of, perturb_tape, &
-            slot_gradient, sum_perturbations, sum_terms, value_of, vary_tape
+  public :: allocate_series, begin_work, chosen, derivatives_at, expand, jacobian_at, noise_of, &
+            perturb_tape, slot_gradient, sum_perturbations, sum_terms, value_of, vary_tape
 
 contains
 

@@ -582,18 +582,36 @@ static const double many_weights[][NODES] = {
     {14.325858354171903, -31.388222363446072, 24.998125859219108, -7.935761849944937},
     {-7.420540068038947, 18.795449407555054, -18.795449407555054, 7.420540068038947}};
 
+/* Compute one block of columns of the Jacobian, times the step, at so many `parts` of the step. */
+static ALWAYS_INLINE void set_at(const struct tape *tape, const int block, const int columns,
+                                 const int nodes, double h, nodal parts, matrix *jacobian)
+{
+  row *to[] = {jacobian[0][block], jacobian[1][block], jacobian[2][block], jacobian[3][block]};
+  if (!tape->leaves) set_columns(tape, nodes, block * SIDE_BY_SIDE, columns, h, parts, to);
+  else if (block == 0)
+    tape->leaves->set_jacobian(tape->a, tape->coefficients, tape->constants, (const double *)&parts,
+                               nodes, h, jacobian[0][0][0]);
+}
+
+/* Compute the Jacobian, times the step, at four parts of the step. */
+void OF_LEVEL(jacobian_at, LEVEL)(const struct tape *tape, double h, const double *parts,
+                                  matrix *result)
+{
+  matrix jacobian[NODES] __attribute__((aligned(64))) = {{{{0.0}}}};
+  const nodal at = {parts[0], parts[1], parts[2], parts[3]};
+  for (int block = 0; block * SIDE_BY_SIDE < tape->n_unknowns; block++)
+    set_at(tape, block, SIDE_BY_SIDE, NODES, h, at, jacobian);
+  memcpy(result, jacobian, sizeof jacobian);
+}
+
 /* Compute one block of columns of the Jacobian as a polynomial of the part of the step, through its
    values at the nodes of Gauss: the error of the perturbations is of order 2 nodes + 1. */
 static ALWAYS_INLINE void set_block(const struct tape *tape, const int block, const int columns,
                                     const int nodes, double h, double factor, matrix *jacobian)
 {
   const int is_few = nodes == FEW_NODES;
-  const nodal parts = factor * (is_few ? few_parts : many_parts);
   row *to[] = {jacobian[0][block], jacobian[1][block], jacobian[2][block], jacobian[3][block]};
-  if (!tape->leaves) set_columns(tape, nodes, block * SIDE_BY_SIDE, columns, h, parts, to);
-  else if (block == 0)
-    tape->leaves->set_jacobian(tape->a, tape->coefficients, tape->constants, (const double *)&parts,
-                               nodes, h, jacobian[0][0][0]);
+  set_at(tape, block, columns, nodes, h, factor * (is_few ? few_parts : many_parts), jacobian);
   const double per_factor = 1.0 / factor;
   for (int i = 0; i < tape->n_unknowns; i++) {
     for (int p = 0; p < columns; p += IN_REGISTER) {

@@ -34,6 +34,7 @@ MODULES = (
     "tape_growth",
     "tape_series",
     "tape_plan",
+    "tape_steady",
     "tape_roots",
     "tape_switches",
     "tape_live",

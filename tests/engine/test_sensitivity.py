@@ -109,6 +109,27 @@ def test_growth_of_a_steady_motion_follows_a_torque_that_it_does_not_feel(
     assert found.growth == pytest.approx(1.1, abs=0.1)
 
 
+@pytest.mark.parametrize(
+    "function",
+    [
+        lambda t: np.cos(t) ** 20,
+        lambda t: np.exp(-20.0 * t),
+        lambda t: 1e-40 * np.cos(1e3 * t),
+        lambda t: np.cos(10.0 * t * t),
+    ],
+)
+def test_a_steady_motion_takes_no_more_steps_than_another(function: Callable[[Any], Any]) -> None:
+    def torque(time: Any, omega: Any) -> list[Any]:
+        return [0.5 * function(time) * omega[1], 0.5 * function(time) * omega[0], 0.0]
+
+    steps = {}
+    for omega in [(0.0, 0.0, 1.0), (0.3, -0.5, 1.0)]:
+        found = solve(Scene("", omega, moments=(1.0, 2.0, 2.5), torque=torque), 50.0)
+        assert found.ended == "complete"
+        steps[omega] = found.steps
+    assert steps[0.0, 0.0, 1.0] <= steps[0.3, -0.5, 1.0]
+
+
 @pytest.mark.parametrize("power", [-900, -300, 1, 300, 900])
 def test_growth_has_no_unit(power: int) -> None:
     factor = math.ldexp(1.0, power)

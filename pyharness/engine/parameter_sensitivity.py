@@ -259,8 +259,13 @@ def _moves(scene: Scene, name: str) -> Iterator[tuple[Callable[[float], Scene], 
             "arguments, constants of expressions, the body and the initial state"
         )
     largest = max(map(abs, listed)) or 1.0
-    for k, value in enumerate(listed):
-        size = largest if name == OMEGA else abs(value) or largest
+    sizes = [largest] * len(listed)
+    if name == "inertia":
+        # An element off the diagonal may be a rounding error.
+        sizes = [math.sqrt(abs(listed[i] * listed[j])) or largest for i, j in INERTIA_ELEMENTS]
+    elif name not in (OMEGA, "coefficients"):
+        sizes = [abs(value) or largest for value in listed]
+    for k, size in enumerate(sizes):
 
         def moved(h: float, k: int = k) -> Scene:
             values = [x + h * (i == k) for i, x in enumerate(listed)]

@@ -98,6 +98,21 @@ def test_differences_are_the_derivatives_where_no_switch_changes(name: str) -> N
     assert np.abs(found[0][name] - found[1][name]).max() <= 1e-9 * scale
 
 
+def test_elements_off_the_diagonal_change_by_the_size_of_the_body() -> None:
+    """Those of a rotated cube are rounding errors."""
+    turn, _ = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))
+    cube = 2.0 * turn @ turn.T
+    rotated, known = (
+        Scene("", (0.5, -0.3, 0.8), inertia=inertia, torque=brake)
+        for inertia in (0.5 * (cube + cube.T), 2.0 * np.eye(3))
+    )
+    slopes: list[Any] = [
+        solve(scene, 1.0, tolerance=1e-12, sensitivities=["inertia"]).sensitivities
+        for scene in (rotated, known)
+    ]
+    assert slopes[0]["inertia"] == pytest.approx(slopes[1]["inertia"], rel=1e-9, abs=1e-9)
+
+
 def test_what_has_no_influence_has_a_derivative_of_zero() -> None:
     def law(t: Any, omega: Any, *, unused: float = 0.3) -> Any:
         return [0.0, 0.0, np.where(t > 50.0, unused, 0.1)]

@@ -153,9 +153,9 @@ contains
       ended = solution%status
       count = solution%steps
     end if
-    ! A start that is not finite may be returned as it is, for example at time 0.
+    ! A start that is not finite may be returned as it is at time 0, and a steady omega at any time.
     if (is_result(ended)) then
-      if (.not. all(abs(omega) <= huge(t_end))) ended = OVERFLOW
+      if (.not. (all(abs(omega) <= huge(t_end)) .and. abs(t_end) <= huge(t_end))) ended = OVERFLOW
     end if
   end subroutine solve_as_given
 

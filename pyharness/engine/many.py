@@ -90,7 +90,8 @@ def solve_many(
     times : float or iterable of float, shape (m,)
         Strictly monotonic times (s) of the results for all bodies, instead of `t_end`. The arrays
         of the result have a further axis, of length m, after the axis of the bodies. The states at
-        a time are bit for bit those of a call with this time as `t_end`.
+        a time are bit for bit those of a call with this time as `t_end`, unless the scene has
+        states of its own.
     omega : array, shape (n, 3) or (3,)
         Initial angular velocities, rad/s. A single row, here and below, applies to all bodies.
     attitude : array, shape (n, 4) or (4,), or scipy.spatial.transform.Rotation
@@ -215,7 +216,8 @@ def solve_many(
     bodies, ends = scene, t_end
     if rows is not None:  # a body for each body and time
         if isinstance(scene, Scene):
-            copies = checked_copies(arrays)
+            # Normalised twice, a quaternion may have another last bit.
+            copies = checked_copies(arrays, as_given=True)
             n = count_bodies(copies)
             arrays |= {
                 name: each if len(each) == 1 else np.repeat(each, len(rows), axis=0)

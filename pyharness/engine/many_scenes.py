@@ -203,12 +203,15 @@ def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
     return found
 
 
-def checked_copies(arrays: dict[str, Any]) -> dict[str, Array]:
-    """Return copies of the arrays, with one row for each body or for all."""
+def checked_copies(arrays: dict[str, Any], *, as_given: bool = False) -> dict[str, Array]:
+    """Return copies of the arrays, with one row for each body or for all.
+
+    Quaternions are normalised, except `as_given`.
+    """
     rows = checked_rows({**arrays, "omega": None, "attitude": None})
     for name in ("omega", "attitude"):
         rows |= checked_rows({name: arrays[name]})
-    if "attitude" in rows:
+    if "attitude" in rows and not as_given:
         rows["attitude"] = unit_quaternions(rows["attitude"])
     return {name: each.copy() for name, each in rows.items()}
 

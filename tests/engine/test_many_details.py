@@ -226,6 +226,13 @@ def test_scenes_have_rows_over_time() -> None:
     assert final.attrs["units"]["omega3"] == "rad/s"
 
 
+def test_attitudes_at_a_time_are_those_of_a_call_with_this_time() -> None:
+    draw = np.random.default_rng(0)
+    given: Any = {"omega": draw.normal(size=(200, 3)), "attitude": draw.normal(size=(200, 4))}
+    found, last = MANY(TOP, times=[1.0, 2.0], **given), MANY(TOP, 2.0, **given)
+    np.testing.assert_array_equal(found.attitude[:, 1], last.attitude)
+
+
 @pytest.mark.parametrize("shape", [(3,), (4, 3), (3, 3), (4, 3, 3)])
 def test_energy_and_angular_momentum_are_those_of_trajectories(shape: tuple[int, ...]) -> None:
     draw = np.random.default_rng(3)

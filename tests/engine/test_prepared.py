@@ -3,6 +3,7 @@
 import copy
 import doctest
 import gc
+import math
 import pickle
 import subprocess
 import sys
@@ -25,7 +26,7 @@ import pytest
 import pyharness.engine.plan as planning
 import pyharness.engine.solve as solving
 import pyharness.engine.solver as solver_module
-from pyharness import InputError, Scene, TorqueLaw, case_scene, prepare, solve
+from pyharness import InputError, Scene, TorqueLaw, case_scene, prepare, solve, solve_many
 from pyharness.bench.growth import growth
 from pyharness.bench.savings import measured_saving
 from pyharness.cli.main import main
@@ -441,6 +442,16 @@ def test_auto_solves_what_the_closed_form_refuses(attitude: bool) -> None:
         rows.append(solver.trajectory(scene.omega, [5.0]).omega[0])
     for row in rows:
         np.testing.assert_allclose(row, wanted, rtol=1e-11)
+
+
+@pytest.mark.parametrize("moments", [(1.0, 2.0, 2.5), (2.0, 2.0, 2.0)])
+@pytest.mark.parametrize("time", [math.nan, math.inf, -math.inf])
+def test_a_steady_rotation_has_no_omega_at_no_finite_time(moments: Any, time: float) -> None:
+    scene = Scene("steady", (0.0, 1.0, 0.0), moments=moments)
+    solver = prepare(scene)
+    assert np.isnan(solver(_omega(scene), time)).all()
+    assert solver.status == "overflow"
+    assert np.isnan(solve_many(scene, np.array([time])).omega).all()
 
 
 def test_what_the_closed_form_gives_up_no_series_is_asked() -> None:

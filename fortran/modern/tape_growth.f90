@@ -11,8 +11,9 @@ module tape_growth
   integer, parameter :: STEPS_IN_BLOCK = 4
   integer, parameter :: MOST_BLOCKS = 64 ! even
   integer, parameter :: MOST_STEPS_IN_BLOCK = 2**28 ! within the range of the counter
-  ! A larger norm would have no further meaning; the square of a product of two such is in range.
-  real(dp), parameter :: LARGEST = 1e75_dp
+  real(dp), parameter :: LARGEST = 1e75_dp ! a larger norm would have no further meaning
+  ! Of an element, whose unit may be large; a product of two such is in range.
+  real(dp), parameter :: LARGEST_ELEMENT = 1e150_dp
 
   ! Matrices of blocks of steps; element (i, j) is the derivative of unknown i at a block's end by
   ! unknown j at its beginning. Blocks are merged in pairs when the array is full.
@@ -129,7 +130,7 @@ contains
           ! The errors of a block are at its beginning or its end.
           noise_of_block(:n) = sqrt(t%noise(:n, m))
           squares = squares + sum_of_squares(n, product, noise_of_block, sizes)
-          product(:, :n) = composed(n, product, t%matrices(:, :, m))
+          product(:, :n) = bounded(composed(n, product, t%matrices(:, :, m)))
           squares = squares + sum_of_squares(n, product, noise_of_block, sizes)
           growth = max(growth, norm(n, product, sizes))
         end do
@@ -172,11 +173,11 @@ contains
   end function sum_of_squares
 
   elemental real(dp) function bounded(x)
-    !! Limit an element of a derivative to LARGEST, which also replaces NaN.
+    !! Limit an element of a derivative to LARGEST_ELEMENT, which also replaces NaN.
     real(dp), intent(in) :: x
 
-    bounded = LARGEST
-    if (abs(x) <= LARGEST) bounded = x
+    bounded = LARGEST_ELEMENT
+    if (abs(x) <= LARGEST_ELEMENT) bounded = x
   end function bounded
 
   pure function padded(n, matrix) result(rows_too)

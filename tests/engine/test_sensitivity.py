@@ -20,6 +20,7 @@ from pyharness.engine.sensitivity import closed_form_estimate, is_sensitive, mot
 from pyharness.model.codes import Statuses
 from pyharness.model.scene import Triple
 from pyharness.model.trajectory import ROUNDING, Trajectory, digits_left
+from pyharness.torques import damping
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.reference import reference
 from tests.checks.scenes import free_motions
@@ -128,6 +129,17 @@ def test_a_steady_motion_takes_no_more_steps_than_another(function: Callable[[An
         assert found.ended == "complete"
         steps[omega] = found.steps
     assert steps[0.0, 0.0, 1.0] <= steps[0.3, -0.5, 1.0]
+
+
+@pytest.mark.parametrize("power", [-320, -299, -250, 250])
+def test_growth_beside_the_attitude_has_no_unit(power: int) -> None:
+    """Derivatives of the attitude by omega are as large as the unit of time."""
+    unit, found = 2.0**power, []
+    for each in (1.0, unit):
+        omega = (0.3 * each, each, -0.4 * each)
+        scene = Scene("", omega, moments=(1.0, 2.0, 2.5), torque=damping(0.3 * each))
+        found.append(solve(scene, 3.0 / each, attitude=True))
+    assert found[1].growth == pytest.approx(found[0].growth, rel=1e-12)
 
 
 @pytest.mark.parametrize("power", [-900, -300, 1, 300, 900])

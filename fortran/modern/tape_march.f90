@@ -319,6 +319,8 @@ contains
     do i = 1, n
       found%error = max(found%error, weights(i)*abs(lanes(1, i, 1)))
     end do
+    ! Relative to a smaller omega, errors are unknown.
+    if (scale > 0.0_dp .and. scale < LEAST_SCALE) found%error = 1.0_dp
 
   contains
 

@@ -1,6 +1,7 @@
 """Extreme motions that random input found: no traceback, no hang, no NaN that is `complete`."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -87,6 +88,19 @@ def test_extreme_motion_ends_in_time_and_says_how(
     elif end == "complete":
         wanted = np.array(scene.omega) + times[0] * np.array(scene.law.constant)
         np.testing.assert_allclose(found.omega[0], wanted, rtol=1e-7, atol=1e157)
+
+
+@pytest.mark.parametrize("size", [1e158, 1e200])
+def test_errors_relative_to_an_omega_out_of_range_are_unknown(size: float) -> None:
+    """Regression test: an omega of 1e-160 rad/s was wrong by one percent, and `complete`."""
+    moments = (2.4 * size, 2.2 * size, 2.0 * size)
+
+    def torque(t: Any, omega: Any) -> list[Any]:
+        return [1.0 + 0.1 * np.sin(2.0 * t), -t * t, 0.2]
+
+    found = solve(Scene("", REST, moments, torque=torque), 9.76, tolerance=1e-3)
+    assert found.ended == "sensitive"
+    assert found.error == pytest.approx(1.0)
 
 
 def test_scipy_gives_up_by_what_it_costs(monkeypatch: pytest.MonkeyPatch) -> None:

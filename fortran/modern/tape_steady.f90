@@ -147,7 +147,8 @@ contains
             x = abs(one(lane, i, block, node) - other(lane, i, block, node))
             x = resolving*x*min(1.0_dp, weights(i)/weights(j))
             ! NaN must not be lost in the maximum.
-            if (.not. x <= difference) difference = x
+            if (.not. x <= huge(x)) x = huge(x)
+            difference = max(difference, x)
           end do
         end do
       end do

@@ -114,6 +114,7 @@ def test_growth_of_a_steady_motion_follows_a_torque_that_it_does_not_feel(
     "function",
     [
         lambda t: np.cos(t) ** 20,
+        lambda t: 0.4 * np.cos(5.0 * t) ** 13,
         lambda t: np.exp(-20.0 * t),
         lambda t: 1e-40 * np.cos(1e3 * t),
         lambda t: np.cos(10.0 * t * t),

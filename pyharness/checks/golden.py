@@ -35,6 +35,7 @@ from pyharness.model.schema import SCHEMAS, check_schema
 from pyharness.model.trajectory import Array, Trajectory
 
 _ANEW = "verify --update writes it anew"
+_MARK = "# Written by: python -m pyharness verify --update"
 _STEPS = (1, 10)
 _RECORDED_METHODS = ("taylor", "closed-form", "gauss-4", "rk4", *SCIPY_METHODS)
 _TOLERANCE = 1e-9
@@ -162,6 +163,19 @@ def read_record(folder: Path) -> dict[str, dict[str, Any]]:
     return found
 
 
+def files_made(folder: Path) -> set[str]:
+    """Return the names of the files in `folder` that `verify --update` made.
+
+    Beside a record, a file with the name of another one is a damaged record.
+    """
+    found = set()
+    for path in folder.glob("*.toml"):
+        with suppress(InputError):
+            if _MARK.encode() in read_input(path, "file", _LARGEST, "a record"):
+                found.add(path.name)
+    return found | {f"{each.source}.toml" for each in recorded()} if found else found
+
+
 def update(folder: Path) -> tuple[dict[str, bytes], list[str]]:
     """Return the files of a new golden record, by name, and its differences from the old record."""
     known: dict[str, dict[str, Any]] = {}
@@ -230,7 +244,7 @@ def _text(name: str, entries: list[dict[str, Any]]) -> str:
     kind = "program" if name in PROGRAMS else "method"
     lines = [
         f"# The {kind} {name}: rows are step, time, TIME, omega, velocity (programs).",
-        "# Written by: python -m pyharness verify --update",
+        _MARK,
         f"schema = {SCHEMAS['golden record']}",
         f'mathematics = "{mathematics()}"',
     ]

@@ -7,7 +7,7 @@ computation.
 import json
 import os
 import shutil
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from pyharness.model.errors import InputError
@@ -73,16 +73,24 @@ def check_tree(path: str, mark: str, option: str, kind: str = "edition") -> None
     The folder may be missing or empty, or contain only the JSON file `mark`, of schema `kind`, and
     the files that `mark` lists.
     """
+    check_replaceable(path, lambda folder: {mark, *_listed(folder / mark, kind)}, option)
+
+
+def check_replaceable(path: str, made: Callable[[Path], set[str]], option: str) -> None:
+    """Raise InputError unless `write_tree` may replace the folder, which may be missing or empty.
+
+    `made` returns the paths in a folder of the files that the verb made.
+    """
     check_folder(path, (), option)
     folder = Path(os.path.realpath(path))
     new, _ = _beside(folder)
     try:
-        reason = _why_not_anew(folder, mark, kind)
+        reason = _why_not_anew(folder, made)
         # Permissions alone do not show whether a folder can be made.
         if not reason:
             new.mkdir()
             try:
-                (new / mark).touch()
+                (new / "probe").touch()
             finally:
                 shutil.rmtree(new, ignore_errors=True)
     except OSError as error:
@@ -91,12 +99,12 @@ def check_tree(path: str, mark: str, option: str, kind: str = "edition") -> None
         raise InputError(f"{option} '{path}': {reason.removeprefix(': ')}; give a new name")
 
 
-def _why_not_anew(folder: Path, mark: str, kind: str) -> str:
+def _why_not_anew(folder: Path, made: Callable[[Path], set[str]]) -> str:
     if Path.cwd().is_relative_to(folder):
         return "is the folder that you are in, or one above it"
     if not os.access(folder.parent, os.W_OK) or os.path.ismount(folder):
         return f"can't be made anew in '{folder.parent}'"
-    listed = {mark, *_listed(folder / mark, kind)}
+    listed = made(folder)
     for file in sorted(folder.rglob("*")):
         name = file.relative_to(folder).as_posix()
         if name not in listed and (file.is_symlink() or not file.is_dir()):

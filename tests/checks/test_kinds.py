@@ -5,6 +5,7 @@ import json
 import math
 import re
 import shlex
+import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache, partial
@@ -226,6 +227,24 @@ def test_record_that_is_none_is_told_in_one_line_and_mended(
         assert main(["verify", "--update", "--record", str(tmp_path)]) == 0
     assert path.read_text() == good
     assert not (tmp_path / "rk9.toml").exists()
+
+
+# Beside a record, a file with the name of another one, such as taylor.toml, is a damaged record.
+@pytest.mark.parametrize(
+    ("name", "beside"),
+    [("mine.toml", ()), ("taylor.toml", ()), ("mine.toml", ("rk4.toml",)), ("mine", ("rk4.toml",))],
+)
+def test_update_refuses_files_of_others(
+    name: str, beside: tuple[str, ...], tmp_path: Path, capsys: Capture
+) -> None:
+    """Regression test: every other TOML file in the folder was deleted."""
+    for each in beside:
+        shutil.copy(RECORD / each, tmp_path)
+    (tmp_path / name).write_text("a = 1\n")
+    with patch("pyharness.checks.golden.update", side_effect=AssertionError):
+        assert main(["verify", "--update", "--record", str(tmp_path)]) == 2
+    assert f"holds '{name}', which was not made by this verb" in capsys.readouterr().err
+    assert {path.name for path in tmp_path.iterdir()} == {*beside, name}
 
 
 def test_no_record_is_said(tmp_path: Path, capsys: Capture) -> None:

@@ -199,19 +199,16 @@ def _unjudged(chosen: Selection, checks: list[Check]) -> list[str]:
 
 
 def _update(record: Path) -> int:
-    from pyharness.checks.golden import update
-    from pyharness.cli.output import check_folder, write_folder
+    from pyharness.checks.golden import files_made, update
+    from pyharness.cli.output import check_replaceable, write_tree
 
     if not record.parent.is_dir():
         raise InputError(
             "there are no stored trajectories (golden) here to update; give --record DIR"
         )
-    check_folder(str(record), (), "--record")
+    check_replaceable(str(record), files_made, "--record")
     files, news = update(record)
-    write_folder(str(record), files, "--record")
-    for path in record.glob("*.toml"):
-        if path.name not in files:
-            path.unlink()
+    write_tree(str(record), files, "--record")
     lines = news or ["nothing moved"]
     shared.emit("".join(f"{line}\n" for line in [*lines, f"{len(files)} files in {record}"]), None)
     return 0

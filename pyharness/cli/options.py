@@ -71,6 +71,9 @@ ALSO = {
     ".md (Markdown), .xml (JUnit) or .json."
 }
 _BY_SUFFIX = {".md": "markdown", ".xml": "junit", ".json": "json"}
+# Options and arguments that name a file to read; --check names several.
+_INPUTS = ("scene", "file", "scan", "vectors", "external", "listing_output", "sweep")
+_MORE_OUTPUTS = {"animate": "the animation", "certificate": "the certificate"}
 _WORTH_SAYING = 60.0  # run time (s) above which a forecast is printed
 
 
@@ -343,28 +346,50 @@ def also_files(options: argparse.Namespace) -> dict[str, str]:
 
 
 def check_outputs(options: argparse.Namespace) -> None:
-    """Raise InputError if a file of --out, --plot or --also can't be written.
+    """Raise InputError if a file can't be written, or is an input or another output.
 
     Verbs call it before any computation.
     """
-    for path in also_files(options):
+    also = also_files(options)
+    for path in also:
         check_writable(path, "--also")
+    files = [(path, "--also", "the result") for path in also]
     picture = getattr(options, "plot", None)
     if picture is not None:
         from pyharness.views.pictures import check_picture, numbers_beside
 
         check_picture(picture)
-        for path in (picture, numbers_beside(picture)):
+        pair = ((picture, "the picture"), (numbers_beside(picture), "its numbers"))
+        for path, what in pair:
             check_writable(path, "--plot")
+            files.append((path, "--plot", what))
+    for name, what in _MORE_OUTPUTS.items():
+        if (path := getattr(options, name, None)) is not None:
+            files.append((path, f"--{name}", what))
     if options.out is not None:
         check_writable(options.out, "--out")
-        if picture is not None:
-            for path, what in ((picture, "the picture"), (numbers_beside(picture), "its numbers")):
-                if os.path.realpath(path) == os.path.realpath(options.out):
-                    raise InputError(
-                        f"--out '{options.out}': --plot '{picture}' writes {what} to this file; "
-                        "give another name"
-                    )
+        for path, option, what in files:
+            if _is_same(path, options.out):
+                shown = picture if option == "--plot" else path
+                raise InputError(
+                    f"--out '{options.out}': {option} '{shown}' writes {what} to this file; "
+                    "give another name"
+                )
+        files.append((options.out, "--out", ""))
+    inputs = [getattr(options, name, None) for name in _INPUTS]
+    for read in [*filter(None, inputs), *names(getattr(options, "check", None))]:
+        for path, option, _ in files:
+            # Of devices, such as a terminal, input and output may be the same.
+            if os.path.isfile(read) and _is_same(path, read):
+                raise InputError(
+                    f"{option} '{path}': is the input file '{read}'; give another name"
+                )
+
+
+def _is_same(one: str, other: str) -> bool:
+    if os.path.isfile(one) and os.path.isfile(other):
+        return os.path.samefile(one, other)
+    return "\0" not in one + other and os.path.realpath(one) == os.path.realpath(other)
 
 
 def without_out(options: argparse.Namespace) -> argparse.Namespace:

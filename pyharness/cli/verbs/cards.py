@@ -61,11 +61,11 @@ def run(options: argparse.Namespace) -> int:
     shared.refuse(options, kind, others)
     if options.cards is not None:
         raise InputError(f"cards {options.cards!r} has no meaning with {kind}; give one of them")
+    shared.check_outputs(options)
     text, lines = "", []
     if kind == "--scan":
         text = _text(options.scan)
         lines = unexplained(text)
-    shared.check_outputs(options)
     failures: Any = None
     match kind:
         case "--format tei":

@@ -326,7 +326,8 @@ def _slopes(errors: Array) -> list[float]:
     return [
         math.log2(coarse / fine)
         for coarse, fine in zip(errors[:-2], errors[2:], strict=True)
-        if coarse < _LARGEST and fine > _SMALLEST
+        # An error may be 0, or so large that the ratio is 0.
+        if coarse < _LARGEST and fine > _SMALLEST and coarse / fine > 0.0
     ]
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import InputError, Scene, case_scene
+from pyharness import InputError, Scene, TorqueLaw, case_scene
 from pyharness.checks.theory.tableau import tableau
 from pyharness.cli.main import main
 from pyharness.history.family import (
@@ -275,6 +275,14 @@ def test_points_of_no_member_are_refused(arguments: Any) -> None:
 def test_solution_that_leaves_every_bound_is_refused() -> None:
     with pytest.raises(InputError, match=r"0\.9"):
         order_table(replace(GROWING, step_size=0.3, steps=4))
+
+
+def test_error_that_is_0_has_no_order() -> None:
+    """Regression test: the logarithm of 0."""
+    law = TorqueLaw(rate=(1e308, 1.0, 1.0))
+    scene = Scene("h", (1.0, 2.0, 3.0), coefficients=(0.0, 0.0, 0.0), torque=law)
+    found = order_table(replace(scene, step_size=0.1, steps=3), [Member("collocation", 2, None, 1)])
+    assert [each.measured for each in found] == [None]
 
 
 def test_one_member_in_every_format(printed: Printed) -> None:

@@ -185,7 +185,7 @@ class _Run:
                 else:
                     h = int(h * 2.0 ** (-excess - 0.05))
                 if abs(h) <= 1:
-                    at = time / 2.0**clock
+                    at = time / (1 << clock)
                     raise InputError(f"prove: no proof is found beyond t = {at:.6g} s")
             self._add_balls(expansion[0], radii[0], time, h)
             after = [sum(each) for each in expansion[0]]
@@ -197,7 +197,7 @@ class _Run:
             radius, wave_radius = radii[0] + system.norm([0, 0, 0]), radii[1]
             self.steps.append([h, tube, radius, middle])
             length = max(1, int(abs(h) * 2.0 ** min(longer, -excess)))
-            progress(abs(time * 100 // end), 100, f"t = {time / 2.0**clock:.4g} s")
+            progress(abs(time * 100 // end), 100, f"t = {time / (1 << clock):.4g} s")
 
     def _expected_excess(
         self, radius: int, source: int, middle: Sequence[int], share: float

@@ -68,6 +68,14 @@ def test_genuine_certificate_passes(name: str) -> None:
     assert all(0.0 < row["radius"] <= 2e-20 * 2 for row in certificate["rows"])
 
 
+def test_certificate_reaches_the_least_times() -> None:
+    """Regression test: 2.0**n overflowed for times below 1e-300 s."""
+    for end in (1e-298, 5e-324):
+        certificate = prove(case_scene(5), [end], 20).certificate
+        assert check(json.loads(json.dumps(certificate))) == 1
+        assert [row["time"] for row in certificate["rows"]] == [end]
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_certificate_of_a_random_scene_passes(kind: str) -> None:
     for seed in range(3):

@@ -246,15 +246,16 @@ def check(certificate: dict[str, Any]) -> int:
     return len(certificate["steps"])
 
 
-def check_file(name: str) -> tuple[dict[str, Any] | None, str]:
-    """Return a certificate and ""; if it does not hold, None and the reason."""
+def check_file(name: str, text: str | None = None) -> tuple[dict[str, Any] | None, str]:
+    """Return the certificate in a file, or in `text`, and ""; else None and why it fails."""
 
     def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         return dict(pairs) if len(dict(pairs)) == len(pairs) else {"a key occurs twice": None}
 
     try:
-        with open(name, encoding="ascii") as file:
-            text = file.read(LARGEST)
+        if text is None:
+            with open(name, encoding="ascii") as file:
+                text = file.read(LARGEST)
         if LONG.search(text):
             raise NotProvedError("a number has more than 4300 characters")
         check(found := json.loads(text, object_pairs_hook=unique))

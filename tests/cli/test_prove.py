@@ -98,9 +98,9 @@ def test_falsified_certificate_has_exit_status_1(capsys: pytest.CaptureFixture[s
     Path("good.json").write_text(json.dumps(record))
     record["steps"][1][3][0] += 1
     Path("bad.json").write_text(json.dumps(record))
-    Path("text.json").write_text("no JSON")
+    Path("text.json").write_text(json.dumps(record)[:-1])
     for names, status in (
-        ("good.json", 0), ("bad.json", 1), ("good.json,bad.json", 1), ("missing.json", 1),
+        ("good.json", 0), ("bad.json", 1), ("good.json,bad.json", 1),
         ("text.json,good.json", 1),
     ):  # fmt: skip
         assert main(["prove", "--check", names, "--format", "json"]) == status
@@ -112,3 +112,19 @@ def test_falsified_certificate_has_exit_status_1(capsys: pytest.CaptureFixture[s
     shown = capsys.readouterr().out
     assert "not proved" in shown
     assert "step 2" in shown
+
+
+@pytest.mark.parametrize("content", [None, b"", b"a = 1\n", b"{}", b"\xff\xfe{\0}\0"])
+def test_file_that_is_no_certificate_is_refused(
+    content: bytes | None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Regression test: the exit status was 1, as for a certificate that does not hold."""
+    if content is not None:
+        Path("x.json").write_bytes(content)
+    for name in ("x.json", str(Path.cwd())):
+        assert main(["prove", "--check", name]) == 2
+        told = capsys.readouterr()
+        assert told.out == ""
+        assert told.err.startswith(f"pyharness: --check '{name}': ")
+        assert told.err.count("\n") == 1
+

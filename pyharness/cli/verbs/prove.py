@@ -4,14 +4,17 @@ import argparse
 import json
 
 from pyharness.cli import options as shared
+from pyharness.model.errors import InputError
 from pyharness.model.output_files import check_writable, write_files
+from pyharness.model.pipes import read_input
 from pyharness.truth.certificate import prove
-from pyharness.truth.certificate_checker import check_file
+from pyharness.truth.certificate_checker import FORMAT, LARGEST, check_file
 from pyharness.truth.enclosed import with_energy
 from pyharness.truth.enclosure import MOST_DIGITS, enclose
 from pyharness.truth.enclosure_report import certificates_report, enclosure_report
 
 _DIGITS = 25
+_MARK = FORMAT.rpartition("-")[0].encode()  # also of other versions of the format
 OPTIONS = {
     **shared.SCENE,
     "--times T1,T2,...": "Times of the results, in s, all positive or all negative, in order of "
@@ -65,6 +68,14 @@ def _check(options: argparse.Namespace) -> int:
     found, names = [], shared.names(options.check)
     for number, name in enumerate(names):
         shared.progress(number, len(names), name)
-        found.append((name, *check_file(name)))
+        found.append((name, *check_file(name, _text(name))))
     failed = any(proved is None for _, proved, _ in found)
     return shared.show(certificates_report(found), options, failed=failed)
+
+
+def _text(name: str) -> str:
+    where = f"--check '{name}'"
+    content = read_input(name, where, LARGEST, "a certificate")
+    if not content.isascii() or _MARK not in content:
+        raise InputError(f"{where}: is not a certificate; give a file of prove --certificate")
+    return content.decode()

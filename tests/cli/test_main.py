@@ -142,6 +142,30 @@ def test_strict_takes_what_is_sensitive_for_a_failure(capsys: Capture) -> None:
         assert capsys.readouterr().out
 
 
+SINGULAR = "body.moments = [3, 2, 1]\ninitial.omega = [0, 1, 1]\ntorque.expression = [{}]\n"
+
+
+@pytest.mark.parametrize(
+    ("torque", "told"),
+    [("'1/w1', '0', '0'", "overflow: the rows end"), ("'sqrt(0.5 - t)', '0', '0'", "singular: ")],
+)
+def test_missing_rows_are_told_and_fail_if_strict(
+    torque: str, told: str, capsys: Capture, tmp_path: Path
+) -> None:
+    """Regression test: the result was a head without rows, and the exit status 0."""
+    (tmp_path / "x.toml").write_text(SINGULAR.format(torque))
+    command = ["run", "--scene", str(tmp_path / "x.toml"), "--format"]
+    for form in ("csv", "markdown", "table"):
+        assert main([*command, form]) == 0
+        found = capsys.readouterr()
+        assert told in (found.out if form == "table" else found.err)
+        assert main([*command, form, "--strict"]) == 1
+        capsys.readouterr()
+    # Of a program of the thesis, an overflow may be the expected result.
+    assert main("run --case 6 --program two-term --format csv".split()) == 0
+    assert "overflow" not in capsys.readouterr().err
+
+
 @pytest.mark.campaign
 def test_compare_tells_of_the_growth_of_the_motion(printed: Printed) -> None:
     record = _record(printed, _BESIDE)

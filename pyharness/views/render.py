@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Sequence
 from typing import Any
 
-from pyharness.model.report import Field, Line, Report, Section, Table
+from pyharness.model.report import Column, Field, Line, Report, Section, Table
 
 SCHEMA = 1  # version of the JSON output
 _WIDTH = 100
@@ -51,30 +51,62 @@ def _lines(told: str | Field | Table) -> list[str]:
 
 
 def _aligned(table: Table) -> list[str]:
-    """Return a table's aligned lines; of more than 200 rows, only the first and the last ten."""
+    """Return a table's aligned lines; of more than 200 rows, only the first and the last ten.
+
+    A table that is too wide is written in parts below each other, each with the first column.
+    """
     n = len(table.rows)
     if n > _MOST_ROWS:
         table = table._replace(rows=[*table.rows[:_END_ROWS], *table.rows[-_END_ROWS:]])
     cells = table.written()
-    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-    fit = table.columns[-1].fit
-    if fit == "wrap":
-        room = _WIDTH - sum(widths[:-1]) - 2 * (len(widths) - 1)
-        widths[-1] = min(widths[-1], max(_NARROWEST, room))
+    lines: list[str] = []
+    for part in _parts(table.columns, _widths(cells)):
+        columns = [table.columns[k] for k in part]
+        block = _block(columns, [[row[k] for k in part] for row in cells])
+        if n > _MOST_ROWS:
+            left_out = f"... {n - 2 * _END_ROWS} rows left out; --format csv gives all ..."
+            block.insert(len(block) - _END_ROWS, left_out)
+        lines += ["", *block] if lines else block
+    return lines
+
+
+def _widths(cells: Sequence[Sequence[str]]) -> list[int]:
+    return [max(map(len, column)) for column in zip(*cells, strict=True)]
+
+
+def _parts(columns: Sequence[Column], widths: Sequence[int]) -> list[list[int]]:
+    """Return the numbers of the columns in each part of a table."""
+    others = sum(widths) - max(widths) + len(widths) - 1
+    if columns[-1].fit or others <= _WIDTH // 2:
+        return [[*range(len(widths))]]  # its last or its widest column is wrapped or cut
+    parts = [[0]]
+    for k in range(1, len(widths)):
+        if len(parts[-1]) > 1 and sum(widths[i] + 1 for i in parts[-1]) + widths[k] > _WIDTH:
+            parts.append([0])
+        parts[-1].append(k)
+    return parts
+
+
+def _block(columns: Sequence[Column], cells: Sequence[Sequence[str]]) -> list[str]:
+    widths = _widths(cells)
+    fit = columns[-1].fit
+    wrapped = len(widths) - 1 if fit else widths.index(max(widths))
+    if fit != "cut":
+        room = _WIDTH - sum(widths) + widths[wrapped] - 2 * (len(widths) - 1)
+        if fit or room + len(widths) - 1 < widths[wrapped]:
+            widths[wrapped] = min(widths[wrapped], max(_NARROWEST, room))
     gap = "  " if sum(widths) + 2 * (len(widths) - 1) <= _WIDTH else " "
     lines = []
-    for *row, last in cells:
-        for part in textwrap.wrap(last, widths[-1]) if fit == "wrap" else [last]:
-            columns = zip(table.columns, [*row, part], widths, strict=True)
+    for row in cells:
+        text = row[wrapped]
+        for part in [text] if fit == "cut" else textwrap.wrap(text, widths[wrapped]) or [text]:
+            texts = [*row[:wrapped], part, *row[wrapped + 1 :]]
             line = gap.join(
                 cell.ljust(width) if column.left else cell.rjust(width)
-                for column, cell, width in columns
+                for column, cell, width in zip(columns, texts, widths, strict=True)
             )
             lines.append((line[:_WIDTH] if fit == "cut" else line).rstrip())
             row = [""] * len(row)
-    if n > _MOST_ROWS:
-        left_out = f"... {n - 2 * _END_ROWS} rows left out; --format csv gives all ..."
-        lines.insert(len(lines) - _END_ROWS, left_out)
     return lines
 
 

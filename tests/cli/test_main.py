@@ -201,6 +201,9 @@ def test_run_for_people_fits_the_terminal(printed: Printed) -> None:
     steps = [int(line.split()[0]) for line in lines if line.strip()[:1].isdigit()]
     assert steps == [*range(1, 11), *range(291, 301)]
     assert printed(f"{command} --format markdown").count("\n") == 302
+    for more in ("", " matrix"):
+        lines = printed(f"run --case 3 --program two-term --steps 3 --attitude{more}").splitlines()
+        assert max(map(len, lines)) <= 100
 
 
 @pytest.mark.parametrize(

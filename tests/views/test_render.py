@@ -80,3 +80,22 @@ def test_record_and_cases() -> None:
     (failure,) = suite.iter("failure")
     assert failure.text == "2, limit 1\nagain b"
     assert [each.attrib["classname"] for each in suite.iter("testcase")] == ["verify.cells"] * 2
+
+
+def test_wide_table_has_parts_or_wrapped_values() -> None:
+    """Regression test: `run --attitude matrix` and `prove --digits 200` wrote 246 columns."""
+    numbers = Table([Column(f"n{i}") for i in range(30)], [[10**9 + i for i in range(30)]] * 2)
+    value = "12345" * 50
+    long = Table([Column("n"), *words("value"), Column("radius")], [[1, value, 3], [2, "x", 4]])
+    report = Report("run", text=[[numbers], [long]], record=dict)
+    lines = render(report, "table").splitlines()
+    assert max(map(len, lines)) <= 100
+    first, *others = "\n".join(lines).split("\n\n")
+    tables = [each.splitlines() for each in (first, *others[:-1])]
+    assert all(len(each) == 3 and each[0].split()[0] == "n0" for each in tables)
+    assert [head for each in tables for head in each[0].split()[1:]] == [
+        f"n{i}" for i in range(1, 30)
+    ]
+    rows = [line.split() for line in others[-1].splitlines()]
+    assert "".join(row[1 if len(row) == 3 else 0] for row in rows[1:-1]) == value
+    assert (rows[1][0], rows[1][2], rows[-1]) == ("1", "3", ["2", "x", "4"])

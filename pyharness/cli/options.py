@@ -15,7 +15,7 @@ from pyharness.engine.scene_reader import read_scene
 from pyharness.model.attitude import NEAR_ONE
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.facts import facts
-from pyharness.model.listing import PROGRAMS, Listing, subset
+from pyharness.model.listing import PROGRAMS, Listing, names_of, subset, switchable
 from pyharness.model.output_files import check_writable, write_files
 from pyharness.model.report import Report, format_duration
 from pyharness.model.scene import Scene, checked_scene
@@ -213,7 +213,20 @@ def chosen_listing(options: argparse.Namespace) -> Listing:
 
 
 def changes_of(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the names in --fix, --keep, --reading and --conjecture, as arguments of `subset`."""
+    """Return the names in --fix, --keep, --reading and --conjecture, as arguments of `subset`.
+
+    Raise InputError for a defect to fix in the corrected, or to keep in the original program.
+    """
+    if options.listing == "corrected":
+        refuse(options, "--listing corrected", ("fix",))
+    fixed = {*names(options.fix)}
+    for name in sorted({*names(options.keep)} - fixed):
+        having = [each for each in chosen_programs(options) if name in names_of("defect", each)]
+        # With names to fix, and no --listing, a program is changed from the original.
+        changed = options.listing is None and all(fixed & {*switchable(each)} for each in having)
+        if having and (changed or options.listing == "original"):
+            chosen = f"--listing {options.listing}" if options.listing else "--fix"
+            raise InputError(f"--keep {name} has no meaning with {chosen}")
     found = {"fix": options.fix, "keep": options.keep, "readings": options.reading}
     assumed = None if options.conjecture is None else names(options.conjecture)
     return {**{each: names(text) for each, text in found.items()}, "conjectures": assumed}

@@ -34,7 +34,9 @@ _GUARD_BITS = 16
 _LENGTH_BITS = 20
 _SHARE_BITS = 20  # the last terms are at most 2**-20 of the radius, or what the digits allow
 _TOLERATED = 3  # bits by which the last terms may exceed this limit
-_MOST_STEPS = 20_000  # some five to thirty seconds
+# Limit of work, some ten seconds; a step needs 1, or more if its bits times the square of the order
+# exceed _BITS_OF_STEP.
+_MOST_WORK, _BITS_OF_STEP = 8000, 1e6
 _MOST_ATTEMPTS = 6
 # After the fraction _EARLY of the time, the growth of the radius is extrapolated to the end. If
 # digits will be missing, the proof begins again with these and _MORE.
@@ -75,7 +77,7 @@ def prove(
     """Return balls that contain omega at `times` (s), and their certificate.
 
     A radius is at most 10**-digits rad/s, times the largest component of omega if that exceeds 1
-    rad/s. `effort` is a factor on the limit of steps. Raise InputError if the scene can't have a
+    rad/s. `effort` is a factor on the limit of work. Raise InputError if the scene can't have a
     certificate, omega grows without bound, or the limit is exceeded.
     """
     if not has_certificate(scene):
@@ -85,7 +87,7 @@ def prove(
         )
     check_order(times, "prove")
     record = _scene_record(scene)
-    limit = _MOST_STEPS * checked_effort(effort)
+    limit = _MOST_WORK * checked_effort(effort)
     wanted = float(digits)
     for attempt in range(_MOST_ATTEMPTS):
         run = _Run(record, times, wanted, digits)
@@ -162,12 +164,12 @@ class _Run:
         radius, wave_radius, time = system.norm([1, 1, 1]), 0, 0
         self._add_balls([[x] for x in middle], radius, 0, 0)
         end = int(self._times[-1] * (1 << clock))
-        length, side = 1 << clock, -1 if end < 0 else 1
+        length, side, work = 1 << clock, -1 if end < 0 else 1, 0.0
         while time != end:
-            if len(self.steps) >= limit:
+            if work >= limit:
                 share = max(abs(time / end), 1e-3)
                 instead = advice("use a shorter time", effort, effort / share)
-                raise InputError(f"prove: more than {limit:.0f} steps; {instead}")
+                raise InputError(f"prove: more than {len(self.steps)} steps; {instead}")
             h = side * min(length, abs(end - time))
             # Residuals much smaller than the present radius would only cost time.
             most, longer = max(self._most, radius.bit_length() - _SHARE_BITS), 1.0
@@ -193,6 +195,8 @@ class _Run:
             more = self._expected_excess(radii[0], source, middle, time / end)
             if early < time / end < 1.0 and more > 0.0:
                 raise _AmplifiedError(more + _MORE)
+            bits = max(self._bits, *(x.bit_length() for x in middle))
+            work += max(1.0, self._order**2 * bits / _BITS_OF_STEP)
             # The checker adds the distance from the stated middle: 0, rounded up.
             radius, wave_radius = radii[0] + system.norm([0, 0, 0]), radii[1]
             self.steps.append([h, tube, radius, middle])

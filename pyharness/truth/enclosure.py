@@ -43,7 +43,7 @@ def enclose(
     takes the initial omega instead. `velocity` requests balls of the translational velocity (m/s),
     `transition` balls of the transition matrix. The attitude is enclosed if the scene has one, the
     rotational energy if it has moments. `progress` receives the completed percentage of the time,
-    100, and the time as text. `effort` is a factor on the limit of steps.
+    100, and the time as text. `effort` is a factor on the limit of work.
 
     Raise InputError if the times are not in order, python-flint is missing, the torque is opaque,
     the solution can't be enclosed up to the last time, or the limit is exceeded.

@@ -17,7 +17,7 @@ from typing import Any
 
 import pytest
 
-from pyharness import Scene, TorqueLaw, case_scene, principal
+from pyharness import InputError, Scene, TorqueLaw, case_scene, principal
 from pyharness.checks.scenes.random_scenes import random_scene
 from pyharness.truth import certificate_checker
 from pyharness.truth.certificate import prove
@@ -74,6 +74,14 @@ def test_certificate_reaches_the_least_times() -> None:
         certificate = prove(case_scene(5), [end], 20).certificate
         assert check(json.loads(json.dumps(certificate))) == 1
         assert [row["time"] for row in certificate["rows"]] == [end]
+
+
+def test_work_limit_is_on_bits_too() -> None:
+    """Regression test: steps of numbers with 1000 bits took a minute up to the limit."""
+    law = TorqueLaw((1e300, 1e300, 1e300))
+    scene = Scene("h", (1.0, 2.0, 3.0), moments=(3.0, 2.0, 1.5), torque=law)
+    with pytest.raises(InputError, match=r"more than 6\d steps; .*effort"):
+        prove(scene, [3e-150], 25, effort=100 / 8000)
 
 
 @pytest.mark.parametrize("kind", KINDS)

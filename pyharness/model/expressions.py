@@ -33,6 +33,7 @@ _COUNTS = dict.fromkeys(_OF_ONE, 1) | {"atan2": 2, "min": 2, "max": 2, "clip": 3
 FUNCTIONS = tuple(_COUNTS)
 _LONGEST = 10_000
 _DEEPEST = 500
+_MOST_OPEN = 200  # the limit of Python's parser
 _FOREIGN = re.compile(r"[^0-9A-Za-z_+\-*/%<>=()., \t\r\n]")
 _NAME = re.compile(r"[A-Za-z_][0-9A-Za-z_]*")
 _ALLOWED = (
@@ -173,6 +174,9 @@ def _component(text: str, names: Mapping[str, Any], place: str) -> Any:
 def _tree(text: str, place: str) -> ast.expr:
     if not text:
         raise InputError(f"{place} is empty; write '0' for no torque about this axis")
+    steps = ((letter == "(") - (letter == ")") for letter in text)
+    if max(itertools.accumulate(steps)) > _MOST_OPEN:
+        raise InputError(f"{place}: nested too deeply; allowed: at most {_MOST_OPEN} parentheses")
     try:
         with warnings.catch_warnings():
             # Python warns of text such as "2(t)", which is refused below.

@@ -137,6 +137,18 @@ def test_same_depth_is_allowed_from_a_deep_stack() -> None:
     assert _value(below(300), [0.0, 2.0, *[0.0] * 6]) == 980.0
 
 
+def test_parentheses_are_limited_as_the_message_says() -> None:
+    """Regression test: the message called 201 parentheses no arithmetic expression."""
+    nested = "sin({})".format
+    text = "w1"
+    for _ in range(200):
+        text = nested(text)
+    assert _torque(text)
+    for deep in (nested(text), "(" * 201):
+        with pytest.raises(InputError, match="nested too deeply; allowed: at most 200 parenthes"):
+            _torque(deep)
+
+
 def _is_torque_or_one_line(text: str) -> None:
     try:
         found = parsed([text, "0", "0"], {"k": 0.5})

@@ -96,6 +96,8 @@ def _run(arguments: list[str]) -> int:
 
         sys.stdout.write(json_help(rest[1]))
         return 0
+    if verb == "help" and len(rest) > 1:
+        raise InputError(f"help {rest[0]}: '{rest[1]}' has no meaning; give one verb")
     if verb == "help":
         verb, rest = (*rest, "--help")[0], ["--help"]
     if verb in ("-h", "--help"):

@@ -4,6 +4,7 @@
 """
 
 import os
+import sys
 import tomllib
 from collections.abc import Iterable
 from typing import Any, SupportsIndex
@@ -67,7 +68,7 @@ def case_scene(number: SupportsIndex) -> Scene:
                 case=number,
             )
     shown = str(number) if abs(number) < 10**18 else "of more than 18 digits"
-    raise unknown("case", shown, map(str, case_numbers()), "--case")
+    raise unknown("case", shown, map(str, case_numbers()))
 
 
 def read_toml(path: str | os.PathLike[str], where: str) -> dict[str, Any]:
@@ -91,6 +92,11 @@ def toml_of(content: bytes, where: str) -> dict[str, Any]:
             f"{where}: nested too deeply; the tables of a scene need few levels"
         ) from None
     except ValueError as error:
+        if "integer string conversion" in str(error):
+            most = sys.get_int_max_str_digits()
+            raise InputError(
+                f"{where}: a whole number is too long; allowed: at most {most} digits"
+            ) from None
         raise InputError(f"{where}: not TOML: {' '.join(str(error).split())}") from None
 
 

@@ -63,7 +63,7 @@ def unexplained(scan: str) -> list[str]:
     _, heading, appendix = scan.rpartition(HEADING)
     if not heading or not re.search(r"^\s*\d+-", appendix, re.MULTILINE):
         raise InputError(
-            f"the scan has no line {HEADING!r} with cards after it; give a scan of this thesis"
+            f"the scan has no line '{HEADING}' with cards after it; give a scan of this thesis"
         )
     first = scan.count("\n", 0, len(scan) - len(appendix)) + 1
     lines = [(n, tight(text)) for n, text in enumerate(appendix.split("\n"), first)]

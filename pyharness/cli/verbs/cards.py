@@ -65,7 +65,10 @@ def run(options: argparse.Namespace) -> int:
     text, lines = "", []
     if kind == "--scan":
         text = _text(options.scan)
-        lines = unexplained(text)
+        try:
+            lines = unexplained(text)
+        except InputError as error:
+            raise InputError(f"--scan '{options.scan}': {error}") from None
     failures: Any = None
     match kind:
         case "--format tei":

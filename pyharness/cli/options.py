@@ -377,15 +377,15 @@ def check_outputs(options: argparse.Namespace) -> None:
             check_writable(path, "--plot")
             files.append((path, "--plot", what))
     for name, what in _MORE_OUTPUTS.items():
-        if (path := getattr(options, name, None)) is not None:
-            files.append((path, f"--{name}", what))
+        if getattr(options, name, None) is not None:
+            files.append((getattr(options, name), f"--{name}", what))
     if options.out is not None:
         check_writable(options.out, "--out")
         for path, option, what in files:
             if _is_same(path, options.out):
-                shown = picture if option == "--plot" else path
+                named = picture if option == "--plot" else path
                 raise InputError(
-                    f"--out '{options.out}': {option} '{shown}' writes {what} to this file; "
+                    f"--out '{options.out}': {option} '{named}' writes {what} to this file; "
                     "give another name"
                 )
         files.append((options.out, "--out", ""))

@@ -162,7 +162,7 @@ def test_missing_rows_are_told_and_fail_if_strict(
         assert main([*command, form, "--strict"]) == 1
         capsys.readouterr()
     # Of a program of the thesis, an overflow may be the expected result.
-    assert main("run --case 6 --program two-term --format csv".split()) == 0
+    assert main(["run", "--case", "6", "--program", "two-term", "--format", "csv"]) == 0
     assert "overflow" not in capsys.readouterr().err
 
 

@@ -127,4 +127,3 @@ def test_file_that_is_no_certificate_is_refused(
         assert told.out == ""
         assert told.err.startswith(f"pyharness: --check '{name}': ")
         assert told.err.count("\n") == 1
-

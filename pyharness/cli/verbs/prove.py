@@ -17,15 +17,15 @@ _DIGITS = 25
 _MARK = FORMAT.rpartition("-")[0].encode()  # also of other versions of the format
 OPTIONS = {
     **shared.SCENE,
-    "--times T1,T2,...": "Times of the results, in s, all positive or all negative (the first may be "
-    "0), in order of increasing distance from 0 (default: the end of the scene's last step).",
+    "--times T1,T2,...": "Times of the results, in s, all positive or all negative (the first may "
+    "be 0), in order of increasing distance from 0 (default: the end of the scene's last step).",
     "--digits D": f"Number D of digits, 1 to {MOST_DIGITS} (default {_DIGITS}). The half-width of "
     "each interval is at most 10**-D rad/s; if the largest component of omega exceeds 1 rad/s, at "
     "most 10**-D times this component.",
     "--velocity": "Enclose the translational velocity too; needs the package python-flint.",
     "--transition": "Enclose the derivatives of the solution with respect to the initial omega "
     "too; needs the package python-flint.",
-    "--certificate FILE": "Write the steps of the proof to this file, in JSON, as a certificate that "
+    "--certificate FILE": "Write the steps of the proof to this file (JSON) as a certificate that "
     "--check can verify; only for torques that depend on time alone; not with --velocity or "
     "--transition.",
     "--check FILE,...": "Verify the certificates in these files instead of proving anything; needs "

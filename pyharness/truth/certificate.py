@@ -34,9 +34,9 @@ _GUARD_BITS = 16
 _LENGTH_BITS = 20
 _SHARE_BITS = 20  # the last terms are at most 2**-20 of the radius, or what the digits allow
 _TOLERATED = 3  # bits by which the last terms may exceed this limit
-# Limit of work, some ten seconds; a step needs 1, or more if its bits times the square of the order
-# exceed _BITS_OF_STEP.
-_MOST_WORK, _BITS_OF_STEP = 8000, 1e6
+# Limit of work, some five to thirty seconds; a step needs 1, or more if its bits times the square
+# of the order exceed _BITS_OF_STEP.
+_MOST_WORK, _BITS_OF_STEP = 20_000, 1e6
 _MOST_ATTEMPTS = 6
 # After the fraction _EARLY of the time, the growth of the radius is extrapolated to the end. If
 # digits will be missing, the proof begins again with these and _MORE.

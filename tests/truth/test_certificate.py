@@ -81,7 +81,7 @@ def test_work_limit_is_on_bits_too() -> None:
     law = TorqueLaw((1e300, 1e300, 1e300))
     scene = Scene("h", (1.0, 2.0, 3.0), moments=(3.0, 2.0, 1.5), torque=law)
     with pytest.raises(InputError, match=r"more than 6\d steps; .*effort"):
-        prove(scene, [3e-150], 25, effort=100 / 8000)
+        prove(scene, [3e-150], 25, effort=100 / 20_000)
 
 
 @pytest.mark.parametrize("kind", KINDS)

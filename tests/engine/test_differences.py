@@ -99,7 +99,7 @@ def test_differences_are_the_derivatives_where_no_switch_changes(name: str) -> N
 
 
 def test_elements_off_the_diagonal_change_by_the_size_of_the_body() -> None:
-    """Those of a rotated cube are rounding errors."""
+    """In a rotated cube they are rounding errors."""
     turn, _ = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))
     cube = 2.0 * turn @ turn.T
     rotated, known = (

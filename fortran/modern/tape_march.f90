@@ -365,8 +365,6 @@ contains
       longest_step = fitting(tape, s%order, local_tolerance, weights, s%a)
       is_resolved = .false.
       if (n_varying == 0 .or. .not. longest_step > 0.0_dp) return
-      ! Relative to no omega, any perturbation of the attitude is large.
-      if (n > 3 .and. .not. scale > 0.0_dp) return
       near = near_zero(n, local_tolerance, weights, s)
       is_resolved = any(near)
       if (is_resolved) then
@@ -518,6 +516,8 @@ contains
       integer :: i
 
       weights(:3) = 1.0_dp/max(scale, LEAST_SCALE)
+      ! Of a body that stays at rest, an omega counts that turns it by a radian.
+      if (.not. scale >= LEAST_SCALE) weights(:3) = abs(t_end)
       weights(4:first_own - 1) = 2.0_dp
       is_guessed = .false.
       diverges = .false.

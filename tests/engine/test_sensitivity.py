@@ -96,6 +96,20 @@ def test_a_body_at_rest_under_control_waits_for_a_push() -> None:
     assert found.steps < 400
 
 
+@pytest.mark.parametrize(("swing", "damping"), [(0.0, 0.0), (0.0, 0.2), (0.3, 0.2)])
+def test_a_body_that_control_keeps_at_rest_is_complete(swing: float, damping: float) -> None:
+    """Relative to its omega, which is 0, any perturbation would be infinite."""
+
+    def torque(time: Any, omega: Any, q: Any) -> list[Any]:
+        gain = 0.5 + swing * np.cos(20.0 * time)
+        return [-gain * q[1 + i] - damping * omega[i] for i in range(3)]
+
+    scene = Scene("hold", (0.0, 0.0, 0.0), (1.0, 2.0, 2.5), attitude=(1, 0, 0, 0), torque=torque)
+    found = solve(scene, 50.0)
+    assert found.ended == "complete"
+    assert 1.0 <= (found.growth or 0.0) < 100.0
+
+
 @pytest.mark.parametrize("omega", [(0.0, 0.0, 1.0), (1e-9, 0.0, 1.0), (0.0, 0.0, 0.0)])
 @pytest.mark.parametrize("frequency", [3.0, 10.0, 100.0])
 def test_growth_of_a_steady_motion_follows_a_torque_that_it_does_not_feel(

@@ -96,6 +96,26 @@ def test_a_body_at_rest_under_control_waits_for_a_push() -> None:
     assert found.steps < 400
 
 
+@pytest.mark.parametrize(
+    "push",
+    [
+        lambda t: np.where(t > 20.0, 1.0, 0.0),
+        lambda t: np.exp(-3.0 * (t - 20.0) ** 2),
+        lambda t: 1.0 + np.tanh(8.0 * (t - 20.0)),
+    ],
+)
+def test_a_body_at_rest_waits_for_a_push_without_damping(push: Callable[[Any], Any]) -> None:
+    def torque(time: Any, omega: Any, q: Any) -> list[Any]:
+        return [0.1 * push(time) - q[1], -q[2], -q[3]]
+
+    scene = Scene("push", (0.0, 0.0, 0.0), (1.0, 2.0, 3.0), attitude=(1, 0, 0, 0), torque=torque)
+    found, truth = (solve(scene, 30.0, tolerance=tolerance) for tolerance in (1e-9, 1e-12))
+    assert found.ended == "complete"
+    assert found.steps < 300
+    largest = np.abs(truth.omega).max()
+    assert np.abs(found.omega - truth.omega).max() <= 1e-9 * largest
+
+
 @pytest.mark.parametrize(("swing", "damping"), [(0.0, 0.0), (0.0, 0.2), (0.3, 0.2)])
 def test_a_body_that_control_keeps_at_rest_is_complete(swing: float, damping: float) -> None:
     """Relative to its omega, which is 0, any perturbation would be infinite."""

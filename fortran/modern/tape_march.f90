@@ -166,7 +166,7 @@ contains
     is_rejected = .false.
     has_values = .false.
     has_guess = .false.
-    from_rest = .not. scale > 0.0_dp
+    from_rest = .not. scale >= LEAST_SCALE
     do
       call set_unknowns()
       if (switches%n > 0) call keep_live(tape, switches, s, live)
@@ -175,7 +175,8 @@ contains
       break_time = next_break(tape, t(1), t_end)
       to_stop = (break_time - t(1)) - t(2)
       ! The scale of a body at rest is the omega that it is about to reach.
-      if (from_rest) scale = largest_terms(1, 3, 1, 4)
+      if (from_rest) scale = max(maxval(abs(y(:3))), largest_terms(1, 3, 1, 4))
+      if (.not. scale >= LEAST_SCALE) scale = max(scale, largest_terms(1, 3, 5, s%order))
       call weigh()
       factor = longest_step()
       if (.not. factor > 0.0_dp) then
@@ -217,6 +218,12 @@ contains
         end if
       end if
       call converge(live, s%order, max(scale, LEAST_SCALE), s%a, s%powers, factor)
+      if (from_rest .and. factor < SHORTER .and. factor > 0.0_dp .and. tries < MOST_TRIES) then
+        ! The guess of the scale is that of a longer step.
+        tries = tries + 1
+        s%h = factor*s%h
+        cycle
+      end if
       if (switches%n > 0) call resolve_switches(nearly, switches, s, factor)
       if (.not. factor > 0.0_dp) then
         call shorten()
@@ -297,7 +304,7 @@ contains
       end if
       t = t_next
       has_values = size(tape%table_starts) == 1 .and. verdict == STAYS .and. .not. is_compared
-      from_rest = .not. scale > 0.0_dp
+      from_rest = .not. scale >= LEAST_SCALE
       rest = (t_end - t(1)) - t(2)
       s%h = factor*s%h
       if (verdict == CROSSES) s%h = whole_step
@@ -368,7 +375,8 @@ contains
       near = near_zero(n, local_tolerance, weights, s)
       is_resolved = any(near)
       if (is_resolved) then
-        longest_step = resolving(varying(:n_varying), near, weights, s, longest_step)
+        longest_step = resolving(varying(:n_varying), near, weights, max(1.0_dp, abs(t_end)), s, &
+                                 longest_step)
       end if
     end function longest_step
 

@@ -97,13 +97,14 @@ contains
     end do
   end function near_zero
 
-  real(dp) function resolving(slots, near, weights, s, factor)
+  real(dp) function resolving(slots, near, weights, most, s, factor)
     !! Return the factor on the step, reduced until its nodes resolve the Jacobian by unknowns near
     !! 0: until the last terms of some slots change it little, and it changes not much from node to
     !! node.
     integer, intent(in) :: slots(:)
     logical, intent(in) :: near(:) !! unknowns
     real(dp), intent(in) :: weights(:)
+    real(dp), intent(in) :: most   !! largest ratio of weights: that of omega and an angle at the end
     type(series_t), intent(inout) :: s
     real(dp), intent(in) :: factor
     real(dp) :: all_terms(SIDE_BY_SIDE, MOST_UNKNOWNS, BLOCKS_OF_COLUMNS, 4)
@@ -134,18 +135,20 @@ contains
     pure real(dp) function difference(one, other)
       !! Return the largest difference of two Jacobians at some nodes, times the step.
       real(dp), intent(in) :: one(:, :, :, :), other(:, :, :, :)
-      real(dp) :: x
+      real(dp) :: ratio, x
       integer :: block, i, j, lane, node
 
       difference = 0.0_dp
       do j = 1, size(near)
-        if (.not. (near(j) .and. weights(j) > 0.0_dp)) cycle
+        if (.not. near(j)) cycle
         lane = 1 + mod(j - 1, SIDE_BY_SIDE)
         block = 1 + (j - 1)/SIDE_BY_SIDE
         do i = 1, size(near)
+          ! A state of weight 0 may change others.
+          ratio = 1.0_dp
+          if (weights(i) > 0.0_dp .and. weights(j) > 0.0_dp) ratio = min(most, weights(i)/weights(j))
           do node = 1, size(one, 4)
-            x = abs(one(lane, i, block, node) - other(lane, i, block, node))
-            x = resolving*x*min(1.0_dp, weights(i)/weights(j))
+            x = resolving*ratio*abs(one(lane, i, block, node) - other(lane, i, block, node))
             ! NaN must not be lost in the maximum.
             if (.not. x <= huge(x)) x = huge(x)
             difference = max(difference, x)

@@ -117,8 +117,9 @@ contains
     logical :: is_resolved                    ! whether the terms of the Jacobian were checked
     logical :: is_compared                    ! whether terms 0 are those of a touch
     logical :: is_low                         ! whether the order must be raised
+    logical :: is_reaching                    ! whether the scale is guessed from all terms
     logical :: is_guessed                     ! whether the size of an own state is guessed
-    logical :: diverges                       ! whether the known terms of an own state do
+    logical :: diverges                       ! whether the known terms of a guess do
     real(dp) :: rates(tape%n_unknowns)        ! at the end of the step
     real(dp) :: whole_step                    ! s: h without switches
     real(dp) :: nearly                        ! relative distance from a switch: a touch
@@ -176,7 +177,8 @@ contains
       to_stop = (break_time - t(1)) - t(2)
       ! The scale of a body at rest is the omega that it is about to reach.
       if (from_rest) scale = max(maxval(abs(y(:3))), largest_terms(1, 3, 1, 4))
-      if (.not. scale >= LEAST_SCALE) scale = max(scale, largest_terms(1, 3, 5, s%order))
+      is_reaching = .not. scale >= LEAST_SCALE
+      if (is_reaching) scale = max(scale, reached_size(1), reached_size(2), reached_size(3))
       call weigh()
       factor = longest_step()
       if (.not. factor > 0.0_dp) then
@@ -218,7 +220,7 @@ contains
         end if
       end if
       call converge(live, s%order, max(scale, LEAST_SCALE), s%a, s%powers, factor)
-      if (from_rest .and. factor < SHORTER .and. factor > 0.0_dp .and. tries < MOST_TRIES) then
+      if (is_reaching .and. factor < GUESSED .and. factor > 0.0_dp .and. tries < MOST_TRIES) then
         ! The guess of the scale is that of a longer step.
         tries = tries + 1
         s%h = factor*s%h
@@ -498,9 +500,18 @@ contains
       largest_terms = min(huge(s%h), largest_terms)
     end function largest_terms
 
+    logical function has_large_terms(first, last, total)
+      !! Return whether the last terms of unknowns are not much smaller than their guessed size.
+      integer, intent(in) :: first, last
+      real(dp), intent(in) :: total
+
+      has_large_terms = largest_terms(first, last, 1, s%order - 2) > 0.0_dp &
+                        .and. largest_terms(first, last, s%order - 1, s%order) > CONVERGED*total
+    end function has_large_terms
+
     real(dp) function reached_size(number)
-      !! Return the largest value of an own state, which begins at 0, in a step that ends at the
-      !! next breakpoint. Its terms may be much larger, and cancel.
+      !! Return the largest value of an unknown that begins at 0, in a step that ends at the next
+      !! breakpoint. Its terms may be much larger, and cancel.
       integer, intent(in) :: number
       real(dp) :: part, total
       integer :: i, k
@@ -520,7 +531,7 @@ contains
     subroutine weigh()
       !! Make errors of omega relative to the scale, errors of the quaternion angles, and errors of
       !! own states relative to their sizes, or to the sizes that they are about to reach.
-      real(dp) :: own_size, before, last
+      real(dp) :: own_size
       integer :: i
 
       weights(:3) = 1.0_dp/max(scale, LEAST_SCALE)
@@ -528,15 +539,13 @@ contains
       if (.not. scale >= LEAST_SCALE) weights(:3) = abs(t_end)
       weights(4:first_own - 1) = 2.0_dp
       is_guessed = .false.
-      diverges = .false.
+      diverges = is_reaching .and. has_large_terms(1, 3, scale)
       do i = first_own, n
         own_size = own_sizes(i)
         if (.not. own_size > 0.0_dp) then
           own_size = reached_size(i)
           is_guessed = is_guessed .or. own_size > 0.0_dp
-          before = largest_terms(i, i, 1, s%order - 2)
-          last = largest_terms(i, i, s%order - 1, s%order)
-          diverges = diverges .or. (before > 0.0_dp .and. last > CONVERGED*own_size)
+          diverges = diverges .or. has_large_terms(i, i, own_size)
         end if
         weights(i) = 0.0_dp
         if (own_size > 0.0_dp) weights(i) = 1.0_dp/max(own_size, LEAST_OWN)

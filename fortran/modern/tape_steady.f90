@@ -104,7 +104,7 @@ contains
     integer, intent(in) :: slots(:)
     logical, intent(in) :: near(:) !! unknowns
     real(dp), intent(in) :: weights(:)
-    real(dp), intent(in) :: most   !! largest ratio of weights: that of omega and an angle at the end
+    real(dp), intent(in) :: most   !! largest ratio of weights that counts
     type(series_t), intent(inout) :: s
     real(dp), intent(in) :: factor
     real(dp) :: all_terms(SIDE_BY_SIDE, MOST_UNKNOWNS, BLOCKS_OF_COLUMNS, 4)
@@ -146,7 +146,7 @@ contains
         do i = 1, size(near)
           ! A state of weight 0 may change others.
           ratio = 1.0_dp
-          if (weights(i) > 0.0_dp .and. weights(j) > 0.0_dp) ratio = min(most, weights(i)/weights(j))
+          if (min(weights(i), weights(j)) > 0.0_dp) ratio = min(most, weights(i)/weights(j))
           do node = 1, size(one, 4)
             x = resolving*ratio*abs(one(lane, i, block, node) - other(lane, i, block, node))
             ! NaN must not be lost in the maximum.

@@ -594,24 +594,31 @@ static ALWAYS_INLINE void set_at(const struct tape *tape, const int block, const
 }
 
 /* Compute the Jacobian, times the step, at four parts of the step. */
+static __attribute__((noinline)) void set_at_nodes(const struct tape *tape, double h,
+                                                   const nodal *parts, matrix *jacobian)
+{
+  if (tape->n_unknowns == 3) set_at(tape, 0, 4, NODES, h, *parts, jacobian);
+  else
+    for (int block = 0; block * SIDE_BY_SIDE < tape->n_unknowns; block++)
+      set_at(tape, block, SIDE_BY_SIDE, NODES, h, *parts, jacobian);
+}
+
 void OF_LEVEL(jacobian_at, LEVEL)(const struct tape *tape, double h, const double *parts,
                                   matrix *result)
 {
-  matrix jacobian[NODES] __attribute__((aligned(64))) = {{{{0.0}}}};
+  matrix jacobian[NODES] __attribute__((aligned(64)));
   const nodal at = {parts[0], parts[1], parts[2], parts[3]};
-  for (int block = 0; block * SIDE_BY_SIDE < tape->n_unknowns; block++)
-    set_at(tape, block, SIDE_BY_SIDE, NODES, h, at, jacobian);
+  set_at_nodes(tape, h, &at, jacobian);
   memcpy(result, jacobian, sizeof jacobian);
 }
 
-/* Compute one block of columns of the Jacobian as a polynomial of the part of the step, through its
-   values at the nodes of Gauss: the error of the perturbations is of order 2 nodes + 1. */
-static ALWAYS_INLINE void set_block(const struct tape *tape, const int block, const int columns,
-                                    const int nodes, double h, double factor, matrix *jacobian)
+/* Replace one block of columns of the Jacobian at the nodes of Gauss by a polynomial of the part of the
+   step: the error of the perturbations is of order 2 nodes + 1. */
+static ALWAYS_INLINE void fit_block(const struct tape *tape, const int block, const int columns,
+                                    const int nodes, double factor, matrix *jacobian)
 {
   const int is_few = nodes == FEW_NODES;
   row *to[] = {jacobian[0][block], jacobian[1][block], jacobian[2][block], jacobian[3][block]};
-  set_at(tape, block, columns, nodes, h, factor * (is_few ? few_parts : many_parts), jacobian);
   const double per_factor = 1.0 / factor;
   for (int i = 0; i < tape->n_unknowns; i++) {
     for (int p = 0; p < columns; p += IN_REGISTER) {
@@ -634,10 +641,17 @@ static ALWAYS_INLINE void set_block(const struct tape *tape, const int block, co
 static ALWAYS_INLINE void set_blocks(const struct tape *tape, const int nodes, double h,
                                      double factor, matrix *jacobian)
 {
-  if (tape->n_unknowns == 3) set_block(tape, 0, 4, nodes, h, factor, jacobian);
+  const nodal parts = factor * (nodes == FEW_NODES ? few_parts : many_parts);
+  const int n = tape->n_unknowns;
+  if (nodes == NODES) set_at_nodes(tape, h, &parts, jacobian);
+  else if (n == 3) set_at(tape, 0, 4, nodes, h, parts, jacobian);
   else
-    for (int block = 0; block * SIDE_BY_SIDE < tape->n_unknowns; block++)
-      set_block(tape, block, SIDE_BY_SIDE, nodes, h, factor, jacobian);
+    for (int block = 0; block * SIDE_BY_SIDE < n; block++)
+      set_at(tape, block, SIDE_BY_SIDE, nodes, h, parts, jacobian);
+  if (n == 3) fit_block(tape, 0, 4, nodes, factor, jacobian);
+  else
+    for (int block = 0; block * SIDE_BY_SIDE < n; block++)
+      fit_block(tape, block, SIDE_BY_SIDE, nodes, factor, jacobian);
 }
 
 static ALWAYS_INLINE void perturb_all(const int n, const int nodes, perturbations *v,

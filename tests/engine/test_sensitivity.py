@@ -116,6 +116,26 @@ def test_a_body_at_rest_waits_for_a_push_without_damping(push: Callable[[Any], A
     assert np.abs(found.omega - truth.omega).max() <= 1e-9 * largest
 
 
+@pytest.mark.parametrize(
+    ("push", "impulse"),
+    [
+        (lambda t: t**6 / (1.0 + t**6), 1.953624981341453),
+        (lambda t: 1.0 - np.exp(-(t**12)), 2.041714317827167),
+        (lambda t: np.sin(4.4 * t) ** 8, 0.781203549776875),
+    ],
+)
+def test_a_push_that_begins_slowly_is_judged_by_the_omega_that_it_causes(
+    push: Callable[[Any], Any], impulse: float
+) -> None:
+    def torque(time: Any, omega: Any, q: Any) -> list[Any]:
+        return [1e-9 * push(time), 0.0 * q[1], 0.0]
+
+    scene = Scene("push", (0.0, 0.0, 0.0), (1.0, 2.0, 3.0), attitude=(1, 0, 0, 0), torque=torque)
+    found = solve(scene, 3.0, tolerance=1e-9)
+    assert found.ended == "complete"
+    assert found.omega[0, 0] == pytest.approx(1e-9 * impulse, rel=2e-9, abs=0.0)
+
+
 @pytest.mark.parametrize(("swing", "damping"), [(0.0, 0.0), (0.0, 0.2), (0.3, 0.2)])
 def test_a_body_that_control_keeps_at_rest_is_complete(swing: float, damping: float) -> None:
     """Relative to its omega, which is 0, any perturbation would be infinite."""

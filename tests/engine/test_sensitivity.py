@@ -186,6 +186,27 @@ def test_a_steady_motion_takes_no_more_steps_than_another(function: Callable[[An
     assert steps[0.0, 0.0, 1.0] <= steps[0.3, -0.5, 1.0]
 
 
+@pytest.mark.parametrize(
+    ("function", "coupling", "spin", "time", "wanted"),
+    [
+        (lambda t: 0.5 * np.cos(t) ** 20, 1.0, 1.0, 50.0, 1.42),
+        (lambda t: 0.2 * np.cos(5.0 * t) ** 13, 0.0, 0.0, 20.0, 1.0),
+    ],
+)
+def test_growth_of_a_steady_motion_follows_pulses(
+    function: Callable[[Any], Any], coupling: float, spin: float, time: float, wanted: float
+) -> None:
+    """The amplification is that of the linear equations by DOP853, between 400 times."""
+
+    def torque(time: Any, omega: Any) -> list[Any]:
+        pulse = function(time)
+        return [pulse * omega[1], coupling * pulse * omega[0], 0.0]
+
+    found = solve(Scene("", (0.0, 0.0, spin), moments=(1.0, 2.0, 2.5), torque=torque), time)
+    assert found.ended == "complete"
+    assert found.growth == pytest.approx(wanted, rel=0.2)
+
+
 @pytest.mark.parametrize("power", [-320, -299, -250, 250])
 def test_growth_beside_the_attitude_has_no_unit(power: int) -> None:
     """Derivatives of the attitude by omega are as large as the unit of time."""

@@ -48,6 +48,7 @@ static const double MOST_CANCELLED = 1e3; /* largest sum of the terms of a step,
 static const double WITHIN_CIRCLE = 0.9;  /* as in tape_plan.f90 */
 static const double INVISIBLE = 100.0;    /* as in tape_powers.f90, and the next one too */
 static const double PART_OF_ORDER = 0.6;
+static const double NEAR_ZERO = 1e3; /* as MULTIPLE in tape_steady.f90 */
 
 typedef lanes series[TERMS];
 
@@ -84,7 +85,8 @@ struct group {
   struct operation *operations;
   lanes **terms;                  /* series of each term of the combinations */
   const struct leaves *leaves;    /* compiled for these registers; or NULL */
-  int *depends;                   /* of each slot: the unknowns on which it depends, as bits */
+  int *depends; /* of each slot: the unknowns on which it depends, as bits; the next is the time */
+  double is_varying;              /* 1 if the Jacobian depends on the time, or 0 */
   lanes *middle, *tangents, *noises; /* of each slot: value amid the step, tangent, rounding error */
   lanes y[WITH_ATTITUDE], low[WITH_ATTITUDE]; /* unknowns and their rounding errors */
   lanes error[WITH_ATTITUDE];     /* truncation error, propagated so far */
@@ -413,14 +415,17 @@ static void find_series(struct group *g)
     g->terms[i] = g->a[tape->slots[i] - 1];
 }
 
-/* Find the unknowns on which each slot depends. */
+/* Find the unknowns on which each slot depends, and whether it depends on the time. */
 static void find_dependences(struct group *g)
 {
   const struct tape *tape = &g->all->tape;
+  const int of_time = 1 << g->n;
+  g->depends[0] = of_time;
   for (int i = 0; i < g->n; i++) g->depends[FIRST_UNKNOWN + i] = 1 << i;
   for (int n = 0; n < tape->n_operations; n++) {
     const int *operation = tape->operations[n];
     int *out = g->depends + operation[3] - 1;
+    if (operation[0] == TABLE) *out = of_time;
     if (operation[0] == TABLE) continue;
     if (operation[0] == LINEAR) {
       for (int i = tape->starts[operation[1] - 1] - 1; i < tape->starts[operation[1]] - 1; i++)
@@ -430,6 +435,7 @@ static void find_dependences(struct group *g)
     *out = g->depends[operation[1] - 1];
     if (operation[0] == PRODUCT || operation[0] == QUOTIENT) *out |= g->depends[operation[2] - 1];
     if (operation[0] == SINE_COSINE || operation[0] == TANH) out[1] = *out;
+    if (*out > of_time) g->is_varying = 1.0;
   }
 }
 
@@ -692,6 +698,10 @@ static void step(struct group *g)
     } else {
       turned += 2.0 * size[i];
     }
+    /* Perturbations of an unknown that stays near 0 change where its terms do not show it: see
+       tape_steady.f90. */
+    const lanes near = NEAR_ZERO * g->local * g->is_varying;
+    g->fails |= accepted & (g->weights[i] * (absolute(g->y[i]) + size[i]) < near);
     const lanes each = g->weights[i] * noise[i] * absolute(h);
     rounded = larger(rounded, g->weights[i] * size[i] + each);
     noises += each * each;

@@ -159,9 +159,13 @@ def test_growth_of_a_steady_motion_follows_a_torque_that_it_does_not_feel(
         wave = 0.5 * np.cos(frequency * time)
         return [wave * omega[1], wave * omega[0], 0.0]
 
-    found = solve(Scene("", omega, moments=(1.0, 2.0, 2.5), torque=torque), 50.0)
+    scene = Scene("", omega, moments=(1.0, 2.0, 2.5), torque=torque)
+    found = solve(scene, 50.0)
     assert found.ended == "complete"
     assert found.growth == pytest.approx(1.1, abs=0.1)
+    many = solve_many(scene, 8.0, omega=[omega, (0.1, 0.2, 0.3)], estimates=True)
+    assert (many.status == 0).all()
+    assert many.growth[0] == pytest.approx(1.1, abs=0.1)
 
 
 @pytest.mark.parametrize(

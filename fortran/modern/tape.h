@@ -7,6 +7,7 @@
 #include <immintrin.h>
 #endif
 
+#include "cases.h"
 #include "codes.h"
 
 #define JOINED(name, level) name##_##level
@@ -55,6 +56,12 @@ static inline reg smaller(reg a, reg b) { return -larger(-a, -b); }
 enum { WITH_ATTITUDE = 7 }; /* number of unknowns */
 enum { FIRST_UNKNOWN = 1 }; /* the slot of omega's first component, from 0 */
 enum { N_INPUTS = 8 };      /* time, omega and attitude; parameters follow */
+
+/* Return the kind of an operation in cases.h. */
+static inline int recurrence_of(const int *operation)
+{
+  return operation[0] == SINE_COSINE && operation[2] > 0 ? WAVE : operation[0];
+}
 
 /* Functions that were compiled for the operations of one tape, by pyharness/engine/leaves.py. Two
    arguments are the coefficients and constants of the combinations. */

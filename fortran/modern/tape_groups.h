@@ -14,6 +14,7 @@ typedef double row[SIDE_BY_SIDE];
 /* The Jacobian is computed at two or four nodes of a step, from as many terms as the least order has. */
 enum { FEW_NODES = 2, NODES = 4, TERMS_AMID = 16 };
 typedef double nodal __attribute__((vector_size(8 * NODES)));
+typedef long long nodal_bits __attribute__((vector_size(8 * NODES)));
 
 /* Terms of several slots abreast. */
 enum { ABREAST = 4, GROUPS = (MOST_UNKNOWNS + ABREAST - 1) / ABREAST };
@@ -153,22 +154,9 @@ static void add_pair(struct work *work, int x, int y)
 /* Add the pairs of slots whose products an operation needs. */
 static void add_pairs(struct work *work, const int *operation)
 {
-  const int second = operation[2] - 1, out = operation[3] - 1;
-  switch (operation[0]) {
-  case QUOTIENT: add_pair(work, second, out); break;
-  case SQRT: add_pair(work, out, out); break;
-  case EXP: add_pair(work, out + 1, out); break;
-  case SINE_COSINE:
-    add_pair(work, out + 2, out + 1);
-    add_pair(work, out + 2, out);
-    break;
-  case TANH:
-    add_pair(work, out + 2, out + 1);
-    add_pair(work, out, out);
-    break;
-  case LOG:
-  case ATAN:
-  case ASIN: add_pair(work, out + 1, second); break;
+  const int y = operation[2] - 1, o = operation[3] - 1, p = o + 1, q = p + 1;
+  switch (recurrence_of(operation)) {
+  PAIR_CASES
   default: break;
   }
 }

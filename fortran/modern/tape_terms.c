@@ -72,7 +72,7 @@ void OF_LEVEL(begin_work, LEVEL)(const struct tape *tape, int n_slots)
       const int *next = tape->operations[work->ordered[i + count]];
       if (kind_of(next) != kind || work->levels[next[3] - 1] != work->levels[operation[3] - 1]) break;
     }
-    *item = (struct item){operation[0], work->ordered[i]};
+    *item = (struct item){recurrence_of(operation), work->ordered[i]};
     if (kind == OF_PRODUCTS) {
       struct pairs *group = work->products + work->n_products;
       *item = (struct item){PRODUCTS, work->n_products++};
@@ -101,6 +101,11 @@ void OF_LEVEL(begin_work, LEVEL)(const struct tape *tape, int n_slots)
     add_combinations(tape, work, count, numbers, out);
   }
 }
+
+/* The operands of TERM_CASES. */
+#define SUM(x, y) *sum++ /* of products of terms */
+#define UNLESS(flag, x) ((flag) ? 0.0 : (x))
+static inline double halved(double x, double root) { return x ? x / (2.0 * root) : 0.0; }
 
 static inline abreast gathered(const double *terms, const int *at, int k)
 {
@@ -193,7 +198,7 @@ void OF_LEVEL(expand_tape, LEVEL)(const struct tape *tape, double h, int order)
       pairs->of_y[k - 1] = gathered(terms, pairs->y, k - 1);
       work->sums[i] = products_between(pairs, k);
     }
-    const double *sum = (const double *)work->sums;
+    const double *sum = (const double *)work->sums, whole = k, per_k = 1.0 / whole;
     for (const struct item *item = work->items; item < work->items + work->n_items; item++) {
       if (item->kind == PRODUCTS) {
         multiply(work->products + item->number, terms, k);
@@ -205,46 +210,13 @@ void OF_LEVEL(expand_tape, LEVEL)(const struct tape *tape, double h, int order)
         continue;
       }
       const int *operation = tape->operations[item->number];
-      const double *x = a[operation[1] - 1], *y = a[operation[2] - 1];
-      double *out = a[operation[3] - 1], *angle;
-      switch (operation[0]) {
-      case LINEAR: out[k] = combined(tape, operation[1] - 1, k, a); break;
-      case QUOTIENT: out[k] = (x[k] - *sum++ - y[k] * out[0]) / y[0]; break;
-      case SQRT:
-        /* A norm is constant at rest. */
-        out[k] = x[k] - *sum++;
-        if (out[k]) out[k] /= 2.0 * out[0];
-        break;
-      case EXP:
-        /* The second slot has k times the terms of the argument. It is constant, because it is
-           large, where term 0 of that slot says so. */
-        angle = out + TERMS;
-        angle[k] = angle[0] ? 0.0 : k * x[k];
-        out[k] = (*sum++ + angle[k] * out[0]) / k;
-        break;
-      case SINE_COSINE:
-        angle = out + 2 * TERMS;
-        angle[k] = k * x[k];
-        out[k] = (*sum++ + angle[k] * out[TERMS]) / k;
-        out[TERMS + k] = -(*sum++ + angle[k] * out[0]) / k;
-        break;
-      case TANH:
-        /* The second slot is 1 minus the square, the derivative. */
-        angle = out + 2 * TERMS;
-        angle[k] = k * x[k];
-        out[k] = (*sum++ + angle[k] * out[TERMS]) / k;
-        out[TERMS + k] = -*sum++ - 2.0 * out[k] * out[0];
-        break;
-      case LOG:
-      case ATAN:
-      case ASIN:
-        angle = out + TERMS;
-        angle[k] = k * x[k];
-        out[k] = (*sum++ + angle[k] * y[0]) / k;
-        break;
-      case SELECT: out[k] = a[chosen(tape, operation)][k]; break;
-      default: /* a table, or a switch */
-        break;
+      const double *const x = a[operation[1] - 1], *const y = a[operation[2] - 1];
+      double *const o = a[operation[3] - 1], *const p = o + TERMS, *const q = p + TERMS;
+      switch (item->kind) {
+      case LINEAR: o[k] = combined(tape, operation[1] - 1, k, a); break;
+      case SELECT: o[k] = a[chosen(tape, operation)][k]; break;
+      TERM_CASES
+      default: break; /* a table, or a switch */
       }
     }
     const abreast part = (abreast){0.0} + h / (k + 1);
@@ -457,6 +429,12 @@ static inline nodal summed(const double *terms, nodal parts)
   return even + parts * odd;
 }
 
+/* The slope of a root of 0, such as a norm at rest, is 0. */
+static inline nodal slope_of_root(nodal root)
+{
+  return (nodal)((nodal_bits)(0.5 / root) & (root != 0.0));
+}
+
 /* Compute the derivatives of the rates by some unknowns, from `first_column` on, at so many `nodes`, the
    `parts` of the step, times the step: element [i][j] of each matrix is that of rate i by unknown j. */
 static ALWAYS_INLINE void set_columns(const struct tape *tape, const int nodes, const int first_column,
@@ -475,7 +453,7 @@ static ALWAYS_INLINE void set_columns(const struct tape *tape, const int nodes, 
   for (int n = 0; n < tape->n_operations + tape->n_unknowns; n++) {
     const int is_rate = n >= tape->n_operations;
     const int *operation = tape->operations[is_rate ? 0 : n];
-    const int first = operation[1] - 1, second = operation[2] - 1, out = operation[3] - 1;
+    const int first = operation[1] - 1, out = operation[3] - 1;
     if (is_rate || operation[0] == LINEAR) {
       const int c = is_rate ? derivatives + n - tape->n_operations : first;
       if (!is_rate) {
@@ -494,39 +472,22 @@ static ALWAYS_INLINE void set_columns(const struct tape *tape, const int nodes, 
       }
       continue;
     }
-    /* The derivatives of the first slot by the operands, and of the second by the first operand. */
-    nodal by_first = {0.0}, by_second = {0.0}, of_second = {0.0};
-    int from = first, other = 0, has_second = 0;
-    if (operation[0] == PRODUCT) m[out] = m[first] * m[second];
-    else if (operation[0] == QUOTIENT) m[out] = m[first] / m[second];
-    else m[out] = summed(a[out], parts);
-    switch (operation[0]) {
-    case PRODUCT: by_first = m[second], by_second = m[first], other = second; break;
-    case QUOTIENT:
-      by_first = 1.0 / m[second], by_second = -m[out] * by_first, other = second;
-      break;
-    case SQRT:
-      for (int d = 0; d < nodes; d++) by_first[d] = m[out][d] ? 0.5 / m[out][d] : 0.0;
-      break;
-    case EXP: by_first = m[out]; break;
-    case SINE_COSINE:
-      by_first = m[out + 1] = summed(a[out + 1], parts), of_second = -m[out], has_second = 1;
-      break;
-    case TANH:
-      by_first = m[out + 1] = summed(a[out + 1], parts), of_second = -2.0 * m[out] * by_first;
-      has_second = 1;
-      break;
-    case LOG:
-    case ATAN:
-    case ASIN: by_first = m[second]; break;
-    case SELECT: by_first = (nodal){0.0} + 1.0, from = chosen(tape, operation); break;
-    default: from = 0; break; /* a table depends on the time alone, and a switch is constant */
+    const int kind = recurrence_of(operation), o = out, p = o + 1, y = operation[2] - 1;
+    const int other = HAS_OWN_VALUE(kind) ? y : 0;
+    int x = kind == SELECT ? chosen(tape, operation) : first;
+    nodal by_x = {0.0}, by_y = {0.0}, second_by_x = {0.0};
+    if (!HAS_OWN_VALUE(kind)) m[o] = summed(a[o], parts);
+    if (READS_SECOND(kind)) m[p] = summed(a[p], parts);
+    switch (kind) {
+    case SELECT: by_x = (nodal){0.0} + 1.0; break;
+    SLOPE_CASES
+    default: x = 0; break; /* a table depends on the time alone, and a switch is constant */
     }
     for (int d = 0; d < nodes; d++) {
-      for (int p = 0; p < columns; p += IN_REGISTER) {
-        const reg x = *(reg *)(v[from][d] + p);
-        *(reg *)(v[out][d] + p) = by_first[d] * x + by_second[d] * *(reg *)(v[other][d] + p);
-        if (has_second) *(reg *)(v[out + 1][d] + p) = of_second[d] * x;
+      for (int lane = 0; lane < columns; lane += IN_REGISTER) {
+        const reg of_x = *(reg *)(v[x][d] + lane), of_y = *(reg *)(v[other][d] + lane);
+        *(reg *)(v[o][d] + lane) = by_x[d] * of_x + by_y[d] * of_y;
+        if (READS_SECOND(kind)) *(reg *)(v[p][d] + lane) = second_by_x[d] * of_x;
       }
     }
   }

@@ -1,0 +1,67 @@
+"""The recurrences, slopes and rounding errors of recorded operations, as C.
+
+fortran/make_cases.py writes the cases of the interpreter from this table, and leaves.py the code
+for single tapes.
+"""
+
+from typing import NamedTuple
+
+from pyharness.model.codes import Operations
+
+
+class Operation(NamedTuple):
+    """The recurrence and the slopes of an operation, as C.
+
+    The letters o, p and q stand for the slots of its results, x and y for the slots of its
+    operands. For each slot, such as o, t_o is term k of the series (l_o if known before), b_o term
+    k - 1, z_o term 0, f_o term 1, and m_o the value at a node. i is 1/k. s0 and s1 are sums of
+    products of terms 1 to k - 1 of the slots in `pairs`. The rounding error of a result is its own
+    and those of the operands, times the absolute slopes.
+    """
+
+    series: tuple[str, ...]
+    pairs: tuple[str, ...] = ()
+    value: str = ""  # of slot o at a node; without it the series is summed
+    slopes: tuple[str, ...] = ()  # of slot o by x and by y
+    second: str = ""  # slope of slot p by x, if another operation may read that slot
+    first: str = ""  # z_o, if not as m_o; without both the interpreter computes it
+    rounding: str = "2.0*size(z_o)"  # own, in units
+
+
+_OF_ANGLE = Operation(("t_p = k*t_x", "t_o = i*(s0 + t_p*z_y)"), ("py",), slopes=("m_y",))
+_SINE = Operation(
+    ("t_q = k*t_x", "t_o = i*(s0 + t_q*z_p)", "t_p = -i*(s1 + t_q*z_o)"), ("qp", "qo"),
+    slopes=("m_p",), second="-m_o", rounding="2.0",
+)  # fmt: skip
+WAVE = 0  # the kind of SINE_COSINE of an angle proportional to time
+OPERATIONS = {
+    Operations.PRODUCT: Operation(
+        ("t_o = s0 + z_x*t_y + z_y*t_x",), ("xy",), "m_x*m_y", ("m_y", "m_x"),
+        rounding="size(z_o)",
+    ),
+    Operations.QUOTIENT: Operation(
+        ("t_o = (t_x - s0 - t_y*z_o)/z_y",), ("yo",), "m_x/m_y", ("1.0/m_y", "-m_o/m_y"),
+        rounding="size(z_o)",
+    ),
+    # A root of 0, such as a norm at rest, is constant: its terms would be 0/0.
+    Operations.SQRT: Operation(
+        ("t_o = halved(t_x - s0, z_o)",), ("oo",), slopes=("slope_of_root(m_o)",),
+        first="root_of(z_x)", rounding="size(z_o)",
+    ),
+    # Term 0 of the second slot says that the exponential is constant.
+    Operations.EXP: Operation(
+        ("t_p = z_p ? 0.0 : k*t_x", "t_o = i*(s0 + t_p*z_o)"), ("po",), slopes=("m_o",)
+    ),
+    Operations.TANH: Operation(
+        ("t_q = k*t_x", "t_o = i*(s0 + t_q*z_p)", "t_p = -s1 - 2.0*t_o*z_o"), ("qp", "oo"),
+        slopes=("m_p",),
+    ),
+    Operations.SINE_COSINE: _SINE,
+    WAVE: _SINE._replace(
+        series=("t_q = k*t_x", "t_o = i*f_x*b_p", "t_p = -i*f_x*b_o"), pairs=()
+    ),
+    Operations.TABLE: Operation(("t_o = l_o",)),
+    Operations.LOG: _OF_ANGLE,
+    Operations.ATAN: _OF_ANGLE,
+    Operations.ASIN: _OF_ANGLE,
+}  # fmt: skip

@@ -43,7 +43,7 @@ def roundings(operation: Any, is_exact: bool) -> list[str]:
                 pairs = zip(texts, "xy", strict=False)
                 parts += [f"size({text.replace('m_', 'z_')})*e[{x}]" for text, x in pairs]
             text = " + ".join(parts).replace("slope_of_root", "slope_at_root")
-            found.append(f"e[{slot}] = " + re.sub(r"\bz_(\w)\b", r"VALUE(\1)", text))
+            found.append(f"e[{slot}] = zero + " + re.sub(r"\bz_(\w)\b", r"a[\1][0]", text))
     return found
 
 

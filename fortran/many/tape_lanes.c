@@ -50,7 +50,7 @@ static const double INVISIBLE = 100.0;    /* as in tape_powers.f90, and the next
 static const double PART_OF_ORDER = 0.6;
 static const double NEAR_ZERO = 1e3; /* as MULTIPLE in tape_steady.f90 */
 
-typedef lanes series[TERMS];
+typedef lanes number, series[TERMS];
 
 /* tape_bodies_t of tape.f90. */
 struct bodies {
@@ -109,6 +109,10 @@ static inline lanes select_of(bits mask, lanes a, lanes b)
   return (lanes)(((bits)a & mask) | ((bits)b & ~mask));
 }
 static inline lanes absolute(lanes x) { return (lanes)((bits)x & 0x7fffffffffffffffLL); }
+static inline lanes size(lanes x) { return absolute(x); }
+static inline lanes slope_at_root(lanes root) { return 0.5 / root; }
+#define OTHER_ROUNDINGS
+#include "../modern/tape_noise.h"
 
 static inline lanes each_of(double (*function)(double), lanes x)
 {
@@ -353,7 +357,7 @@ static lanes converged(const struct group *g, lanes factor)
   return factor;
 }
 
-/* Return bounds of the rounding errors of the derivatives, as noise_of in tape_series.f90. */
+/* Return bounds of the rounding errors of the derivatives. */
 static void set_noise(struct group *g, lanes *noise)
 {
   const struct tape *tape = &g->all->tape;
@@ -362,43 +366,7 @@ static void set_noise(struct group *g, lanes *noise)
     return;
   }
   for (int i = 0; i < FIRST_UNKNOWN + g->n; i++) g->noises[i] = all_of(0.0);
-  for (int n = 0; n < tape->n_operations + g->n; n++) {
-    lanes sum = {0.0};
-    const int is_output = n >= tape->n_operations;
-    const int *operation = tape->operations[is_output ? 0 : n];
-    if (is_output || operation[0] == LINEAR) {
-      const int c = is_output ? tape->n_combinations - g->n + n - tape->n_operations
-                              : operation[1] - 1;
-      for (int i = tape->starts[c] - 1; i < tape->starts[c + 1] - 1; i++) {
-        const int slot = tape->slots[i] - 1;
-        sum += fabs(tape->coefficients[i]) * (absolute(g->a[slot][0]) + g->noises[slot]);
-      }
-      if (tape->starts[c + 1] > tape->starts[c]) sum += fabs(tape->constants[c]);
-      if (is_output) noise[n - tape->n_operations] = sum;
-      else g->noises[operation[3] - 1] = sum;
-      continue;
-    }
-    const int first = operation[1] - 1, second = operation[2] > 0 ? operation[2] - 1 : 0;
-    const int out = operation[3] - 1;
-    const lanes x = g->noises[first], y = g->noises[second], value = absolute(g->a[out][0]);
-    switch (operation[0]) {
-    case PRODUCT:
-      sum = value + absolute(g->a[first][0]) * y + absolute(g->a[second][0]) * x;
-      break;
-    case QUOTIENT: sum = value + (x + value * y) / absolute(g->a[second][0]); break;
-    case SQRT: sum = value + x / (2.0 * value); break;
-    case EXP: sum = value * (2.0 + x); break;
-    case TANH: sum = 2.0 * value + g->a[out + 1][0] * x; break;
-    case TABLE: sum = 2.0 * value; break;
-    case LOG:
-    case ATAN:
-    case ASIN: sum = 2.0 * value + absolute(g->a[second][0]) * x; break;
-    default: /* An angle proportional to time has no rounding error. */
-      sum = 2.0 + (operation[2] > 0 ? all_of(0.0) : absolute(g->a[out + 1][0]) * x);
-      g->noises[out + 1] = 2.0 + (operation[2] > 0 ? all_of(0.0) : value * x);
-    }
-    g->noises[out] = sum;
-  }
+  bound_roundings(tape, (const series *)g->a, g->noises, noise);
 }
 
 /* Find the series of the operands and results of all operations, and of all terms of combinations. */

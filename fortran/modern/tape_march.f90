@@ -257,7 +257,7 @@ contains
         end if
         if (verdict == CROSSES) call end_at_switch()
       end if
-      call noise_of(live, s, noise)
+      call noise_of(s, noise)
       if (.not. is_continued_to_switch()) then
         is_rejected = .true.
         tries = tries + 1

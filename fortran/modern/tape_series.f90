@@ -21,7 +21,6 @@ module tape_series
   integer, parameter, public :: LAST_TERM = SERIES_LENGTH - 1
   integer, parameter, public :: SIDE_BY_SIDE = 8       ! perturbations in a register
   integer, parameter :: BYTES = 8                      ! of a number
-  real(dp), parameter :: EPSILON_OF_FUNCTION = 2.0_dp ! rounding error of a function, in units
   ! A value whose rounding error is a number too. Beyond it, exponentials of larger arguments than
   ! LARGE_ARGUMENT are saturated. They are all larger than the powers of 2 that replace them.
   real(dp), parameter :: LARGEST = 1e290_dp
@@ -95,13 +94,18 @@ module tape_series
       real(dp), intent(inout) :: rates(tape%n_unknowns)
     end function begin_values
 
-    integer(c_int) function bound_noise(tape, noise) bind(c, name="bound_noise_level")
-      !! Bound the rounding errors of the rates, and return 1; or return 0, if it is not compiled.
+    subroutine bound_noise(tape, n_slots, of_slots, noise, of_unknowns) &
+      bind(c, name="bound_noise_level")
+      !! Bound the rounding errors of the rates and, without leaves or with those of the unknowns,
+      !! of all slots.
       import :: c_int, dp, tape_arrays_t
       implicit none(type, external)
       type(tape_arrays_t), intent(in) :: tape
+      integer(c_int), intent(in), value :: n_slots
+      real(dp), intent(inout) :: of_slots(n_slots)
       real(dp), intent(inout) :: noise(tape%n_unknowns)
-    end function bound_noise
+      real(dp), intent(in), optional :: of_unknowns(tape%n_unknowns)
+    end subroutine bound_noise
 
     subroutine expand_tape(tape, h, order) bind(c, name="expand_tape_level")
       !! Compute all terms of all slots from their terms 0, and from the time and the tables.
@@ -478,81 +482,14 @@ contains
     end do
   end function value_of
 
-  subroutine noise_of(tape, s, noise, of_unknowns)
+  subroutine noise_of(s, noise, of_unknowns)
     !! Compute bounds of the rounding errors of the derivatives of the unknowns, in units of the
-    !! rounding error of 1, by running error analysis of terms 0 (Higham 2002, section 3.3). The
-    !! time counts as exact, and so do the unknowns without `of_unknowns`.
-    type(tape_t), intent(in) :: tape
+    !! rounding error of 1. Without `of_unknowns` the unknowns count as exact.
     type(series_t), intent(inout) :: s
     real(dp), intent(out) :: noise(:)
     real(dp), intent(in), optional :: of_unknowns(:) !! their rounding errors, in units
-    integer :: i, n, out
 
-    if (.not. present(of_unknowns)) then
-      if (bound_noise(s%arrays, noise) /= 0) return
-    end if
-    s%noise = 0.0_dp
-    if (present(of_unknowns)) s%noise(FIRST_UNKNOWN:FIRST_UNKNOWN + size(noise) - 1) = of_unknowns
-    do n = 1, tape%n_operations
-      associate (first => tape%operations(2, n), second => tape%operations(3, n))
-        out = tape%operations(4, n)
-        select case (tape%operations(1, n))
-        case (LINEAR)
-          s%noise(out) = of_combination(first)
-        case (PRODUCT)
-          s%noise(out) = abs(s%a(0, out)) + abs(s%a(0, first))*s%noise(second) &
-                         + abs(s%a(0, second))*s%noise(first)
-        case (QUOTIENT)
-          s%noise(out) = abs(s%a(0, out)) &
-                         + (s%noise(first) + abs(s%a(0, out))*s%noise(second)) &
-                         /abs(s%a(0, second))
-        case (SQUARE_ROOT)
-          s%noise(out) = abs(s%a(0, out)) &
-                         + s%noise(first)/max(tiny(1.0_dp), 2.0_dp*abs(s%a(0, out)))
-        case (EXPONENTIAL)
-          s%noise(out) = abs(s%a(0, out))*(EPSILON_OF_FUNCTION + s%noise(first))
-        case (TANGENT)
-          s%noise(out) = EPSILON_OF_FUNCTION*abs(s%a(0, out)) + s%a(0, out + 1)*s%noise(first)
-        case (TABLE)
-          s%noise(out) = EPSILON_OF_FUNCTION*abs(s%a(0, out))
-        case (LOGARITHM, ARCTANGENT, ARCSINE)
-          s%noise(out) = EPSILON_OF_FUNCTION*abs(s%a(0, out)) + abs(s%a(0, second))*s%noise(first)
-        case (SWITCH, FLOOR_OF)
-          s%noise(out) = 0.0_dp
-        case (SELECT_OF)
-          s%noise(out) = of_combination(chosen(tape, n, s%a))
-        case default
-          s%noise(out) = EPSILON_OF_FUNCTION
-          s%noise(out + 1) = EPSILON_OF_FUNCTION
-          ! An angle proportional to time has no rounding error.
-          if (second == 0) then
-            s%noise(out) = s%noise(out) + abs(s%a(0, out + 1))*s%noise(first)
-            s%noise(out + 1) = s%noise(out + 1) + abs(s%a(0, out))*s%noise(first)
-          end if
-        end select
-      end associate
-    end do
-    do i = 1, tape%n_unknowns
-      noise(i) = of_combination(size(tape%constants) - tape%n_unknowns + i)
-    end do
-
-  contains
-
-    pure real(dp) function of_combination(n)
-      integer, intent(in) :: n
-      integer :: i
-
-      of_combination = 0.0_dp
-      ! One term alone is rounded once, and the multiplication by 1 not at all.
-      do i = tape%starts(n), tape%starts(n + 1) - 1
-        of_combination = of_combination + abs(tape%coefficients(i)) &
-                         *(abs(s%a(0, tape%slots(i))) + s%noise(tape%slots(i)))
-      end do
-      if (tape%starts(n + 1) > tape%starts(n)) then
-        of_combination = of_combination + abs(tape%constants(n))
-      end if
-    end function of_combination
-
+    call bound_noise(s%arrays, size(s%noise), s%noise, noise, of_unknowns)
   end subroutine noise_of
 
 end module tape_series

@@ -171,7 +171,7 @@ contains
       end do
       step%state = request%state + step%state
       call derivatives_at(live, [request%t + step%h, 0.0_dp], step%state, -s%h, s, derivatives)
-      call noise_of(live, s, noise, abs(step%state))
+      call noise_of(s, noise, abs(step%state))
       ! NaN is not allowed.
       is_continued = all(abs(step%h*derivatives - slope) <= MOST_DEFECT*tolerances &
                          + MOST_ROUNDING*epsilon(s%h)*(sizes + abs(step%h)*noise)) &

@@ -9,7 +9,7 @@
 
 typedef double lanes __attribute__((vector_size(8 * SIDE_BY_SIDE)));
 typedef long long bits __attribute__((vector_size(8 * SIDE_BY_SIDE)));
-typedef double series[TERMS];
+typedef double number, series[TERMS];
 typedef double perturbations[TERMS_OF_PERTURBATION][SIDE_BY_SIDE];
 
 /* block_t of tape_series.f90. Where the derivative of unknown i depends on a parameter itself,
@@ -166,6 +166,12 @@ static int chosen(const struct tape *tape, const int *operation)
   return tape->slots[tape->starts[combination] - 1] - 1;
 }
 
+static inline double size(double x) { return fabs(x); }
+static inline double slope_at_root(double root) { return 0.5 / (root > 0x1p-1022 ? root : 0x1p-1022); }
+#define OTHER_ROUNDINGS \
+  case SELECT: e[o] = size(a[chosen(tape, operation)][0]) + e[chosen(tape, operation)]; break;
+#include "tape_noise.h"
+
 /* Compute the terms of all slots below the order, and those of the unknowns up to it. Inputs are
    term 0 of all slots, and all terms of the time and of tables. */
 void OF_LEVEL(expand_tape, LEVEL)(const struct tape *tape, double h, int order)
@@ -235,12 +241,17 @@ int OF_LEVEL(begin_values, LEVEL)(const struct tape *tape, double *rates)
   return 1;
 }
 
-/* Bound the rounding errors of the rates, and return whether the leaves can. */
-int OF_LEVEL(bound_noise, LEVEL)(const struct tape *tape, double *noise)
+/* Bound the rounding errors of the rates. Those of the unknowns may be missing. */
+void OF_LEVEL(bound_noise, LEVEL)(const struct tape *tape, int n_slots, double *of_slots,
+                                  double *noise, const double *of_unknowns)
 {
-  if (!tape->leaves) return 0;
-  tape->leaves->set_noise(tape->a, tape->coefficients, tape->constants, noise);
-  return 1;
+  if (tape->leaves && !of_unknowns) {
+    tape->leaves->set_noise(tape->a, tape->coefficients, tape->constants, noise);
+    return;
+  }
+  memset(of_slots, 0, n_slots * sizeof *of_slots);
+  if (of_unknowns) memcpy(of_slots + FIRST_UNKNOWN, of_unknowns, tape->n_unknowns * sizeof *of_slots);
+  bound_roundings(tape, tape->a, of_slots, noise);
 }
 
 /* For the part `factor` of the step, sum the terms of the unknowns from 1 on (`changes`), the terms

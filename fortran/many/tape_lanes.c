@@ -87,7 +87,8 @@ struct group {
   const struct leaves *leaves;    /* compiled for these registers; or NULL */
   int *depends; /* of each slot: the unknowns on which it depends, as bits; the next is the time */
   double is_varying;              /* 1 if the Jacobian depends on the time, or 0 */
-  lanes *middle, *tangents, *noises; /* of each slot: value amid the step, tangent, rounding error */
+  lanes *middle, *noises;         /* of each slot: value amid the step, rounding error */
+  lanes (*tangents)[WITH_ATTITUDE]; /* of each slot: derivatives by the unknowns */
   lanes y[WITH_ATTITUDE], low[WITH_ATTITUDE]; /* unknowns and their rounding errors */
   lanes error[WITH_ATTITUDE];     /* truncation error, propagated so far */
   lanes probes[PROBES][WITH_ATTITUDE]; /* perturbations since time 0 */
@@ -110,7 +111,8 @@ static inline lanes select_of(bits mask, lanes a, lanes b)
 }
 static inline lanes absolute(lanes x) { return (lanes)((bits)x & 0x7fffffffffffffffLL); }
 static inline lanes size(lanes x) { return absolute(x); }
-static inline lanes slope_at_root(lanes root) { return 0.5 / root; }
+static inline lanes slope_of_root(lanes root) { return 0.5 / root; }
+#define slope_at_root slope_of_root
 #define OTHER_ROUNDINGS
 #include "../modern/tape_noise.h"
 
@@ -273,6 +275,11 @@ static inline void multiply(lanes *out, const lanes *x, const lanes *y, int k)
   }
 }
 
+/* The operands of TERM_CASES. An exponential is never constant here. */
+#define SUM(x, y) convolved(x, y, k, 1, k - 1)
+#define UNLESS(flag, x) (x)
+#define halved(x, root) ((x) / (2.0 * (root)))
+
 /* Compute the terms of all slots, and those of the unknowns up to the order. */
 static void expand(struct group *g)
 {
@@ -284,37 +291,15 @@ static void expand(struct group *g)
   }
   const struct operation *const end = g->operations + tape->n_operations;
   for (int k = 0; k < g->order; k++) {
-    const double whole = k;
-    for (const struct operation *o = g->operations; k > 0 && o < end; o++) {
-      const lanes *x = o->x, *y = o->y;
-      lanes *out = o->out, *second = out + TERMS, *third = second + TERMS;
-      switch (o->kind) {
-      case LINEAR: out[k] = combined(g, o->combination, k); break;
-      case PRODUCT: multiply(out, x, y, k); break;
-      case QUOTIENT: out[k] = (x[k] - convolved(out, y, k, 0, k - 1)) / y[0]; break;
-      case SQRT: out[k] = (x[k] - convolved(out, out, k, 1, k - 1)) / (2.0 * out[0]); break;
-      case EXP: /* The second slot has k times the terms of the argument. */
-        second[k] = whole * x[k];
-        out[k] = convolved(out, second, k, 0, k - 1) / whole;
-        break;
-      case SINE_COSINE:
-        third[k] = whole * x[k];
-        out[k] = convolved(second, third, k, 0, k - 1) / whole;
-        second[k] = -convolved(out, third, k, 0, k - 1) / whole;
-        break;
-      case TANH: /* The second slot is 1 minus the square, the derivative. */
-        third[k] = whole * x[k];
-        out[k] = convolved(second, third, k, 0, k - 1) / whole;
-        second[k] = -convolved(out, out, k, 0, k);
-        break;
-      case LOG:
-      case ATAN:
-      case ASIN:
-        second[k] = whole * x[k];
-        out[k] = convolved(y, second, k, 0, k - 1) / whole;
-        break;
-      default: /* a table */
-        break;
+    const double whole = k, per_k = 1.0 / whole;
+    for (const struct operation *each = g->operations; k > 0 && each < end; each++) {
+      const lanes *const x = each->x, *const y = each->y;
+      lanes *const o = each->out, *const p = o + TERMS, *const q = p + TERMS;
+      switch (each->kind) {
+      case LINEAR: o[k] = combined(g, each->combination, k); break;
+      case PRODUCT: multiply(o, x, y, k); break;
+      TERM_CASES
+      default: break; /* a table */
       }
     }
     const lanes part = g->h / (k + 1.0);
@@ -376,7 +361,7 @@ static void find_series(struct group *g)
   for (int n = 0; n < tape->n_operations; n++) {
     const int *operation = tape->operations[n];
     g->operations[n] = (struct operation){
-        operation[0], operation[1] - 1, g->a[operation[1] - 1],
+        recurrence_of(operation), operation[1] - 1, g->a[operation[1] - 1],
         g->a[operation[2] > 0 ? operation[2] - 1 : 0], g->a[operation[3] - 1]};
   }
   for (int i = 0; i < tape->starts[tape->n_combinations] - 1; i++)
@@ -407,6 +392,16 @@ static void find_dependences(struct group *g)
   }
 }
 
+/* Return the derivative of a combination by an unknown. */
+static lanes perturbed(const struct group *g, int n, int j)
+{
+  const struct tape *tape = &g->all->tape;
+  lanes sum = {0.0};
+  for (int i = tape->starts[n] - 1; i < tape->starts[n + 1] - 1; i++)
+    sum += tape->coefficients[i] * g->tangents[tape->slots[i] - 1][j];
+  return sum;
+}
+
 /* Compute the derivatives of the rates by the unknowns amid the step, times the step. */
 static void set_jacobian(struct group *g, lanes factor, lanes jacobian[][WITH_ATTITUDE])
 {
@@ -416,53 +411,36 @@ static void set_jacobian(struct group *g, lanes factor, lanes jacobian[][WITH_AT
     g->leaves->set_lane_jacobian(*g->a, tape->coefficients, tape->constants, &half, &step, jacobian);
     return;
   }
+  lanes *const m = g->middle, (*const v)[WITH_ATTITUDE] = g->tangents;
   for (int n = 0; n < g->all->n_slots; n++) {
     lanes sum = {0.0};
     /* The order is above the number of these terms. */
     for (int k = FEW_TERMS - 1; k > 0; k--) sum = half * (sum + g->a[n][k]);
-    g->middle[n] = g->a[n][0] + sum;
+    m[n] = g->a[n][0] + sum;
   }
-  for (int j = 0; j < g->n; j++) {
-    lanes *v = g->tangents;
-    memset(v, 0, g->all->n_slots * sizeof *v);
-    v[FIRST_UNKNOWN + j] = all_of(1.0);
-    for (int n = 0; n < tape->n_operations; n++) {
-      const int *operation = tape->operations[n];
-      if (!(g->depends[operation[3] - 1] >> j & 1)) continue;
-      const int first = operation[1] - 1, second = operation[2] > 0 ? operation[2] - 1 : 0;
-      const int out = operation[3] - 1;
-      const lanes *m = g->middle;
-      switch (operation[0]) {
-      case LINEAR:
-        for (int i = tape->starts[first] - 1; i < tape->starts[first + 1] - 1; i++)
-          v[out] += tape->coefficients[i] * v[tape->slots[i] - 1];
-        break;
-      case PRODUCT: v[out] = m[first] * v[second] + m[second] * v[first]; break;
-      case QUOTIENT: v[out] = (v[first] - m[out] * v[second]) / m[second]; break;
-      case SQRT: v[out] = v[first] / (2.0 * m[out]); break;
-      case EXP: v[out] = m[out] * v[first]; break;
-      case SINE_COSINE:
-        v[out] = m[out + 1] * v[first];
-        v[out + 1] = -m[out] * v[first];
-        break;
-      case TANH:
-        v[out] = m[out + 1] * v[first];
-        v[out + 1] = -2.0 * m[out] * v[out];
-        break;
-      case LOG:
-      case ATAN:
-      case ASIN: v[out] = m[second] * v[first]; break;
-      default: break;
-      }
+  for (int j = 0; j < g->n; j++) v[FIRST_UNKNOWN + j][j] = all_of(1.0);
+  for (int n = 0; n < tape->n_operations; n++) {
+    const int *operation = tape->operations[n], kind = recurrence_of(operation);
+    const int x = operation[1] - 1, y = operation[2] - 1, o = operation[3] - 1, p = o + 1;
+    const int other = HAS_OWN_VALUE(kind) ? y : 0;
+    lanes by_x = {0.0}, by_y = {0.0}, second_by_x = {0.0};
+    switch (kind) {
+    case LINEAR:
+      for (int j = 0; j < g->n; j++) v[o][j] = perturbed(g, x, j);
+      continue;
+    SLOPE_CASES
+    default: break; /* a table */
     }
-    for (int i = 0; i < g->n; i++) {
-      const int c = tape->n_combinations - g->n + i;
-      lanes sum = {0.0};
-      for (int k = tape->starts[c] - 1; k < tape->starts[c + 1] - 1; k++)
-        sum += tape->coefficients[k] * v[tape->slots[k] - 1];
-      jacobian[i][j] = step * sum;
+    for (int j = 0; j < g->n; j++) {
+      /* A slope that does not count may be infinite. */
+      if (!(g->depends[o] >> j & 1)) continue;
+      v[o][j] = by_x * v[x][j] + by_y * v[other][j];
+      if (READS_SECOND(kind)) v[p][j] = second_by_x * v[x][j];
     }
   }
+  for (int i = 0; i < g->n; i++)
+    for (int j = 0; j < g->n; j++)
+      jacobian[i][j] = step * perturbed(g, tape->n_combinations - g->n + i, j);
 }
 
 static lanes power_of(lanes x, int exponent)
@@ -858,7 +836,7 @@ static int order_for(const struct bodies *all, int *factors)
 void OF_LEVEL(solve_tape_bodies, LEVEL)(struct bodies *all)
 {
   struct group g;
-  const size_t of_slot = TERMS + 3, n_slots = all->n_slots;
+  const size_t of_slot = TERMS + 2 + WITH_ATTITUDE, n_slots = all->n_slots;
   const int n = all->tape.n_operations, n_terms = all->tape.starts[all->tape.n_combinations] - 1;
   lanes *memory = aligned_alloc(sizeof(lanes), n_slots * of_slot * sizeof(lanes));
   int next = 0, active = 0, unseen = 0;
@@ -881,8 +859,8 @@ void OF_LEVEL(solve_tape_bodies, LEVEL)(struct bodies *all)
   g.leaves = fits_lanes((intptr_t)all->tape.leaves) ? all->tape.leaves : NULL;
   g.a = (series *)memory;
   g.middle = memory + n_slots * TERMS;
-  g.tangents = g.middle + n_slots;
-  g.noises = g.tangents + n_slots;
+  g.noises = g.middle + n_slots;
+  g.tangents = (lanes(*)[WITH_ATTITUDE])(g.noises + n_slots);
   g.terms = (lanes **)(g.operations + n);
   find_series(&g);
   find_dependences(&g);

@@ -67,6 +67,11 @@ def main(root: str, header: str) -> None:
         },
         "TERM_CASES": {name: terms(each) for name, each in others.items()},
         "SLOPE_CASES": {name: slopes(each) for name, each in table.items()},
+        "SLOPE_SERIES_CASES": {
+            name: [f"slope = {each.slopes[0][2:]}"]
+            for name, each in table.items()
+            if name != "WAVE" and len(each.slopes) == 1 and each.slopes[0].startswith("m_")
+        },
         "ROUNDING_CASES": {
             name: roundings(each, name == "WAVE") for name, each in table.items()
         },

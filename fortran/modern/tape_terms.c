@@ -328,53 +328,38 @@ static void perturb(const struct tape *tape, double h, int k)
   const series *const a = (const series *)tape->a;
   perturbations *const v = tape->v;
   const int derivatives = tape->n_combinations - tape->n_unknowns;
-  lanes x;
 
   for (int n = 0; n < tape->n_operations; n++) {
-    const int *operation = tape->operations[n];
-    const int first = operation[1] - 1, second = operation[2] - 1, out = operation[3] - 1;
-    switch (operation[0]) {
-    case LINEAR:
-      x = perturbed(tape, first, k, (const perturbations *)v);
-      break;
+    const int *operation = tape->operations[n], kind = operation[0];
+    const int first = operation[1] - 1, y = operation[2] - 1, o = operation[3] - 1, p = o + 1;
+    lanes x = {0.0};
+    int slope = -1; /* the slot whose series is the derivative by the operand */
+    switch (kind) {
+    case LINEAR: x = perturbed(tape, first, k, (const perturbations *)v); break;
     case PRODUCT:
-      x = convolved_many(v[first], a[second], v[second], a[first], k);
-      x += loaded(v[first][k]) * a[second][0] + loaded(v[second][k]) * a[first][0];
+      x = convolved_many(v[first], a[y], v[y], a[first], k);
+      x += loaded(v[first][k]) * a[y][0] + loaded(v[y][k]) * a[first][0];
       break;
     case QUOTIENT:
-      x = convolved_many(v[second], a[out], v[out], a[second], k);
-      x = (loaded(v[first][k]) - loaded(v[second][k]) * a[out][0] - x) / a[second][0];
+      x = convolved_many(v[y], a[o], v[o], a[y], k);
+      x = (loaded(v[first][k]) - loaded(v[y][k]) * a[o][0] - x) / a[y][0];
       break;
     case SQRT:
-      x = (0.5 * loaded(v[first][k]) - convolved_one(v[out], a[out], k)) / a[out][0];
-      break;
-    case EXP:
-      x = convolved_one(v[first], a[out], k) + loaded(v[first][k]) * a[out][0];
-      break;
-    case TANH:
-      x = convolved_one(v[first], a[out + 1], k) + loaded(v[first][k]) * a[out + 1][0];
-      break;
-    case LOG:
-    case ATAN:
-    case ASIN:
-      x = convolved_one(v[first], a[second], k) + loaded(v[first][k]) * a[second][0];
+      x = (0.5 * loaded(v[first][k]) - convolved_one(v[o], a[o], k)) / a[o][0];
       break;
     case SELECT: x = loaded(v[chosen(tape, operation)][k]); break;
-    case SINE_COSINE:
-      x = convolved_one(v[first], a[out], k) + loaded(v[first][k]) * a[out][0];
-      store(v[out + 1][k], -x);
-      x = convolved_one(v[first], a[out + 1], k) + loaded(v[first][k]) * a[out + 1][0];
-      break;
-    default: /* a table or a switch, which have no perturbation */
-      x = (lanes){0.0};
-      break;
+    SLOPE_SERIES_CASES
+    default: break; /* a table or a switch, which have no perturbation */
     }
-    store(v[out][k], x);
+    if (slope >= 0) x = convolved_one(v[first], a[slope], k) + loaded(v[first][k]) * a[slope][0];
+    if (kind == SINE_COSINE)
+      store(v[p][k], -convolved_one(v[first], a[o], k) - loaded(v[first][k]) * a[o][0]);
+    store(v[o][k], x);
   }
   for (int i = 0; i < tape->n_unknowns; i++) {
     double *to = v[FIRST_UNKNOWN + i][k + 1];
-    x = h / (k + 1) * perturbed(tape, derivatives + i, k, (const perturbations *)v);
-    store(to, loaded(to) + x);
+    const lanes x = perturbed(tape, derivatives + i, k, (const perturbations *)v);
+    store(to, loaded(to) + h / (k + 1) * x);
   }
 }
 

@@ -62,7 +62,7 @@ def main(root: str, header: str) -> None:
     others = {name: each for name, each in table.items() if name not in ("PRODUCT", "TABLE")}
     statements = {
         "PAIR_CASES": {
-            name: [f"add_pair(work, {x}, {y})" for x, y in each.pairs]
+            name: [f"add_pair(work, {pair[0]}, {pair[1]})" for pair in each.pairs]
             for name, each in others.items()
         },
         "TERM_CASES": {name: terms(each) for name, each in others.items()},
@@ -72,9 +72,7 @@ def main(root: str, header: str) -> None:
             for name, each in table.items()
             if name != "WAVE" and len(each.slopes) == 1 and each.slopes[0].startswith("m_")
         },
-        "ROUNDING_CASES": {
-            name: roundings(each, name == "WAVE") for name, each in table.items()
-        },
+        "ROUNDING_CASES": {name: roundings(each, name == "WAVE") for name, each in table.items()},
     }
     kinds = {
         "HAS_OWN_VALUE": [name for name, each in table.items() if each.value],

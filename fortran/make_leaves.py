@@ -16,7 +16,8 @@ def main(root: str, target: str, header: str) -> None:
     # The finder of an editable installation, an instance, would start a build.
     sys.meta_path[:] = [each for each in sys.meta_path if isinstance(each, type)]
     from pyharness import Scene, TorqueLaw, torques
-    from pyharness.engine.leaves import key, names, source, structure
+    from pyharness.engine.leaf_text import key, structure
+    from pyharness.engine.leaves import names, source
     from pyharness.engine.recorded import listing, system_of
     from pyharness.model.constant_body import with_constant_body
 

@@ -8,21 +8,17 @@ import re
 from collections.abc import Iterator
 from functools import lru_cache
 
+from pyharness.engine.leaf_text import TIME, Structure, place, slots_read, unknowns_of
 from pyharness.engine.leaves import (
     HEADER,
-    TIME,
-    Structure,
     derivatives,
     first_values,
     kept_values,
     names,
     noises,
-    place,
     rates_of_term,
     recurrences,
-    slots_read,
     source,
-    unknowns_of,
 )
 from pyharness.model.codes import Storage
 

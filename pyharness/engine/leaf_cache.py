@@ -16,7 +16,7 @@ from itertools import takewhile
 from pathlib import Path
 
 from pyharness.engine.lane_leaves import whole_source
-from pyharness.engine.leaves import Structure, structure
+from pyharness.engine.leaf_text import Structure, structure
 from pyharness.engine.recorded import has_ready_leaves, listing, number_of_leaves, system_of
 from pyharness.model.array_type import Array
 from pyharness.model.constant_body import with_constant_body

@@ -7,23 +7,31 @@ memory, so that tapes that differ only in them share their leaves.
 import re
 from collections.abc import Callable, Iterable, Iterator
 from functools import lru_cache
-from hashlib import sha256
 from itertools import chain
-from typing import TYPE_CHECKING, NamedTuple
 
+from pyharness.engine.leaf_text import (
+    FIRST_UNKNOWN,
+    TIME,
+    Listed,
+    Structure,
+    combined,
+    letters,
+    numbered_terms,
+    place,
+    rates_of,
+    rule_of,
+    slots_read,
+    unknowns_of,
+    with_slots,
+)
 from pyharness.model.codes import Operations, Storage
 from pyharness.model.recurrences import OPERATIONS, WAVE, Operation
-
-if TYPE_CHECKING:
-    from pyharness.engine.recorded import Listing
 
 _ABREAST = 4  # products side by side, and nodes of the Jacobian
 _CHUNK = 8  # groups of products that are summed together; the registers suffice for 8
 _BLOCK = 8  # columns of the Jacobian in a row of its storage
 _TERMS_AMID = 16  # terms of a series at a node
 _SIZE = -(-Storage.MOST_UNKNOWNS // _BLOCK) * Storage.MOST_UNKNOWNS * _BLOCK  # of a Jacobian
-_MOST_OPERATIONS = 499  # whose products fit on the stack of a thread
-TIME, FIRST_UNKNOWN = 1, 2  # slots, from 1
 
 HEADER = (
     f"""
@@ -50,31 +58,6 @@ static void put(double *to, int nodes, double h, abreast a, abreast b, abreast c
 )
 
 
-_Listed = tuple[int, int, int, int]  # kind, operands x and y, and slot o of an operation
-
-
-class Structure(NamedTuple):
-    """The parts of a tape on which its leaves depend."""
-
-    n_unknowns: int
-    operations: tuple[_Listed, ...]
-    combinations: tuple[tuple[int, ...], ...]  # the slots of each
-
-
-def structure(tape: "Listing") -> Structure | None:
-    """Return the structure of a tape, or None if it can't be compiled."""
-    kinds = {operation[0] for operation in tape.operations}
-    if not kinds <= {*OPERATIONS, Operations.LINEAR} or len(tape.operations) > _MOST_OPERATIONS:
-        return None
-    combinations = (tuple(slot for slot, _ in terms) for _, terms in tape.combinations)
-    return Structure(tape.n_unknowns, tuple(tape.operations), tuple(combinations))
-
-
-def key(tape: Structure) -> int:
-    """Return an integer of 63 bits that identifies a structure."""
-    return int.from_bytes(sha256(repr(tuple(tape)).encode()).digest()[:8]) >> 1
-
-
 @lru_cache(maxsize=64)
 def source(tape: Structure, suffix: str = "") -> str:
     """Return the C source of the functions of tape.h for a single body.
@@ -94,68 +77,20 @@ def names(tape: Structure, suffix: str = "") -> list[str]:
     return [f"expand{suffix}", f"set_jacobian{suffix}", values, f"set_noise{suffix}"]
 
 
-def _of(operation: _Listed) -> Operation:
-    is_wave = operation[0] == Operations.SINE_COSINE and operation[2] > 0
-    return OPERATIONS[WAVE if is_wave else operation[0]]
-
-
-def _slots(operation: _Listed) -> dict[str, int]:
-    _, x, y, out = operation
-    return {"x": x, "y": y, "o": out, "p": out + 1, "q": out + 2}
-
-
-def place(slot: int, k: str) -> str:
-    """Return term k of a slot, as C."""
-    return f"A({slot}, {k})"
-
-
-def _written(text: str, operation: _Listed) -> str:
-    """Return C with slots in the place of letters."""
-    slots = _slots(operation)
-
-    def name(match: re.Match[str]) -> str:
-        what, slot = match[1], slots[match[2]]
-        term = {"b": "k - 1", "f": "1", "l": "k"}.get(what)
-        return place(slot, term) if term else f"{what}{slot}"
-
-    return re.sub(r"\b([tzmbfl])_([xyopq])\b", name, text)
-
-
-def combined(tape: Structure, number: int, name: str, *, is_value: bool) -> str:
-    """Return a linear combination of C variables, such as "t4" for slot 4 and the `name` "t"."""
-    parts = [f"d[{number - 1}]"] * is_value
-    parts += [f"c[{i}]*{name}{slot}" for i, slot in _terms(tape, number)]
-    return " + ".join(parts) or "0.0"
-
-
-def _terms(tape: Structure, number: int) -> Iterator[tuple[int, int]]:
-    begin = sum(map(len, tape.combinations[: number - 1]))
-    yield from enumerate(tape.combinations[number - 1], begin)
-
-
-def _rates(tape: Structure) -> range:
-    return range(len(tape.combinations) - tape.n_unknowns + 1, len(tape.combinations) + 1)
-
-
-def unknowns_of(tape: Structure) -> range:
-    """Return the slots of the unknowns."""
-    return range(FIRST_UNKNOWN, FIRST_UNKNOWN + tape.n_unknowns)
-
-
 def recurrences(tape: Structure) -> tuple[list[str], list[tuple[int, int]]]:
     """Return the statements that compute term k of all results, and the pairs of their sums."""
     pairs: dict[tuple[int, int], int] = {}
     terms = []
     for operation in tape.operations:
-        slots = _slots(operation)
+        slots = letters(operation)
         if operation[0] == Operations.LINEAR:
             rule = Operation((f"t_o = {combined(tape, operation[1], 't', is_value=False)}",))
         else:
-            rule = _of(operation)
+            rule = rule_of(operation)
         both = [sorted(slots[letter] for letter in pair) for pair in rule.pairs]
         sums = [f"sum[{pairs.setdefault((x, y), len(pairs))}]" for x, y in both]
         for line in rule.series:
-            text = _written(line, operation)
+            text = with_slots(line, operation)
             for number, each in enumerate(sums):
                 text = text.replace(f"s{number}", each)
             terms.append(f"const double {text};")
@@ -165,13 +100,8 @@ def recurrences(tape: Structure) -> tuple[list[str], list[tuple[int, int]]]:
 
 def rates_of_term(tape: Structure) -> tuple[list[str], list[str]]:
     """Return the rates of the unknowns: term 0, and term k, as C."""
-    first = [combined(tape, number, "z", is_value=True) for number in _rates(tape)]
-    return first, [combined(tape, number, "t", is_value=False) for number in _rates(tape)]
-
-
-def slots_read(lines: list[str]) -> list[int]:
-    """Return the slots whose term 0 is read."""
-    return sorted({int(each) for each in re.findall(r"\bz(\d+)", " ".join(lines))})
+    first = [combined(tape, number, "z", is_value=True) for number in rates_of(tape)]
+    return first, [combined(tape, number, "t", is_value=False) for number in rates_of(tape)]
 
 
 def _expand(tape: Structure) -> Iterator[str]:
@@ -251,8 +181,8 @@ def first_values(tape: Structure) -> list[str]:
         if operation[0] == Operations.LINEAR:
             text = combined(tape, operation[1], "z", is_value=True)
         else:
-            rule = _of(operation)
-            text = _written(rule.first or rule.value.replace("m_", "z_"), operation)
+            rule = rule_of(operation)
+            text = with_slots(rule.first or rule.value.replace("m_", "z_"), operation)
         if not text:
             return []
         lines.append(f"z{operation[3]} = {text}")
@@ -287,7 +217,7 @@ def kept_values(lines: list[str], rates: list[str], number: str) -> Iterator[str
 def _roundings(tape: Structure) -> tuple[list[str], list[str]]:
     """Return definitions of the rounding errors of results, and those of the rates, in units.
 
-    This is the running error analysis of `noise_of` in tape_series.f90.
+    This is the running error analysis of fortran/modern/tape_noise.h.
     """
     # Inputs have none.
     known: set[int] = set()
@@ -296,7 +226,7 @@ def _roundings(tape: Structure) -> tuple[list[str], list[str]]:
     def of_combination(number: int) -> str:
         parts = [
             f"size(c[{i}])*" + (f"(size(z{slot}) + e{slot})" if slot in known else f"size(z{slot})")
-            for i, slot in _terms(tape, number)
+            for i, slot in numbered_terms(tape, number)
         ]
         return " + ".join([*parts, f"size(d[{number - 1}])"] if parts else ["0.0"])
 
@@ -305,7 +235,7 @@ def _roundings(tape: Structure) -> tuple[list[str], list[str]]:
         if kind == Operations.LINEAR:
             texts = {out: of_combination(x)}
         else:
-            rule = _of(operation)
+            rule = rule_of(operation)
             slopes = {out: [*zip((x, y), rule.slopes, strict=False)]}
             if rule.second:
                 slopes[out + 1] = [(x, rule.second)]
@@ -313,9 +243,9 @@ def _roundings(tape: Structure) -> tuple[list[str], list[str]]:
             is_exact = rule is OPERATIONS[WAVE]
             texts = {
                 slot: " + ".join(
-                    [_written(rule.rounding, operation).replace(f"z{out}", f"z{slot}")]
+                    [with_slots(rule.rounding, operation).replace(f"z{out}", f"z{slot}")]
                     + [
-                        f"size({_written(of.replace('m_', 'z_'), operation)})*e{operand}"
+                        f"size({with_slots(of.replace('m_', 'z_'), operation)})*e{operand}"
                         for operand, of in each
                         if operand in known and not is_exact
                     ]
@@ -324,7 +254,7 @@ def _roundings(tape: Structure) -> tuple[list[str], list[str]]:
             }
         lines += [f"e{slot} = {text}" for slot, text in texts.items()]
         known |= set(texts)
-    return lines, [of_combination(number) for number in _rates(tape)]
+    return lines, [of_combination(number) for number in rates_of(tape)]
 
 
 def _set_noise(tape: Structure) -> Iterator[str]:
@@ -361,8 +291,8 @@ def derivatives(tape: Structure, count: int) -> tuple[list[str], list[dict[int, 
             lines.append(f"m{out} = zero + {combined(tape, x, 'm', is_value=True)}")
             slopes = {out: _slopes_of_combination(tape, x, by)}
         else:
-            rule = _of(operation)
-            value = _written(rule.value, operation)
+            rule = rule_of(operation)
+            value = with_slots(rule.value, operation)
             lines.append(f"m{out} = {value}" if value else _summed(out, count))
             if "m_p" in rule.slopes:
                 lines.append(_summed(out + 1, count))
@@ -372,7 +302,7 @@ def derivatives(tape: Structure, count: int) -> tuple[list[str], list[dict[int, 
         for slot, texts in slopes.items():
             by[slot] = {unknown: f"v{slot}_{unknown}" for unknown in texts}
             lines += [f"{by[slot][unknown]} = {text}" for unknown, text in texts.items()]
-    return lines, [_slopes_of_combination(tape, number, by) for number in _rates(tape)]
+    return lines, [_slopes_of_combination(tape, number, by) for number in rates_of(tape)]
 
 
 def _summed(slot: int, count: int) -> str:
@@ -389,17 +319,17 @@ def _slopes_of_combination(
 ) -> dict[int, str]:
     parts = [
         (unknown, f"c[{i}]*{name}")
-        for i, slot in _terms(tape, number)
+        for i, slot in numbered_terms(tape, number)
         for unknown, name in by.get(slot, {}).items()
     ]
     return _sums(parts)
 
 
 def _products(
-    slopes: Iterable[tuple[int, str]], operation: _Listed, by: dict[int, dict[int, str]]
+    slopes: Iterable[tuple[int, str]], operation: Listed, by: dict[int, dict[int, str]]
 ) -> dict[int, str]:
     parts = [
-        (unknown, f"({_written(slope, operation)})*{name}")
+        (unknown, f"({with_slots(slope, operation)})*{name}")
         for slot, slope in slopes
         for unknown, name in by.get(slot, {}).items()
     ]

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.engine.leaves import key, structure
+from pyharness.engine.leaf_text import key, structure
 from pyharness.engine.problem import normalized, remainders
 from pyharness.model.attitude import IDENTITY, quaternion_rates
 from pyharness.model.codes import Methods, Operations, Places, Statuses, Storage

@@ -20,7 +20,7 @@ from pyharness import Scene, TorqueLaw, prepare, solve, solve_many, torques
 from pyharness.checks.scenes.state_scenes import READY, draw, draw_ready
 from pyharness.engine import leaf_cache
 from pyharness.engine.lane_leaves import whole_source
-from pyharness.engine.leaves import structure
+from pyharness.engine.leaf_text import structure
 from pyharness.engine.recorded import kernel_tape, listing, system_of, taylor_step
 from pyharness.model.codes import Statuses
 from pyharness.model.constant_body import with_constant_body

@@ -165,6 +165,7 @@ def test_growth_of_a_steady_motion_follows_a_torque_that_it_does_not_feel(
     assert found.growth == pytest.approx(1.1, abs=0.1)
     many = solve_many(scene, 8.0, omega=[omega, (0.1, 0.2, 0.3)], estimates=True)
     assert (many.status == 0).all()
+    assert many.growth is not None
     assert many.growth[0] == pytest.approx(1.1, abs=0.1)
 
 

@@ -59,9 +59,15 @@ def try_torque(tally: Tally) -> None:
         tally.counts[leaves] += 1
         return
     compare_many(tally, scene, time, source)
+    compare_terms(tally, scene, tape, address, source.random() * time, source)
+
+
+def compare_terms(
+    tally: Tally, scene: Scene, tape: Tape, address: int, t: float, source: Random
+) -> None:
+    """Compare the terms of a step at time `t`."""
     state = np.array([*scene.omega, *(scene.attitude or ())])
     h = 10.0 ** source.uniform(-3.0, 0.0) / max(map(abs, scene.omega))
-    t = source.random() * time
     interpreted, compiled = (one_step(tape, each, t, state, h) for each in (0, address))
     if interpreted.h == compiled.h == 0.0:
         tally.counts["singular"] += 1

@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from pyharness.engine.stepper import step_lengths
+from pyharness.engine.stepped import step_lengths
 from pyharness.engine.steps import rates
 from pyharness.model.array_type import Array
 from pyharness.model.dense_output import (

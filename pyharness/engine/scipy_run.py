@@ -16,7 +16,7 @@ import numpy as np
 
 from pyharness.engine.problem import rows_trajectory
 from pyharness.engine.recorded import outputs_at
-from pyharness.engine.stepper import steps_to
+from pyharness.engine.stepped import steps_to
 from pyharness.model.effort import advice
 from pyharness.model.errors import InputError, TimedError
 from pyharness.model.scene import Scene

@@ -25,7 +25,7 @@ from pyharness.engine.registry import (
 from pyharness.engine.rescaled import integrate, is_ordinary, rescaling_factor, scaled
 from pyharness.engine.scipy_ivp import finest_tolerance
 from pyharness.engine.sides import in_reverse, joined
-from pyharness.engine.stepper import with_reason
+from pyharness.engine.stepped import with_reason
 from pyharness.engine.steps import rates as rates_of
 from pyharness.engine.steps import transformed_steps
 from pyharness.engine.switch_text import with_text

@@ -2,31 +2,27 @@
 
 import math
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.polynomial.polynomial import polyval
 
-from pyharness.engine.recorded import LONGEST_TRIAL, Step, is_recorded, kernel_tape, taylor_step
+from pyharness.engine.recorded import LONGEST_TRIAL, Step, kernel_tape, taylor_step
 from pyharness.engine.singular import SingularError, undefined_operation
 from pyharness.model.attitude import IDENTITY, quaternion_rates, unit_quaternion
 from pyharness.model.changing import rates_of_changing
-from pyharness.model.constant_body import with_constant_body
 from pyharness.model.errors import InputError
 from pyharness.model.keywords import with_hints
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.state_torque import StateTorque, of_law, torque_of
 from pyharness.model.symbols import MOST_OPERATIONS, Recorder
 from pyharness.model.tape import Tape, float_outputs
-from pyharness.model.trajectory import Array, Trajectory
+from pyharness.model.trajectory import Array
 from pyharness.model.values import boolean, finite, number, three_floats, tolerance_of
 
-_FINEST = 1e-14  # smallest tolerance of a step
+FINEST = 1e-14  # smallest tolerance of a step
 _DEFAULT = 1e-9
-_MOST_STEPS = 200_000  # in `steps_to` and `with_reason`
 
 
 class Stepper:
@@ -101,9 +97,9 @@ class Stepper:
         attitude = wants if attitude is None else boolean("attitude", attitude)
         self._time = 0.0
         self._steps = 0
-        self._tolerance = tolerance_of(tolerance, _FINEST)
-        if not _FINEST <= self._tolerance <= 1.0:
-            raise InputError(f"tolerance is {self._tolerance:g}; allowed: {_FINEST:g} to 1")
+        self._tolerance = tolerance_of(tolerance, FINEST)
+        if not FINEST <= self._tolerance <= 1.0:
+            raise InputError(f"tolerance is {self._tolerance:g}; allowed: {FINEST:g} to 1")
         self._n = 7 if attitude else 3
         self.scene = scene
         own = [each.start for each in scene.states]
@@ -305,49 +301,6 @@ class Stepper:
         self._state[place] = values
         if self._steps == 0:
             self._last = Step(0.0, self._state[None], self._state, 0)
-
-
-def steps_to(
-    scene: Scene, attitude: bool, end: float, tolerance: float, most: int = _MOST_STEPS
-) -> Iterator[tuple[float, Stepper]]:
-    """Yield the beginning (s) of each step from 0 to `end` (s), and the stepper after the step.
-
-    No step follows a singularity or `most` steps.
-    """
-    stepper = Stepper(with_constant_body(scene), max(tolerance, _FINEST), attitude=attitude)
-    with suppress(SingularError):
-        while abs(stepper.time) < abs(end) and stepper.steps < most:
-            before = stepper.time
-            stepper.step(end - before)
-            yield before, stepper
-
-
-def step_lengths(
-    scene: Scene, attitude: bool, end: float, tolerance: float, bounds: Sequence[float]
-) -> dict[float, float]:
-    """Return the length (s) of each step from 0 to `end` (s), by its end, if not in `bounds`."""
-    cuts = frozenset(bounds)
-    return {
-        stepper.time: abs(stepper.time - before)
-        for before, stepper in steps_to(scene, attitude, end, tolerance)
-        if stepper.time not in cuts
-    }
-
-
-def with_reason(scene: Scene, found: Trajectory, end: float) -> Trajectory:
-    """Return `found`, which ends early; its ending is ``singular`` if the torque is undefined."""
-    if not is_recorded(scene):
-        return found
-    try:
-        stepper = Stepper(with_constant_body(scene), attitude=scene.attitude is not None)
-        while abs(stepper.time) < abs(end) and stepper.steps < _MOST_STEPS:
-            stepper.step(end - stepper.time)
-    except SingularError as error:
-        if error.what:
-            return replace(found, ended="singular", reason=str(error))
-    except InputError:
-        pass
-    return found
 
 
 def _equations(scene: Scene, torque: Tape, attitude: bool) -> Tape:

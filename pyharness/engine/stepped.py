@@ -1,0 +1,58 @@
+"""Integrations step by step: the steps of a motion, and why it ends early."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import replace
+
+from pyharness.engine.recorded import is_recorded
+from pyharness.engine.singular import SingularError
+from pyharness.engine.stepper import FINEST, Stepper
+from pyharness.model.constant_body import with_constant_body
+from pyharness.model.errors import InputError
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Trajectory
+
+_MOST_STEPS = 200_000
+
+
+def steps_to(
+    scene: Scene, attitude: bool, end: float, tolerance: float, most: int = _MOST_STEPS
+) -> Iterator[tuple[float, Stepper]]:
+    """Yield the beginning (s) of each step from 0 to `end` (s), and the stepper after the step.
+
+    No step follows a singularity or `most` steps.
+    """
+    stepper = Stepper(with_constant_body(scene), max(tolerance, FINEST), attitude=attitude)
+    with suppress(SingularError):
+        while abs(stepper.time) < abs(end) and stepper.steps < most:
+            before = stepper.time
+            stepper.step(end - before)
+            yield before, stepper
+
+
+def step_lengths(
+    scene: Scene, attitude: bool, end: float, tolerance: float, bounds: Sequence[float]
+) -> dict[float, float]:
+    """Return the length (s) of each step from 0 to `end` (s), by its end, if not in `bounds`."""
+    cuts = frozenset(bounds)
+    return {
+        stepper.time: abs(stepper.time - before)
+        for before, stepper in steps_to(scene, attitude, end, tolerance)
+        if stepper.time not in cuts
+    }
+
+
+def with_reason(scene: Scene, found: Trajectory, end: float) -> Trajectory:
+    """Return `found`, which ends early; its ending is ``singular`` if the torque is undefined."""
+    if not is_recorded(scene):
+        return found
+    try:
+        stepper = Stepper(with_constant_body(scene), attitude=scene.attitude is not None)
+        while abs(stepper.time) < abs(end) and stepper.steps < _MOST_STEPS:
+            stepper.step(end - stepper.time)
+    except SingularError as error:
+        if error.what:
+            return replace(found, ended="singular", reason=str(error))
+    except InputError:
+        pass
+    return found

@@ -14,7 +14,7 @@ module tape_plan
   integer, parameter :: LEAST_ORDER = 16, LEAST_OF_STEPS = 8
   real(dp), parameter :: ORDERS = 1.1_dp, ORDERS_OF_STEPS = 0.7_dp
   integer, parameter :: CHECKED = 3  ! last terms checked: from rest a ramp makes only every third
-  real(dp), parameter :: LONGER = 16.0_dp  ! largest factor on the step that was tried
+  real(dp), parameter, public :: LONGER = 16.0_dp  ! largest factor on the step that was tried
   real(dp), parameter, public :: LEAST_LOCAL_TOLERANCE = 1e-18_dp ! below rounding
   real(dp), parameter :: WITHIN_CIRCLE = 0.9_dp ! part of the distance of a zero
 

@@ -6,7 +6,7 @@ module tape_step
   use statuses, only: COMPLETE, OVERFLOW, SLIDING
   use tape, only: FIRST_UNKNOWN, tape_t, TIME_SLOT
   use tape_live, only: keep_live, settle
-  use tape_plan, only: converge, fitting, MOST_TRIES, order_for
+  use tape_plan, only: converge, fitting, LONGER, MOST_TRIES, order_for
   use tape_series, only: allocate_series, derivatives_at, expand, noise_of, series_t
   use tape_switches, only: change, CROSSES, find_switches, IS_CHANGED, next_crossing, &
                            resolve_switches, SLIDES, STAYS, switches_t, update
@@ -19,6 +19,7 @@ module tape_step
   ! in tolerances, and over the rounding errors.
   real(dp), parameter :: MOST_DEFECT = 1.0_dp
   real(dp), parameter :: MOST_ROUNDING = 1e3_dp
+  integer, parameter :: MOST_LONGER = 12 ! expansions of a step that is too short
   ! Tolerance whose reciprocal is a number.
   real(dp), parameter :: LEAST_TOLERANCE = 2.0_dp**(-1000)
 
@@ -102,6 +103,12 @@ contains
       factor = min(factor, request%longest/s%h)
       call converge(live, s%order, minval(tolerances), s%a, s%powers, factor)
       if (switches%n > 0) then
+        if (.not. (is_rejected .or. factor < LONGER) .and. step%expansions < MOST_LONGER) then
+          ! The last step may have ended at a switch. In so short a step a state that is on a level,
+          ! but for rounding, would be far from it.
+          s%h = factor*s%h
+          cycle
+        end if
         if (.not. is_settled) then
           ! At the beginning, where the last step ended at a switch, but for rounding.
           switches%part = factor

@@ -3,6 +3,7 @@
 import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -171,14 +172,15 @@ class Stepper:
         self._set(slice(3, 7), unit_quaternion("attitude", values)[0])
 
     @property
-    def states(self) -> dict[str, float]:
-        """The scene's own states by name."""
+    def states(self) -> Mapping[str, float]:
+        """The scene's own states by name; assign a dict of those to change."""
         names = (each.name for each in self._scene.states)
-        return dict(zip(names, self._state[self._n : -3].tolist(), strict=True))
+        own = self._state[self._n : -3].tolist()
+        return MappingProxyType(dict(zip(names, own, strict=True)))
 
     @states.setter
     def states(self, values: Mapping[str, float]) -> None:
-        found = self.states
+        found = dict(self.states)
         if not isinstance(values, Mapping) or not set(values) <= set(found):
             allowed = ", ".join(found) or "none: the scene has no states of its own"
             raise InputError(f"states: {values!r}; allowed: a dict of {allowed}")

@@ -12,6 +12,7 @@ MOST_STATES = 8  # for which the kernel has places
 _TAKEN = (
     *("t", "time", "recorded_time", "omega", "omega1", "omega2", "omega3", "velocity", "velocity1"),
     *("velocity2", "velocity3", "attitude", "q0", "q1", "q2", "q3", "ier", "axis", "component"),
+    *("body", "ended", "error", "growth"),
 )
 
 

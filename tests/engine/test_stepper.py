@@ -93,6 +93,8 @@ def test_results_cannot_be_changed() -> None:
         assert values is not None
         with pytest.raises(ValueError, match="read-only"):
             values[0] = 7.0
+    with pytest.raises(TypeError):
+        stepper.states["wheel"] = 1.0  # type: ignore[index]
     with pytest.raises(AttributeError):
         stepper.torque = (1.0, 0.0, 0.0)  # type: ignore[attr-defined]
     for name in ("time", "steps"):
@@ -143,6 +145,18 @@ def test_a_tiny_step_does_not_shorten_the_next() -> None:
     stepper.step(math.ulp(usual))
     assert stepper.time == math.nextafter(usual, math.inf)
     assert stepper.step() > 1.5 * usual
+
+
+@pytest.mark.parametrize("start", [1.0, 1.35, 1.4])
+def test_a_switch_at_the_end_of_a_step_does_not_stop_the_next(start: float) -> None:
+    """The last step is some 1e-14 s, and omega on a level but for rounding."""
+
+    def torque(t: Any, w: Any) -> list[Any]:
+        return [0.1 * w[1], np.clip(w[0], -0.3, 0.3), 0.1 * np.sin(t)]
+
+    stepper = Stepper(Scene("", (start, -3.8, 0.6), moments=(1.5, 1.1, 1.4), torque=torque))
+    stepper.until(10.0)
+    assert stepper.omega == pytest.approx(solve(stepper.scene, 10.0).omega[-1], rel=1e-8)
 
 
 def test_a_singular_torque_ends_the_steps() -> None:

@@ -29,6 +29,7 @@ SEQUENCES = ("3-1-3", "3-2-1")
 FORMS = ("quaternion", *SEQUENCES, "matrix")
 NEAR_ONE = 1e-12  # largest deviation of a norm from 1 that counts as rounding
 _ROUNDED = 2.0**-51  # deviation of a norm from 1 that normalisation cannot reduce
+_PARALLEL = 2.0**-51  # sine of half an angle that is a rounding error
 
 
 def scalar_first(values: object) -> Any:
@@ -113,7 +114,7 @@ def angles(attitude: Array, sequence: str) -> Array:
     (a, b), (c, d) = pairs
     total, rest = np.arctan2(b, a), np.arctan2(d, c)
     first, last = total + rest, total - rest
-    no_total, no_rest = np.hypot(a, b) == 0.0, np.hypot(c, d) == 0.0
+    no_total, no_rest = np.hypot(a, b) <= _PARALLEL, np.hypot(c, d) <= _PARALLEL
     first = np.where(no_rest, 2.0 * total, np.where(no_total, 2.0 * rest, first))
     last = np.where(no_rest | no_total, 0.0, last)
     found: Array = np.degrees(np.column_stack([first, tilt, last]))

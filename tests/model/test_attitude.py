@@ -42,6 +42,7 @@ def test_poles_keep_their_digits(sequence: str, pole: float, beside: float) -> N
     q = np.array([of_angles("", (30.0, tilt, 40.0), sequence)])
     found = angles(q, sequence)
     assert found[0, 1] == pytest.approx(tilt, abs=1e-13)
+    assert found[0, 2] == pytest.approx(40.0 if beside else 0.0, abs=1e-5)
     back = np.array([of_angles("", found[0], sequence)])
     assert min(abs(back - q).max(), abs(back + q).max()) < 1e-15
 

@@ -34,7 +34,7 @@ _DIFFERENCE = 1e-5  # relative perturbation for the Jacobian matrices
 # Relative change by a sweep at which the iteration has converged; largest change that may be due
 # to rounding errors.
 _CONVERGED, _ROUNDED = 1e-15, 1e-12
-_MOST_NEWTON = 10
+_MOST_NEWTON = 100
 _CLOSE = 1e-7  # rad; the error of the last Newton step is about its square
 
 
@@ -266,13 +266,23 @@ class MacroStep:
         known = self._pace * self.length * nodes + self.stroboscopic[3]
         forward = 1.0 if self.length > 0.0 else -1.0
         angle = self.length * np.interp(forward * times, forward * known, nodes)
+        low, high = (np.full_like(angle, end) for end in sorted((0.0, self.length)))
+        last = np.full_like(angle, np.inf)
         for _ in range(_MOST_NEWTON):
             point, cosine, sine = self.at(angle)
             fast = self.coordinates.omega(point, cosine, sine)[2]
             change = ((times - self._pace * angle) - point[3]) * (self.coordinates.rate * fast)
-            angle = angle + change
             if np.abs(change).max() <= _CLOSE:
-                break
+                return angle + change
+            # Near the separatrix omega is slow in a part of each revolution, where Newton's method
+            # leaves the interval that is known to contain the angle, or does not converge.
+            low = np.where(change > 0.0, np.maximum(low, angle), low)
+            high = np.where(change < 0.0, np.minimum(high, angle), high)
+            near = angle + change
+            is_lost = (np.abs(change) > 0.5 * np.abs(last)) | (near < low) | (near > high)
+            is_lost &= np.abs(change) > _CLOSE
+            near = np.where(is_lost, 0.5 * (low + high), near)
+            angle, last = near, near - angle
         return angle
 
     def at(self, angle: Array) -> tuple[Array, Array, Array]:

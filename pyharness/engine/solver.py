@@ -320,7 +320,8 @@ def prepare(
     InputError
         If the method is unknown, or can't solve the scene or its attitude; if the torque needs the
         attitude, and `attitude` is false; or if the tolerance or effort is out of range. A call
-        raises InputError if a changing moment reaches 0 before `t_end`.
+        raises InputError if a changing moment reaches 0 before `t_end`; if it is a function of
+        time, the status is `overflow`.
     NotBuiltError
         If the extension is not built.
 

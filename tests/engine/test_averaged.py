@@ -224,6 +224,34 @@ def test_measured_error_shows_a_fault(fault: str, monkeypatch: pytest.MonkeyPatc
     assert step() > 1e3 * right
 
 
+def test_measured_error_has_the_size_and_sign_of_the_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An error of omega changes the time of each revolution too."""
+    coordinates = Coordinates.from_omega(SCENE.euler_coefficients, SCENE.omega)
+    assert coordinates is not None
+    torques = [np.array(push / moment) for push, moment in zip(PUSH.constant, MOMENTS, strict=True)]
+
+    def step() -> averaged_step.MacroStep:
+        return averaged_step.MacroStep(
+            coordinates, lambda time, omega: list(torques), False,
+            coordinates.point(SCENE.omega), 0.0, 40_000 * np.pi, (20, 44),
+        )  # fmt: skip
+
+    residual = averaged_step.MacroStep._residual
+
+    def wrong(self: Any, mean: Array, waves: Array, slow: Any, fast: Any) -> tuple[Array, Array]:
+        """Return a residual with an error of p1, p2 and p3, except for the measured error."""
+        found, more = residual(self, mean, waves, slow, fast)
+        if len(slow.nodes) == 20:
+            found[:3] += 1e-9 * slow.nodes
+        return found, more
+
+    right = step()
+    monkeypatch.setattr(averaged_step.MacroStep, "_residual", wrong)
+    found = step()
+    error = right.stroboscopic - found.stroboscopic
+    np.testing.assert_allclose(found.error[:, -1], error[:, -1], rtol=1e-3)
+
+
 @pytest.mark.campaign
 def test_crossing_of_the_separatrix_is_refused_at_its_time() -> None:
     """The spin about axis 3 ceases after some 3e5 s."""

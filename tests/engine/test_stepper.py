@@ -8,6 +8,7 @@ import pytest
 from scipy.integrate import quad
 
 from pyharness import InputError, Scene, Stepper, solve
+from pyharness.engine.stepper import step_lengths
 from pyharness.torques import in_space, table
 
 BRICK = Scene("brick", (0.1, 2.0, 0.3), moments=(1.0, 2.0, 3.0))
@@ -39,6 +40,16 @@ def test_a_step_ends_where_a_table_changes(kind: str) -> None:
     back.until(4.0)
     back.until(0.0)
     np.testing.assert_allclose(back.omega, still.omega, atol=1e-12)
+
+
+@pytest.mark.parametrize("end", [4.0, -4.0])
+def test_lengths_of_steps_are_the_differences_of_their_ends(end: float) -> None:
+    lengths = step_lengths(BRICK, False, end, 1e-9, [])
+    ends = [0.0, *lengths]
+    assert len(ends) > 3
+    assert ends[-1] == end
+    assert list(lengths.values()) == np.abs(np.diff(ends)).tolist()
+    assert [*step_lengths(BRICK, False, end, 1e-9, [end]), end] == ends[1:]
 
 
 def test_the_state_within_the_last_step() -> None:

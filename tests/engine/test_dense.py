@@ -162,6 +162,10 @@ def test_too_many_polynomials_are_refused(monkeypatch: pytest.MonkeyPatch) -> No
     for method in ("dop853", "rk4"):
         with pytest.raises(InputError, match="dense output"):
             solve(SCENES["law"], 20.0, method, dense_output=True)
+    five = solve(replace(SCENES["law"], step_size=0.5), [-2.5, 2.5], "rk4", dense_output=True)
+    assert five.sol is not None
+    with pytest.raises(InputError, match="more than 5 steps"):
+        solve(replace(SCENES["law"], step_size=0.5), 2.75, "rk4", dense_output=True)
 
 
 def test_a_short_campaign() -> None:

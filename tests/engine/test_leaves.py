@@ -496,8 +496,8 @@ def test_the_folder_is_limited_and_cleaned(folder: Path, monkeypatch: pytest.Mon
     file = compiled_once(folder)
     left = folder / "new-killed"
     left.mkdir()
-    os.utime(left, (0, 0))
-    os.utime(file, (0, 0))
+    os.utime(left, (1, 1))
+    os.utime(file, (0, 0))  # older than the folder
     monkeypatch.setattr(leaf_cache, "MOST_BYTES", 100)
     prepare(scene_of(lambda t, w: -w * w[1]), compiled=True)
     assert not left.exists()

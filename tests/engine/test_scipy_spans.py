@@ -1,6 +1,7 @@
 """SciPy's methods under recorded torques that act for a short time."""
 
 import math
+from dataclasses import replace
 from random import Random
 from typing import Any
 
@@ -11,6 +12,7 @@ from pyharness import Scene, opaque, solve
 from pyharness.engine.registry import SCIPY_METHODS
 from pyharness.engine.scipy_run import series_beside
 from pyharness.model.state_torque import StateTorque
+from pyharness.torques import table
 
 SPHERE = Scene("", (0.0, 0.0, 1.0), moments=(2.0, 2.0, 3.0))
 KINK = Scene(
@@ -65,6 +67,18 @@ def test_spans_are_short_where_the_torque_is(sign: float) -> None:
     own = next(each for each in spans if abs(each.end) >= 14.0)
     assert own.longest < 0.02
     assert spans[0].longest > 0.1
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_spans_end_where_a_table_changes(sign: float) -> None:
+    values = [(0.1, 0.0, 0.0), (0.0, 2.0, 0.0), (0.3, 0.0, 0.1)]
+    torque = table(np.sort(sign * np.array([1.0, 2.0, 4.0])), values)
+    beside = series_beside(replace(SPHERE, torque=torque), [5.0 * sign], 1e-9)
+    assert beside is not None
+    ends = [sign * each.end for each in beside.spans]
+    assert ends == sorted(ends)
+    assert {1.0, 2.0, 4.0, 5.0} <= {*ends}
+    assert ends[-1] == 5.0
 
 
 def test_kink_is_unchecked() -> None:

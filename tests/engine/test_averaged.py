@@ -10,7 +10,7 @@ import pytest
 from pyharness import TorqueLaw, solve
 from pyharness.checks.scenes.random_scenes import draw
 from pyharness.engine import averaged_step
-from pyharness.engine.averaged_coordinates import Coordinates
+from pyharness.engine.averaged_coordinates import Coordinates, torque_of
 from pyharness.model.errors import InputError, TimedError
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array, Trajectory
@@ -279,6 +279,19 @@ def test_dense_output_and_events_use_the_method() -> None:
     truth = solve(SCENE, found.t_events[0], "taylor").omega
     assert len(truth) > 5
     assert np.abs(truth[:, 0]).max() < 1e-8
+
+
+@pytest.mark.parametrize(
+    ("torque", "varies"),
+    [
+        (PUSH, False),
+        (TorqueLaw((1e-6, 0.0, 0.0), (0.0, 1e-9, 0.0)), True),
+        (TorqueLaw(sines=[((1e-6, 0.0, 2e-6), 2e-3)]), True),
+        (TorqueLaw(cosines=[((1e-6, 0.0, 2e-6), 2e-3)]), True),
+    ],
+)
+def test_time_is_an_unknown_only_if_the_torque_varies(torque: TorqueLaw, varies: bool) -> None:
+    assert torque_of(replace(SCENE, torque=torque))[1] is varies
 
 
 def test_sizes_of_a_point_have_its_units() -> None:

@@ -18,6 +18,7 @@ from pyharness.engine.steps import rates
 from pyharness.events import crosses
 from pyharness.model.attitude import product
 from pyharness.model.changing import ChangingMoments
+from pyharness.model.errors import TimedError
 from pyharness.torques import damping, recorded, table
 from tests.campaigns import parameter_campaign
 from tests.campaigns.parameter_campaign import KINDS, LIMIT, random_scene
@@ -297,6 +298,15 @@ def test_slow_and_fast_motions(factor: float) -> None:
     assert np.abs(found - slopes(BRICK, [3.0], "omega")).max() <= 1e-10
     pushed = replace(slow, torque=TorqueLaw((0.1 * factor**2, 0.0, 0.0)))
     assert np.isfinite(slopes(pushed, [3.0 / factor], "omega", "torque.constant")["omega"]).all()
+
+
+@pytest.mark.parametrize("end", [720.0, 800.0])
+def test_derivatives_beyond_binary64_are_refused(end: float) -> None:
+    """The derivative is exp(t), of an omega that is 1e-200 rad/s at first."""
+    scene = Scene("", (1e-200, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=damping(-1.0))
+    assert solve(scene, end, tolerance=1e-3).omega[0, 0] > 1e100
+    with pytest.raises(TimedError, match="sensitivities overflow"):
+        slopes(scene, [1.0, end], "omega", tolerance=1e-3)
 
 
 def test_names_of_summands() -> None:

@@ -238,6 +238,16 @@ def test_the_work_limit_holds(name: str, monkeypatch: pytest.MonkeyPatch) -> Non
         scipy_method(name)(fast, [20.0], 1e-6)
 
 
+def test_a_jump_at_the_start_is_told() -> None:
+    def torque(t: Any, w: Any) -> Any:
+        return [-np.sign(w[0] - 1.0) if t < 1e-3 else 0.0, 0.0, 0.0]
+
+    scene = Scene("", (1.0 + 1e-15, 0.0, 0.0), _MOMENTS, torque=opaque(torque))
+    with pytest.raises(TimedError, match="jumps back and forth") as refused:
+        solve(scene, 2.0, "dop853", 1e-6, effort=1e-5)
+    assert refused.value.time == 0.0
+
+
 @pytest.mark.campaign
 def test_a_tolerance_that_can_not_be_met_is_refused() -> None:
     """A component of omega grows by the factor exp(21), and so does the error of the first step."""

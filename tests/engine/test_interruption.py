@@ -98,6 +98,9 @@ LONG: dict[str, Callable[[], object]] = {
     "many-threads": partial(_many, "four-term", 2),
     **{f"bodies-{name}": partial(_bodies, name, 1) for name in ("taylor", "rk4", "gauss-2")},
     "bodies-threads": partial(_bodies, "taylor", 2),
+    "bodies-recorded": lambda: solve_many(
+        RECORDED, 200.0, omega=np.full((60_000, 3), RECORDED.omega), tolerance=1e-6, threads=1
+    ),
     "linear-solver": _linear,
     "dop853": _method(PUSHED, "dop853", 1e4, 1e-3),
     "lsoda": _method(PUSHED, "lsoda", 1e4, 1e-3),
@@ -140,8 +143,9 @@ def keyboard() -> Iterator[_Keyboard]:
 def test_kernel_ends_at_once(
     name: str, keyboard: _Keyboard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    rooms = [f"engine.{each}" for each in ("taylor", "closed_form", "gauss", "many_scenes")]
-    for each in (*rooms, "thesis.compiled", "thesis.many", "model.extension"):
+    rooms = ("taylor", "closed_form", "gauss", "many_scenes", "many_prepared")
+    engine = [f"engine.{each}" for each in rooms]
+    for each in (*engine, "thesis.compiled", "thesis.many", "model.extension"):
         monkeypatch.setattr(f"pyharness.{each}.extension", keyboard.door)
     if name in DOORLESS:
         keyboard.press()

@@ -90,6 +90,7 @@ RATIOS: dict[str, tuple[Callable[..., Any], bool]] = {
         lambda t, w: np.exp(700 * w) / np.exp(699 * w) - np.exp(701 * w) / np.exp(699.5 * w),
         True,
     ),
+    "of time": (lambda t, w: np.cos(5 * t) * np.exp(800 * w) / (1.0 + np.exp(800 * w)), True),
     "times 0": (lambda t, w: np.sin(t) * np.exp(698 * w) / (1.0 + np.exp(700 * w)), True),
     "of a pole": (lambda t, w: (np.exp(800 * w) + 1.0) / (np.exp(800 * w) - 1.0), True),
     "lost": (lambda t, w: np.exp(900.0 * w) * np.exp(-899.0 * w), False),

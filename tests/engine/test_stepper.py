@@ -172,7 +172,9 @@ def test_a_switch_at_the_end_of_a_step_does_not_stop_the_next(start: float) -> N
 
 @pytest.mark.parametrize("longest", [1e-3, -1e-3, 1e9])
 def test_a_step_whose_terms_are_infinite_is_shortened(longest: float) -> None:
-    cube = Scene("", (1.0, 0.0, 0.0), (1.0, 1.0, 1.0), torque=lambda t, w: [-1e40 * w[0] ** 3, 0, 0])
+    cube = Scene(
+        "", (1.0, 0.0, 0.0), (1.0, 1.0, 1.0), torque=lambda t, w: [-1e40 * w[0] ** 3, 0, 0]
+    )
     stepper = Stepper(cube)
     time = stepper.step(longest)
     assert 0.0 < abs(time) < 1e-40

@@ -399,6 +399,23 @@ def test_few_calls_with_arrays() -> None:
     assert max(calls) > 1000
 
 
+def test_few_calls_of_a_function_that_is_recorded() -> None:
+    calls = 0
+
+    def turned(t: Any, omega: Any, q: Any) -> Any:
+        # The norm of an array of vectors would be one number.
+        nonlocal calls
+        calls += 1
+        return np.linalg.norm(q[1:]) - 0.5
+
+    found = times_of(BODY, 30.0, turned, attitude=True)
+    assert calls < 60
+    assert len(found) > 4
+    assert found == pytest.approx(
+        times_of(BODY, 30.0, lambda t, omega, q: 0.75 - q[0] ** 2, attitude=True)
+    )
+
+
 def test_opaque_torque_has_events() -> None:
     torque = opaque(lambda t, omega: [-w for w in omega])
     ball = Scene("ball", (3.0, 0.0, 4.0), moments=(1.0, 1.0, 1.0), torque=torque)

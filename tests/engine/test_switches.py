@@ -374,6 +374,16 @@ def test_a_motion_in_another_unit_of_time_has_the_same_switches(unit: float) -> 
     assert end(torque, unit) / unit == pytest.approx(end(plain, 1.0), rel=1e-11)
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_stepper_passes_the_switches_of_a_square_wave(sign: float) -> None:
+    stepper = Stepper(_ball(lambda t, w: [np.sign(np.sin(sign * 3.0 * t)), 0.0, 0.0]), 1e-10)
+    stepper.until(sign * 20.0)
+    pushes, rest = divmod(20.0, math.pi / 3.0)
+    wanted = 0.3 + sign * (rest if pushes % 2 == 0 else math.pi / 3.0 - rest)
+    assert stepper.omega[0] == pytest.approx(wanted, abs=1e-12)
+    assert stepper.steps <= 3 * (pushes + 1)
+
+
 BRANCHES: dict[str, Torque] = {
     "1/t": lambda t, w: [np.where(t > 5, 1 / t, 0.0), 0.0, 0.0],
     "log and pole": lambda t, w: [

@@ -400,6 +400,7 @@ BRANCHES: dict[str, Torque] = {
     "not after": lambda t, w: [np.where(t <= 0, 0.0, np.cos(t)), 0.0, 0.0],
     "and": lambda t, w: [np.where((np.sin(2.86 * t) > -0.679) & (w[2] > 0.1), np.cos(t), 0), 0, 0],
     "not": lambda t, w: [np.where(~(np.sin(3 * t) > 0), 0, np.cos(t)), 0.0, 0.0],
+    "all, some, all": lambda t, w: [np.where(np.sin(2 * t) > 0, np.cos(3 * t) * w[1], w[2]), 0, 0],
     "jump": lambda t, w: [np.where(w[0] <= 1.5, np.cos(w[1]) * 0.2, 1 - 0.3 * np.sin(t)), 0, 0],
     "at rest on a level": lambda t, w: [np.where(np.clip(t, 0, 1) > 1, 1.0, 0.1), 0.0, 0.0],
     "at rest on levels": lambda t, w: [

@@ -177,6 +177,7 @@ def test_growth_of_a_steady_motion_follows_a_torque_that_it_does_not_feel(
         lambda t: np.exp(-20.0 * t),
         lambda t: 1e-40 * np.cos(1e3 * t),
         lambda t: np.cos(10.0 * t * t),
+        lambda t: 0.1 * sum(np.cos((1.0 + 0.1 * k) * t) for k in range(10)),
     ],
 )
 def test_a_steady_motion_takes_no_more_steps_than_another(function: Callable[[Any], Any]) -> None:

@@ -35,6 +35,7 @@ from pyharness.engine.plan import RK4_OR_TAYLOR, plan
 from pyharness.engine.problem import closed_form
 from pyharness.engine.solver import Solver
 from pyharness.model.trajectory import Array
+from pyharness.torques import damping
 from pyharness.truth.reference import reference
 
 PUSHED = case_scene(5)
@@ -332,6 +333,16 @@ def test_plan_says_what_is_skipped_and_why(capsys: pytest.CaptureFixture[str]) -
     for form in ("table", "json", "csv", "markdown"):
         assert main(["plan", "--case", "7", "--format", form]) == 0
         assert "torque of time" in capsys.readouterr().out
+
+
+def test_plan_says_that_a_torque_depends_on_the_state() -> None:
+    chosen = plan(replace(case_scene(2), torque=damping(0.1)))
+    told = {each.part: (each.kept, each.why) for each in chosen.decisions}
+    assert told["integration"] == (True, "its torque depends on the state")
+    kept, why = told["torque"]
+    assert kept
+    assert why.startswith("depends on the state: ")
+    assert "torque" not in chosen.skipped
 
 
 def test_plan_refuses_a_tolerance_out_of_range() -> None:

@@ -748,7 +748,6 @@ static int put_in(struct group *g, int lane, int body)
   g->t[lane] = g->t_low[lane] = g->worst[lane] = g->noise[lane] = g->allowed[lane] = 0.0;
   g->end[lane] = g->rest[lane] = end;
   g->h[lane] = copysign(fmin(fabs(end), 1.0 / scale), end);
-  g->previous[lane] = g->h[lane];
   g->scale[lane] = scale;
   g->growth[lane] = 1.0;
   g->local[lane] = 0.125 * all->tolerance;

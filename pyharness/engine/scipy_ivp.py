@@ -193,7 +193,7 @@ class _Run(Run):
         for _ in range(_MOST_GUESSES):
             coarse = self.solved("RK45", _COARSE, _COARSE * scale)
             sizes = np.nan_to_num(np.abs(coarse.y), nan=0.0, posinf=0.0)
-            largest = float(sizes.max(initial=0.0))
+            largest = float(sizes.max())
             if not 0.0 < largest < scale / _FAR:
                 break
             scale = largest

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from pyharness import Scene, TorqueLaw, case_scene, load, solve
 from pyharness.engine.event_fits import Solution
 from pyharness.engine.event_functions import event_functions
-from pyharness.events import crosses, extremum, flip, rest, tilt
+from pyharness.events import Event, crosses, extremum, flip, rest, tilt
 from pyharness.model.dense_output import Pieces
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.torques import damping, opaque, pulses
@@ -414,6 +414,13 @@ def test_few_calls_of_a_function_that_is_recorded() -> None:
     assert found == pytest.approx(
         times_of(BODY, 30.0, lambda t, omega, q: 0.75 - q[0] ** 2, attitude=True)
     )
+
+
+def test_an_event_of_the_user_is_that_of_its_function() -> None:
+    own = Event("own", lambda t, omega, attitude, rates: omega[1])
+    expected = times_of(BODY, 30.0, second)
+    assert len(expected) > 2
+    assert times_of(BODY, 30.0, own) == expected
 
 
 def test_opaque_torque_has_events() -> None:

@@ -27,7 +27,8 @@ from pyharness.model.errors import InputError
 from pyharness.model.extension import extension
 from pyharness.model.inertia import SYMMETRIC, nearest_float, principal_frame
 from pyharness.model.progress import for_each_piece
-from pyharness.model.scene import Scene, checked_scene
+from pyharness.model.scene import STATE_TORQUE, Scene, checked_scene
+from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
 from pyharness.model.waves import with_merged_rows
 
@@ -229,6 +230,8 @@ def scene_of_row(scene: Scene, rows: Mapping[str, Array], i: int) -> Scene:
         own = {**dict.fromkeys(BODIES), **own}
     law = scene.torque
     if torque:
+        if isinstance(law, StateTorque):
+            raise InputError(STATE_TORQUE)
         law = replace(law, **torque)
     if values:
         law = torque_with_values(

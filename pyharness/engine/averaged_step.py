@@ -265,7 +265,7 @@ class MacroStep:
         nodes = self._slow.nodes
         known = self._pace * self.length * nodes + self.stroboscopic[3]
         forward = 1.0 if self.length > 0.0 else -1.0
-        angle = self.length * np.interp(forward * times, forward * known, nodes)
+        angle: Array = self.length * np.interp(forward * times, forward * known, nodes)
         low, high = (np.full_like(angle, end) for end in sorted((0.0, self.length)))
         last = np.full_like(angle, np.inf)
         for _ in range(_MOST_NEWTON):
@@ -273,7 +273,8 @@ class MacroStep:
             fast = self.coordinates.omega(point, cosine, sine)[2]
             change = ((times - self._pace * angle) - point[3]) * (self.coordinates.rate * fast)
             if np.abs(change).max() <= _CLOSE:
-                return angle + change
+                angle = angle + change
+                break
             # Near the separatrix omega is slow in a part of each revolution, where Newton's method
             # leaves the interval that is known to contain the angle, or does not converge.
             low = np.where(change > 0.0, np.maximum(low, angle), low)

@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import quad
 
 from pyharness import InputError, Scene, Stepper, solve
-from pyharness.engine.stepper import step_lengths
+from pyharness.engine.stepped import step_lengths
 from pyharness.torques import in_space, table
 
 BRICK = Scene("brick", (0.1, 2.0, 0.3), moments=(1.0, 2.0, 3.0))

@@ -6,6 +6,7 @@ module tape_roots
   private
 
   real(dp), parameter :: NARROWEST = 2.0_dp**(-40) ! interval without a decision, over the step
+  real(dp), parameter :: NEGLIGIBLE = 2.0_dp**(-60) ! part of the terms that shows no sign
   integer, parameter :: MOST_CUTS = 100
 
   public :: first_root, size_of
@@ -27,7 +28,7 @@ contains
     root = 2.0_dp*most
     touch = -1.0_dp
     total = size_of(c(:degree), most)
-    if (c(0) > total - c(0) .or. total == 0.0_dp) return
+    if (c(0) > total - c(0) .or. total == 0.0_dp .or. .not. total <= NEGLIGIBLE*huge(total)) return
     low = 0.0_dp
     width = most
     do while (low < most)
@@ -46,7 +47,8 @@ contains
         if (abs(d(1)) <= bend .and. d(0) <= nearly*total) touch = low + r
         low = high
         width = 2.0_dp*width
-      else if (degree > 0 .and. abs(d(1)) > bend .or. r <= NARROWEST*most) then
+      else if (degree > 0 .and. abs(d(1)) > bend .or. r <= NARROWEST*most &
+               .or. abs(d(0)) + spread <= NEGLIGIBLE*total) then
         if (r <= NARROWEST*most) touch = low + r
         if (value_of(c(:degree), high) < 0.0_dp) then
           root = bisected(c(:degree), low, high)

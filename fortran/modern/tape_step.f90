@@ -7,6 +7,7 @@ module tape_step
   use tape, only: FIRST_UNKNOWN, tape_t, TIME_SLOT
   use tape_live, only: keep_live, settle
   use tape_plan, only: converge, fitting, LONGER, MOST_TRIES, order_for
+  use tape_roots, only: size_of
   use tape_series, only: allocate_series, derivatives_at, expand, noise_of, series_t
   use tape_switches, only: change, CROSSES, find_switches, IS_CHANGED, next_crossing, &
                            resolve_switches, SLIDES, STAYS, switches_t, update
@@ -135,8 +136,8 @@ contains
       end if
       ! The time at the end is rounded. The state belongs to that time.
       step%h = (request%t + step%h) - request%t
-      if (.not. abs(step%h) > 0.0_dp) then
-        if (verdict /= CROSSES) return
+      if (.not. abs(step%h) > 0.0_dp .and. verdict /= CROSSES) return
+      if (verdict == CROSSES .and. (.not. abs(step%h) > 0.0_dp .or. is_at_once())) then
         ! A switch at the beginning of the step, but for rounding.
         do i = 1, switches%n
           if (switches%crosses(i) /= 0) call change(i, switches%crosses(i), switches, s)
@@ -159,6 +160,22 @@ contains
     end do
 
   contains
+
+    logical function is_at_once()
+      !! Return whether the operands that cross a level change by rounding errors alone.
+      real(dp) :: noise(tape%n_unknowns)
+      integer :: i
+
+      call noise_of(s, noise, abs(request%state))
+      is_at_once = .true.
+      do i = 1, switches%n
+        if (switches%crosses(i) == 0) cycle
+        associate (terms => s%a(1:s%order - 1, switches%operands(i)))
+          is_at_once = is_at_once .and. factor*size_of(terms, factor) &
+                       <= epsilon(factor)*s%noise(switches%operands(i))
+        end associate
+      end do
+    end function is_at_once
 
     logical function is_continued()
       !! Return whether the derivatives at the end of the step are those of the series. The state at

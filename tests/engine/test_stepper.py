@@ -181,6 +181,34 @@ def test_a_step_whose_terms_are_infinite_is_shortened(longest: float) -> None:
     assert stepper.omega[0] == pytest.approx(1.0 / math.sqrt(1.0 + 2e40 * time), abs=1e-9)
 
 
+def test_a_level_is_crossed_where_the_operand_is_a_rounding_error() -> None:
+    """After the switch the operand is -1.1e-16, and omega changes by less than that."""
+
+    def torque(t: Any, w: Any) -> list[Any]:
+        return [0.1 * np.clip(np.log1p(w[1] ** 2), -1.0, 0.9), 0.0, 0.0]
+
+    omega = (0.5182826958662092, -1.2169234765601231, -1.089492426125041)
+    moments = (1.5451530837733427, 2.3063661260959587, 1.3944668890613767)
+    stepper = Stepper(Scene("", omega, moments=moments, torque=torque))
+    for _ in range(10):
+        if stepper.time < 3.0:
+            stepper.step(3.0 - stepper.time)
+    assert stepper.time == 3.0
+    assert stepper.omega == pytest.approx(solve(stepper.scene, 3.0).omega[-1], rel=1e-8)
+
+
+def test_a_switch_that_becomes_invisible_is_passed() -> None:
+    """The operand is below the smallest number of binary64 from 0.21 s on."""
+
+    def torque(t: Any, w: Any) -> list[Any]:
+        pulse = np.exp(-689.6 * (t + 0.8234) ** 2)
+        return [0.1 * np.sign(np.sin(0.8 * pulse)), 0.0 * w[0], 0.0]
+
+    stepper = Stepper(Scene("", (0.0, 0.0, 0.4), moments=(1.7, 1.3, 2.5), torque=torque), 1e-6)
+    stepper.until(0.5)
+    assert stepper.time == 0.5
+
+
 def test_a_singular_torque_ends_the_steps() -> None:
     scene = Scene(
         "pole", (1.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0),

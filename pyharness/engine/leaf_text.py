@@ -1,4 +1,4 @@
-"""Tapes as C: what code for their recorded operations depends on, and how it names their slots."""
+"""How C code names the slots of a tape."""
 
 import re
 from collections.abc import Iterator
@@ -76,13 +76,13 @@ def combined(tape: Structure, number: int, name: str, *, is_value: bool) -> str:
 
 
 def numbered_terms(tape: Structure, number: int) -> Iterator[tuple[int, int]]:
-    """Yield the number of each coefficient of a combination, and its slot."""
+    """Yield coefficient numbers and slots of a combination."""
     begin = sum(map(len, tape.combinations[: number - 1]))
     yield from enumerate(tape.combinations[number - 1], begin)
 
 
 def rates_of(tape: Structure) -> range:
-    """Return the numbers of the combinations that are the rates."""
+    """Return the numbers of the rates."""
     return range(len(tape.combinations) - tape.n_unknowns + 1, len(tape.combinations) + 1)
 
 

@@ -1,4 +1,4 @@
-"""An integration by one of SciPy's methods of a torque that depends on the state."""
+"""One integration by SciPy of a torque of the state."""
 
 import itertools
 import math
@@ -49,7 +49,7 @@ class StateRows(NamedTuple):
 
 
 class StateRun(Run):
-    """An integration, which may be repeated with another local tolerance."""
+    """An integration, which may be repeated."""
 
     def __init__(self, scene: Scene, end: float, name: str, effort: float, most: float) -> None:
         torque = scene.torque
@@ -126,7 +126,7 @@ class StateRun(Run):
             raise InputError(f"[torque]: {HAS_MEMORY}")
 
     def work_error(self, time: float) -> TimedError:
-        """Return the error of an integration that exceeds its work limit."""
+        """Return the error beyond the work limit."""
         if self._jumps():
             return TimedError(
                 f"{self.label}: the torque jumps back and forth at t = {{time}} s; write a smooth "
@@ -258,7 +258,7 @@ class StateRun(Run):
 
 
 def with_unit_attitude(rows: Array) -> Array:
-    """Normalise the quaternion of each row, if there is one."""
+    """Normalise the quaternions, if any."""
     if rows.shape[1] == 3:
         return rows
     unit = rows[:, 3:] / np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)

@@ -1,4 +1,4 @@
-"""Integrations step by step: the steps of a motion, and why it ends early."""
+"""The steps of a motion, and why it ends early."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress

@@ -1,7 +1,6 @@
-"""The recurrences, slopes and rounding errors of recorded operations, as C.
+"""Recurrences, slopes and rounding errors of recorded operations, as C.
 
-fortran/make_cases.py writes the cases of the interpreter from this table, and leaves.py the code
-for single tapes.
+The interpreter (by fortran/make_cases.py) and leaves.py take them from here.
 """
 
 from typing import NamedTuple

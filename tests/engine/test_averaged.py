@@ -262,7 +262,6 @@ def test_crossing_of_the_separatrix_is_refused_at_its_time() -> None:
 
 
 def test_rows_near_the_separatrix_are_those_of_taylor() -> None:
-    """In a part of each revolution the angle hardly changes."""
     law = TorqueLaw((-7.2334e-7, -5.6474e-7, -2.7866e-7))
     moments = 1.308, 1.5601, 1.4755
     scene = Scene("", (-0.25, 0.205, 0.9463), moments=moments, torque=law)

@@ -160,8 +160,6 @@ def test_a_tiny_step_does_not_shorten_the_next() -> None:
 
 @pytest.mark.parametrize("start", [1.0, 1.35, 1.4])
 def test_a_switch_at_the_end_of_a_step_does_not_stop_the_next(start: float) -> None:
-    """The last step is some 1e-14 s, and omega on a level but for rounding."""
-
     def torque(t: Any, w: Any) -> list[Any]:
         return [0.1 * w[1], np.clip(w[0], -0.3, 0.3), 0.1 * np.sin(t)]
 
@@ -182,8 +180,6 @@ def test_a_step_whose_terms_are_infinite_is_shortened(longest: float) -> None:
 
 
 def test_a_level_is_crossed_where_the_operand_is_a_rounding_error() -> None:
-    """After the switch the operand is -1.1e-16, and omega changes by less than that."""
-
     def torque(t: Any, w: Any) -> list[Any]:
         return [0.1 * np.clip(np.log1p(w[1] ** 2), -1.0, 0.9), 0.0, 0.0]
 
@@ -198,8 +194,6 @@ def test_a_level_is_crossed_where_the_operand_is_a_rounding_error() -> None:
 
 
 def test_a_switch_that_becomes_invisible_is_passed() -> None:
-    """The operand is below the smallest number of binary64 from 0.21 s on."""
-
     def torque(t: Any, w: Any) -> list[Any]:
         pulse = np.exp(-689.6 * (t + 0.8234) ** 2)
         return [0.1 * np.sign(np.sin(0.8 * pulse)), 0.0 * w[0], 0.0]

@@ -304,9 +304,7 @@ def _refuse(where: str, table: dict[str, Any], chosen: str, keys: Iterable[str])
 
 def _checked(where: str, axis: Axis) -> Axis:
     field = number_field(axis.field)
-    if axis.how == "sphere":
-        return axis
-    ends = axis.coordinates() if axis.how == "normal" else axis.values
+    ends = axis.coordinates() if axis.how in ("normal", "sphere") else axis.values
     for value in (float(np.min(ends)), float(np.max(ends))):
         if not (math.isfinite(value) and field.takes(value)):
             raise InputError(f"{where}: {value:g}; allowed: {field.allowed}")

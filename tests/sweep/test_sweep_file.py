@@ -195,6 +195,7 @@ REFUSED = {
     f"{CASE}{axis('method', ['rk4', 'rk4'])}": "(method): a name is given twice",
     f"{CASE}{DRAWN}deviation = -1.0\nseed = 1\n": "(omega.1): deviation -1; allowed",
     f"{CASE}{DRAWN}deviation = 1.0\nseed = -1\n": "(omega.1): seed is out of range; allowed",
+    f"{CASE}[[axis]]\nfield = 'height'\ndraw = 'sphere'\ncount = 50\nseed = 1\n": "(height): ",
     f"{CASE}{DRAWN}deviation = 1.0\n": "(omega.1): seed is missing; give a whole number from 0",
 }  # fmt: skip
 

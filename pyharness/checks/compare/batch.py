@@ -13,6 +13,7 @@ from pyharness.engine.many_scenes import scene_of_row
 from pyharness.engine.registry import PREPARED_FOR_STATE, REGISTRY, requested_tolerance
 from pyharness.engine.solve import solve
 from pyharness.engine.solver import PREPARED
+from pyharness.model.arrays import unit_quaternions
 from pyharness.model.attitude import IDENTITY, product
 from pyharness.model.codes import Statuses
 from pyharness.model.ensemble import Ensemble
@@ -151,7 +152,7 @@ class Batch:
     def first_attitudes(self) -> Array:
         """Return the normalised attitudes at time 0, shape (n, 4), or (1, 4) if shared."""
         first = np.array(self.arrays.get("attitude", [self.scene.attitude or IDENTITY]))
-        return np.asarray(first / np.linalg.norm(first, axis=1, keepdims=True))
+        return unit_quaternions(first)
 
     def by_method(self, method: str, tolerance: float, part: float = 1.0) -> Array:
         """Return omega (rad/s) at `part` times `t_end` by another method, shape (n, 3)."""

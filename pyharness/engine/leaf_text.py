@@ -1,4 +1,4 @@
-"""How C code names the slots of a tape."""
+"""Names of the slots of a tape in C code."""
 
 import re
 from collections.abc import Iterator

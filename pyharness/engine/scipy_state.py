@@ -95,7 +95,7 @@ def finest_of_state(name: str, scene: Scene, time: float, most: float) -> float:
     return 1.5 * _SAFETY * FINEST_STEP * _difference(first, second) / _TRIAL[0]
 
 
-def _refined(run: "StateRun", times: Sequence[float], tolerance: float) -> StateRows:
+def _refined(run: StateRun, times: Sequence[float], tolerance: float) -> StateRows:
     """Return states at `times` (s) whose estimated error meets `tolerance`, or raise InputError."""
     scale = run.expected_omega()
     if scale == 0.0:

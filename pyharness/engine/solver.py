@@ -320,8 +320,7 @@ def prepare(
     InputError
         If the method is unknown, or can't solve the scene or its attitude; if the torque needs the
         attitude, and `attitude` is false; or if the tolerance or effort is out of range. A call
-        raises InputError if a changing moment reaches 0 before `t_end`; if it is a function of
-        time, the status is `overflow`.
+        raises it if a changing moment reaches 0; if that is a function, the status is `overflow`.
     NotBuiltError
         If the extension is not built.
 

@@ -16,9 +16,10 @@ from pyharness.engine.scene_reader import scene_of
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.listing import Listing, subset
-from pyharness.model.scene import STATE_TORQUE, Scene
+from pyharness.model.scene import SPACE_TORQUE, STATE_TORQUE, Scene
 from pyharness.model.scene_file import body_of, scene_text
 from pyharness.model.state_torque import StateTorque
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
 from pyharness.sweep.axes import CHOICES, CONSTANTS, ELEMENTS, INERTIA, number_field
 from pyharness.sweep.reductions import empty, needs_attitudes, reduced
@@ -237,10 +238,14 @@ def check_state_axis(scene: Scene, field: str) -> None:
 
 def check_state_solver(scene: Scene, methods: Sequence[str], has_program: bool) -> None:
     """Raise InputError if a method, or a program, can't solve the scene's torque."""
-    if not isinstance(scene.torque, StateTorque):
-        return
+    torque = scene.torque
+    if isinstance(torque, TorqueLaw):
+        if torque.frame != "space":
+            return
+        # An axis may vary a torque that is 0 in the scene.
+        scene = replace(scene, torque=replace(torque, constant=(1.0, 0.0, 0.0)))
     if has_program:
-        raise InputError(STATE_TORQUE)
+        raise InputError(SPACE_TORQUE if scene.torque.in_space else STATE_TORQUE)
     if scene.torque.needs_attitude and scene.attitude is None:
         raise InputError(
             "the torque depends on the attitude, and the scene has none; give [initial] attitude"

@@ -95,8 +95,11 @@ def _flips(batch: Batch, given: Mapping[str, Any]) -> Found:
     rows = np.concatenate([batch.omega0[:, None, :], batch.rows(given["samples"])], axis=1)
     component = np.take_along_axis(rows, column[:, None, None], axis=2)[:, :, 0]
     below = component < 0.0
-    changes = (below[:, 1:] != below[:, :-1]) & np.isfinite(component[:, 1:])
-    return np.asarray(changes.sum(axis=1))
+    is_finite = np.isfinite(component)
+    changes = (below[:, 1:] != below[:, :-1]) & is_finite[:, 1:]
+    # A program has rows until it ends; what a method could not solve has no count.
+    is_known = is_finite[:, 1] if batch.is_program else is_finite.all(axis=1)
+    return np.where(is_known, changes.sum(axis=1), -1)
 
 
 def _growth(batch: Batch, given: Mapping[str, Any]) -> Found:
@@ -138,7 +141,8 @@ def _axis_flips(batch: Batch, given: Mapping[str, Any]) -> Found:
     """Return how often the tilt of an axis passes 90 degrees from sample to sample, shape (n,)."""
     along, across = _tilt_squares(batch, given)
     is_over = np.concatenate([np.zeros((len(along), 1), bool), across > along], axis=1)
-    return np.asarray((is_over[:, 1:] != is_over[:, :-1]).sum(axis=1))
+    count = (is_over[:, 1:] != is_over[:, :-1]).sum(axis=1)
+    return np.where(np.isfinite(along).all(axis=1), count, -1)
 
 
 def _pointing_error(batch: Batch, given: Mapping[str, Any]) -> Found:

@@ -114,19 +114,18 @@ def _scene(table: object, path: Path) -> tuple[Scene, bytes]:
         scene = scene_of(table, path.stem)
     else:
         raise InputError("scene is missing; give [scene] with case, file, or a scene's own tables")
-    return checked_scene(scene, any_axes=True, any_state=True), more
+    return checked_scene(scene, any_axes=True, any_torque=True, any_state=True), more
 
 
 def _solver(table: object, axes: tuple[Axis, ...]) -> Solver:
     if not isinstance(table, dict):
         raise InputError(f"solve is {kind_of(table)}; it must be a table [solve]")
     check_keys(table, (*_OF_METHODS, "program", *_OF_PROGRAMS), "[solve]")
-    values = {axis.field: axis.values[0] for axis in axes if axis.is_choice}
-    for field in values:
-        if field in table:
-            raise InputError(f"[solve] {field}: it is given here and on an axis; give it once")
-    given = {**table, **values}
     fields = {axis.field for axis in axes}
+    for field in table:
+        if field in fields:
+            raise InputError(f"[solve] {field}: it is given here and on an axis; give it once")
+    given = {**table, **{axis.field: axis.values[0] for axis in axes if axis.is_choice}}
     for key in CHOICES:
         if not isinstance(given.get(key, ""), str):
             raise InputError(f"[solve] {key} is {kind_of(given[key])}; it must be text")

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from pyharness import case_scene, run_program, solve
 from pyharness.model.codes import Statuses
+from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import STOP_VARIABLES
@@ -63,7 +64,10 @@ _WITH_DAMPING = "[torque]\nexpression = ['-0.1*w1', '-0.3*w2', '0.2*cos(t)']"
 _IN_SPACE = "[torque]\nexpression = ['0.2*q1', '-0.1*w2', '0.3*q0*q3']"
 
 
-@pytest.mark.parametrize("torque", ["", _LAW, _WITH_DAMPING, _IN_SPACE])
+_ABOUT_SPACE = _LAW.replace("[torque]", "[torque]\nframe = 'space'")
+
+
+@pytest.mark.parametrize("torque", ["", _LAW, _WITH_DAMPING, _IN_SPACE, _ABOUT_SPACE])
 def test_attitudes_are_those_of_single_scenes(tmp_path: Path, torque: str) -> None:
     towards = np.array([0.3, -2.0, 1.0])
     asked = ", ".join(
@@ -110,6 +114,31 @@ def test_initial_attitudes_may_vary_where_a_quantity_needs_them(tmp_path: Path) 
         assert np.abs(found["attitude"][i] - rows.attitude[-1]).max() < 1e-11
         axis3 = rows.rotation().as_matrix()[-1, 2, 2]
         assert found["pointing-error"][i] == pytest.approx(np.arccos(axis3), abs=1e-7)
+
+
+def test_torque_in_space_may_be_that_of_an_axis_alone(tmp_path: Path) -> None:
+    """The scene's own torque is 0; attitude and omega are those of `solve` nevertheless."""
+    more = "attitude = [2.0, 1.0, 0.0, -1.0]\n[scene.torque]\nframe = 'space'\n[scene.run]"
+    scene, top = BASE.replace("[scene.run]", more), 'reductions = ["attitude", "end"]'
+    axes = axis("torque.constant.1", [0.0, 1.0])
+    sweep, found = _found(tmp_path, text(axes, top=top, scene=scene))
+    for i, torque in enumerate((0.0, 1.0)):
+        law = TorqueLaw((torque, 0.0, 0.0), frame="space")
+        rows = solve(replace(sweep.scene, torque=law), 10.0, attitude=True)
+        assert rows.attitude is not None
+        assert np.abs(found["attitude"][i] - rows.attitude[-1]).max() < 1e-11
+        assert np.abs(found["end"][i] - rows.omega[-1]).max() < 1e-11
+    with pytest.raises(InputError, match="about the axes of space"):
+        program = scene + "[solve]\nprogram = 'two-term'\n"
+        _found(tmp_path, text(axes, top="", scene=program))
+
+
+def test_scenes_without_solution_have_no_count(tmp_path: Path) -> None:
+    top = 'reductions = ["flips", "axis-flips", "status"]'
+    _, found = _found(tmp_path, text(axis("omega.1", [1.0, 1e200]), top=top))
+    assert (found["status"] == [Statuses.COMPLETE, Statuses.GAVE_UP]).all()
+    for name in ("flips", "axis-flips"):
+        assert (found[name] >= 0).tolist() == [True, False]
 
 
 @pytest.mark.campaign
@@ -251,6 +280,6 @@ def test_what_is_no_number_is_no_flip() -> None:
     rows = np.stack([middle * 0.0, middle, middle * 0.0], axis=1)[None, :, :]
     solved = SimpleNamespace(
         omega0=rows[:, 0], rows=lambda samples: rows[:, 1 : 1 + samples],
-        bodies=np.array([[1.0, 2.0, 3.0]]),
+        bodies=np.array([[1.0, 2.0, 3.0]]), is_program=True,
     )  # fmt: skip
     assert REDUCTIONS["flips"].compute(solved, {"samples": 4}).tolist() == [2]  # type: ignore[arg-type]

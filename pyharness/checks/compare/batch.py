@@ -143,7 +143,7 @@ class Batch:
         """
         ends = [each.attitude for each in self._samples(samples) if each.attitude is not None]
         found = np.stack(ends, axis=1)
-        if self.scene.torque.needs_attitude:
+        if self._needs_attitude:
             w, x, y, z = self.first_attitudes.T[:, :, None]
             found = np.stack(product((w, -x, -y, -z), np.moveaxis(found, 2, 0)), axis=2)
         return found
@@ -183,9 +183,15 @@ class Batch:
         own = {name: array for name, array in self.arrays.items() if name != "lipschitz"}
         return scene_of_row(self._shared, own, i)
 
+    @property
+    def _needs_attitude(self) -> bool:
+        torque = self.scene.torque
+        # A torque in space may be 0 in `scene`, and another in `arrays`.
+        return torque.needs_attitude or getattr(torque, "frame", "") == "space"
+
     @cached_property
     def _shared(self) -> Scene:
-        attitude = self.scene.attitude if self.scene.torque.needs_attitude else None
+        attitude = self.scene.attitude if self._needs_attitude else None
         return replace(self.scene, attitude=attitude)
 
     @cached_property
@@ -209,7 +215,7 @@ class Batch:
         tolerance = requested_tolerance(method, self.solver.tolerance)
         # One initial attitude serves all scenes, because `attitudes` multiplies the result by
         # `first_attitudes`.
-        has_one = self.attitude and not self.scene.torque.needs_attitude
+        has_one = self.attitude and not self._needs_attitude
         more = {"attitude": IDENTITY} if has_one else {}
         return self._solve(method, tolerance, t_end, **more)
 
@@ -219,7 +225,7 @@ class Batch:
         tolerance = max(tolerance, REGISTRY[method].finest)
         if method not in (PREPARED_FOR_STATE if by_state else PREPARED):
             return self._solve_each(method, tolerance, t_end)
-        hidden = OF_PROGRAMS if self.scene.torque.needs_attitude else (*OF_PROGRAMS, "attitude")
+        hidden = OF_PROGRAMS if self._needs_attitude else (*OF_PROGRAMS, "attitude")
         options: dict[str, Any] = {k: x for k, x in self.arrays.items() if k not in hidden} | more
         options["compiled"] = self.solver.compiled
         return solve_many(self._shared, t_end, method=method, tolerance=tolerance, **options)
@@ -227,7 +233,7 @@ class Batch:
     def _solve_each(self, method: str, tolerance: float, t_end: Array) -> Ensemble:
         n = len(self.omega0)
         ends, status = np.full((n, 3), np.nan), np.full(n, Statuses.REFUSED, dtype=np.int8)
-        attitude = self.scene.torque.needs_attitude
+        attitude = self._needs_attitude
         for i, time in enumerate(t_end.tolist()):
             try:
                 found = solve(self.scene_of(i), time, method, tolerance, attitude=attitude)

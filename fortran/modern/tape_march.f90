@@ -53,6 +53,7 @@ module tape_march
   ! Relative distance from a switch that an error may bridge; at least, of rounding errors.
   real(dp), parameter :: NEAR = 1e-13_dp, MOST_NEAR = 1e-5_dp
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53) ! unit of rounding errors
+  real(dp), parameter :: DECAYED = 1e-100_dp ! largest perturbation beside which the error counts
   real(dp), parameter :: LARGEST_JUMP = 1e100_dp ! whose square is finite
 
   ! One integration of a request.
@@ -457,25 +458,26 @@ contains
 
     real(dp) function fitting_lanes()
       !! Return the factor on the step with which the last terms of the perturbations are small.
-      real(dp) :: first, size_of_last
+      real(dp) :: first, size_of_last, unit
       integer :: i, block, lane, number
 
       first = 0.0_dp
       size_of_last = 0.0_dp
-      do block = 1, n_blocks
-        do lane = merge(2, 1, block == 1), SIDE_BY_SIDE ! the error does not count
-          number = SIDE_BY_SIDE*(block - 1) + lane - 1
-          if (number > n) exit
-          if (.not. weights(number) > 0.0_dp) cycle
-          do i = 1, n
-            associate (v => s%blocks(lane, :, FIRST_UNKNOWN - 1 + i, block), &
-                       relative => weights(i)/weights(number))
-              first = max(first, relative*abs(v(1)))
-              if (last_terms(block) < s%order) cycle
-              size_of_last = max(size_of_last, relative*abs(v(1 + s%order)), &
-                                 relative*abs(v(s%order))/factor)
-            end associate
-          end do
+      ! The error, number 0, is last: it counts only where the others have decayed.
+      do number = n, 0, -1
+        block = 1 + number/SIDE_BY_SIDE
+        lane = 1 + mod(number, SIDE_BY_SIDE)
+        unit = 1.0_dp
+        if (number > 0) unit = weights(number)
+        if (.not. unit > 0.0_dp .or. (number == 0 .and. first >= DECAYED)) cycle
+        do i = 1, n
+          associate (v => s%blocks(lane, :, FIRST_UNKNOWN - 1 + i, block), &
+                     relative => weights(i)/unit)
+            first = max(first, relative*abs(v(1)))
+            if (last_terms(block) < s%order) cycle
+            size_of_last = max(size_of_last, relative*abs(v(1 + s%order)), &
+                               relative*abs(v(s%order))/factor)
+          end associate
         end do
       end do
       size_of_last = size_of_last*factor**s%order

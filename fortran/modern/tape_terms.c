@@ -24,6 +24,7 @@ struct block {
 enum { FIRST_CHECKED = 5 }; /* term of a perturbation: most steps need it and the next one */
 enum { SMALL_TERMS = 3, MOST_TRIES = 60 }; /* last terms of derivatives that are small; cuts of a step */
 #define SHORTER 0.7        /* factor of a cut */
+#define DECAYED 1e-100     /* largest perturbation beside which the error counts */
 #define MOST_CANCELLED 1e3 /* largest term over the size of a derivative */
 static inline perturbations *perturbations_of(const struct tape *tape) { return tape->v; }
 
@@ -629,12 +630,13 @@ int OF_LEVEL(perturb_tape, LEVEL)(const struct tape *tape, int number, double h,
   matrix jacobian[NODES] __attribute__((aligned(64)));
   perturbations *const v = (perturbations *)tape->v + FIRST_UNKNOWN;
   const int n = tape->n_unknowns;
-  /* Perturbation n was a unit of unknown n when it began. The error, perturbation 0, does not count,
-     because it may be zero. */
+  /* Perturbation n was a unit of unknown n when it began. The error, perturbation 0, may be zero, and
+     counts where the others have decayed. */
   const int count = n + 1 - number < SIDE_BY_SIDE ? n + 1 - number : SIDE_BY_SIDE;
   double limits[SIDE_BY_SIDE], first = 0.0, power = 1.0;
   for (int p = 0; p < count; p += IN_REGISTER)
     *(reg_anywhere *)(limits + p) = sizes_of(tape, 0, weights, p);
+  const double of_error = number == 0 && count > 0 ? limits[0] : 0.0;
   for (int i = number ? 0 : 1; i < count; i++) {
     const double weight = weights[number + i - 1];
     if (weight > 0.0 && limits[i] > first * weight) first = limits[i] / weight;
@@ -644,6 +646,7 @@ int OF_LEVEL(perturb_tape, LEVEL)(const struct tape *tape, int number, double h,
     const double weight = i >= count || number + i == 0 ? 0.0 : weights[number + i - 1];
     limits[i] = weight > 0.0 ? tolerance * first * weight : HUGE_VAL;
   }
+  if (of_error > 0.0 && first < DECAYED) limits[0] = tolerance * of_error;
   int k = 0, was_small, is_small = 0, is_short;
   if (is_long) set_blocks(tape, NODES, h, factor, jacobian);
   else set_blocks(tape, FEW_NODES, h, factor, jacobian);

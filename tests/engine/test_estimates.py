@@ -140,3 +140,22 @@ def test_long_steps_hide_no_amplification() -> None:
     assert np.abs(found.omega[0] - truth).max() <= tolerance * np.abs(omega).max()
     assert found.growth is not None
     assert found.growth[0] > 1e4
+
+
+@pytest.mark.parametrize("time", [2.994238392143583, 3.2519603690527905, 4.131954592862878])
+def test_error_of_a_strongly_damped_body_does_not_grow(time: float) -> None:
+    """In a block of steps its perturbations underflow, and the error of each step is added."""
+    rate = 1.5e4
+    body = Scene(
+        "damped", (0, 0, 1), moments=(1, 2, 2),
+        torque=lambda t, w: -2 * rate * w + np.array([0, 0, 2 * rate * np.cos(t)]),
+    )  # fmt: skip
+    exact = (rate * rate * np.cos(time) + rate * np.sin(time)) / (rate * rate + 1.0)
+    alone = solve(body, time, tolerance=1e-6)
+    many = MANY(body, time, omega=[(0, 0, 1)] * 2, tolerance=1e-6, estimates=True)
+    assert alone.ended == "complete"
+    assert (many.status == 0).all()
+    assert alone.error is not None
+    for omega, error in ((alone.omega[-1], alone.error), *zip(many.omega, many.error, strict=True)):
+        assert abs(omega[2] - exact) < 1e-14
+        assert error < 1e-9

@@ -40,7 +40,7 @@ SCENE = {
 }
 LISTING = {
     "--listing L": "Version of the program: original (default), or corrected (without the "
-    "defects, which are faults of its author).",
+    "author's faults, called defects).",
     "--fix NAME,...": "Correct only these defects of the original program (names: `pyharness "
     "defects`).",
     "--keep NAME,...": "Correct all defects of the original program except these.",
@@ -55,16 +55,16 @@ LISTING = {
     "--no-stop": "Omit the stop test of --lipschitz.",
 }
 _EFFORT = (
-    "Factor of the work limit of each computation, above 0. The default, 1, allows about 10 "
+    "Multiply the work limit of each computation by F, above 0. The default, 1, allows about 10 "
     "seconds{}. A computation that exceeds its limit ends with an error."
 )
 EFFORT = {"--effort F": _EFFORT.format(" (30 for a program of the thesis)")}
 EFFORT_WITHOUT_PROGRAMS = {"--effort F": _EFFORT.format("")}
 STRICT = {
     "--strict": "Exit with status 1 also if amplified rounding errors may exceed the tolerance. "
-    "Without --strict, the status is 1 only if the Fortran and the Python version of a program "
-    "differ, a corrected program misses its order of convergence, or a method of --method misses "
-    "its tolerance or ends early."
+    "In any case, the status is 1 if the Fortran and the Python version of a program differ, a "
+    "corrected program misses its order of convergence, or a method of --method misses its "
+    "tolerance or ends early."
 }
 ALSO = {
     "--also FILE,...": "Write the result to these files too, each in the format of its ending: "

@@ -26,24 +26,24 @@ _OPTION_OF = {"method": "--method", "peer": "--peers"}
 OPTIONS = {
     "--case N": "Measure only this case of Table 1 of the thesis, 1 to 7 (default: Cases 2 to 7, "
     "with --attitude also Case 1).",
-    "--horizon T": "End time of each integration, in s, above 0, up to 1000. Default: 3 s in all "
-    "cases, and also 100 s in Cases 3 and 4; with --attitude, also 100 s in all cases except 6.",
+    "--horizon T": "End time of each integration, in s, above 0, up to 1000 (default: 3, and also "
+    "100 in Cases 3 and 4, or with --attitude in all cases except 6).",
     "--draws N": "Instead of the cases, measure N random scenes, 1 to 10000, with all kinds of "
     "torque and body.",
     "--ensemble": "Instead of single trajectories, measure calls that solve many bodies at once: "
     "bodies per second, time per body as a function of the number of bodies, and memory.",
     "--terms": "Instead of the cases, measure scenes whose torques depend on omega (angular "
-    "velocity), time and attitude, for one body and many. Some torques are ready-made "
-    "(pyharness.torques), others are Python functions.",
+    "velocity), time and attitude, for one body and many. The torques are ready-made "
+    "(pyharness.torques) or Python functions.",
     "--bodies N": f"Number of bodies of --ensemble or --terms, 1 to {_MOST_BODIES} (default "
     f"{_BODIES} with --ensemble, {_TERM_BODIES} with --terms).",
     "--seed S": "Seed, any text, of the random scenes of --draws or the bodies of --ensemble or "
     "--terms (default: the present year and week, as in 2026-W47).",
-    "--attitude": "Compute and measure the attitude (orientation) of the body together with omega.",
-    "--method M,...": "Measure only these of our methods and programs, by their names in the first "
-    "column of the result, or none (default: all).",
-    "--peers NAME,...": "Measure only these third-party solvers, by their names in the first "
-    "column of the result or by package (heyoka, numba, scipy), or none (default: all installed).",
+    "--attitude": "Measure the attitude (orientation) of the body together with omega.",
+    "--method M,...": "Measure only these of our methods and programs (names: first column of the "
+    "result; none: no method; default: all).",
+    "--peers NAME,...": "Measure only these third-party solvers (names: first column of the "
+    "result, or packages: heyoka, numba, scipy; none: no solver; default: all installed).",
     "--compiled": "With --terms, compile all torques with the C compiler first.",
     "--plan": "Instead of comparing solvers, measure run times with and without each computation "
     "that `pyharness plan` can omit, such as the translational velocity.",

@@ -17,8 +17,8 @@ from pyharness.thesis.programs import BINARY64, WORD_NAMES
 OPTIONS = {
     **shared.SCENE,
     **shared.LISTING,
-    "--listing L": "Version of the programs: original, or corrected (without the defects, which "
-    "are faults of their author); default: both.",
+    "--listing L": "Version of the programs: original, or corrected (without the author's faults, "
+    "called defects); default: both.",
     "--program P": f"Compare only this program: {', '.join(PROGRAMS)} (default: all three). The "
     "first two use collocation.",
     "--method M,...": "Compare these methods instead of the programs, such as auto,taylor,dop853 "

@@ -22,8 +22,8 @@ OPTIONS = {
     "--system S": "With --dialect ftn, operating system of the CDC computer that runs the job: "
     f"{' or '.join(SYSTEMS)} (default nos).",
     "--round": "With --dialect ftn, let FTN round results instead of truncating them.",
-    "--terms N": "With --program four-term, write a deck for collocation with N terms, 3 or 5. It "
-    "is a conjecture derived from the four-term deck: the thesis prints no such deck.",
+    "--terms N": "With --program four-term, write a deck for collocation with N terms, 3 or 5. The "
+    "thesis prints none; ours is a conjecture derived from the four-term deck.",
     **shared.outputs(FORMATS, plot=""),
 }
 USAGE = "--program P"

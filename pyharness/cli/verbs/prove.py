@@ -25,9 +25,8 @@ OPTIONS = {
     "--velocity": "Enclose the translational velocity too; needs the package python-flint.",
     "--transition": "Enclose the derivatives of the solution with respect to the initial omega "
     "too; needs the package python-flint.",
-    "--certificate FILE": "Write the steps of the proof to this file (JSON) as a certificate that "
-    "--check can verify; only for torques that depend on time alone; not with --velocity or "
-    "--transition.",
+    "--certificate FILE": "Write the steps of the proof to this file (JSON), a certificate for "
+    "--check. Only for torques that depend on time alone; not with --velocity or --transition.",
     "--check FILE,...": "Verify the certificates in these files instead of proving anything; needs "
     "no third-party library.",
     **shared.EFFORT_WITHOUT_PROGRAMS,

@@ -101,7 +101,7 @@ def _trajectory(arrays: dict[str, Any], header: dict[str, Any], where: str) -> T
     names: Any = header.get(SENSITIVITIES)
     if names is not None or SENSITIVITIES in arrays:
         array, counts = arrays[SENSITIVITIES], [_count(each) for _, each in names]
-        _check_array(array, "f8", count, n, sum(counts))
+        _check_array(array, "f8", count, n + n_own, sum(counts))
         _require(all(type(name) is str for name, _ in names))
         parts = np.split(array, np.cumsum(counts)[:-1], axis=2) if counts else []
         sensitivities = dict(zip((name for name, _ in names), parts, strict=True))
@@ -146,10 +146,10 @@ def _events(
     _require(sum(lengths) == n and np.isfinite(times).all())
     ends = list(itertools.accumulate(lengths))
     parts = [slice(end - length, end) for end, length in zip(ends, lengths, strict=True)]
-    # Integration begins at time 0; a terminal event may be before the first row.
-    away = rows[-1] - rows[0] if len(rows) > 1 else rows.sum() or times.sum()
+    # Integration begins at time 0; a terminal event may be before the first row, or leave one row.
+    signs = (math.copysign(1.0, rows[-1] - rows[0]),) if len(rows) > 1 else (1.0, -1.0)
     for part in parts:
-        _require((np.diff(math.copysign(1.0, away) * times[part]) >= 0.0).all())
+        _require(any((np.diff(sign * times[part]) >= 0.0).all() for sign in signs))
     return [times[part] for part in parts], [states[part] for part in parts]
 
 

@@ -91,9 +91,7 @@ def _attributes(arrays: dict[str, Any], header: dict[str, Any]) -> dict[str, Any
             str(name): arrays[f"{_SENSITIVITY}{number}"]
             for number, name in enumerate(header["sensitivities"])
         }
-        if any(
-            each.dtype != "f8" or each.shape[:-1] != (rows[0], width) for each in found.values()
-        ):
+        if any(each.dtype != "f8" or each.shape[:-1] != (*rows, width) for each in found.values()):
             raise ValueError("sensitivities of another shape")
         given["sensitivities"] = found
     if _EVENTS[0] in arrays:

@@ -104,8 +104,7 @@ def file_content(found: "Trajectory") -> bytes:
     if found.sensitivities is not None:
         columns = found.sensitivities
         header[SENSITIVITIES] = [[name, each.shape[2]] for name, each in columns.items()]
-        width = 3 if found.attitude is None else 7
-        none = np.zeros((len(found.time), width, 0))
+        none = np.zeros((len(found.time), len(found.y), 0))
         arrays[SENSITIVITIES] = np.concatenate([none, *columns.values()], axis=2)
     arrays["header"] = json.dumps(header)
     return archive_of(arrays)

@@ -261,6 +261,9 @@ def _listed(where: str, table: dict[str, Any], field: str, dimension: str) -> Ax
             raise InputError(f"{where}: a name is given twice; give each name once")
         return Axis(field, dimension, len(values), "listed", tuple(values))
     floats = tuple(finite(where, each) for each in values)
+    for each in floats if number_field(field).whole else ():
+        if not each.is_integer():
+            raise InputError(f"{where}: {each:g}; allowed: whole numbers")
     return _checked(where, Axis(field, dimension, len(values), "listed", floats))
 
 

@@ -116,7 +116,9 @@ def _batch(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Batch:
     if solver.program is not None:
         listing = listing_of(solver.program, solver.listing, solver.reading)
     sizes = own.get("step_size", np.full(n, scene.step_size))
-    t_end = sizes * scene.steps if solver.t_end is None else np.full(n, solver.t_end)
+    with np.errstate(over="ignore"):
+        whole = sizes * scene.steps
+    t_end = whole if solver.t_end is None else np.full(n, solver.t_end)
     t_end = own.get("t_end", t_end)
     omega = _omega(scene, own, values if body == "moments" else None, n)
     attitude = _components("attitude", scene.attitude or IDENTITY, own, n, first=0)

@@ -94,9 +94,11 @@ def _flips(batch: Batch, given: Mapping[str, Any]) -> Found:
     column = np.broadcast_to(middle, (len(batch.omega0),))
     rows = np.concatenate([batch.omega0[:, None, :], batch.rows(given["samples"])], axis=1)
     component = np.take_along_axis(rows, column[:, None, None], axis=2)[:, :, 0]
-    below = component < 0.0
     is_finite = np.isfinite(component)
-    changes = (below[:, 1:] != below[:, :-1]) & is_finite[:, 1:]
+    # A component that is 0 keeps the sign that it had.
+    places = np.where(component != 0.0, np.arange(component.shape[1]), 0)
+    signs = np.sign(np.take_along_axis(component, np.maximum.accumulate(places, axis=1), axis=1))
+    changes = signs[:, 1:] * signs[:, :-1] < 0.0
     # A program has rows until it ends; what a method could not solve has no count.
     is_known = is_finite[:, 1] if batch.is_program else is_finite.all(axis=1)
     return np.where(is_known, changes.sum(axis=1), -1)

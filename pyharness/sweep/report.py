@@ -236,8 +236,11 @@ def _map(
     least, largest, logarithmic = scale
     norm = (LogNorm if logarithmic else Normalize)(least, largest)
     seen = np.ma.masked_invalid(np.where(panel > 0.0, panel, np.nan) if logarithmic else panel)
-    y, x = values
-    drawn = plot.pcolormesh(x, y, seen, norm=norm, shading="nearest", rasterized=True)
+    y, x = map(np.asarray, values)
+    # A mesh needs ascending coordinates; listed values may have any order.
+    rows, columns = np.argsort(y, kind="stable"), np.argsort(x, kind="stable")
+    seen = seen[np.ix_(rows, columns)]
+    drawn = plot.pcolormesh(x[columns], y[rows], seen, norm=norm, shading="nearest", rasterized=True)
     down, across = axes
     for axis, set_label, set_scale in (
         (across, plot.set_xlabel, plot.set_xscale),

@@ -321,13 +321,17 @@ def _check_solvers(sweep: Sweep) -> None:
         if one.program is not None:
             listing_of(one.program, one.listing, one.reading)
     varied = [axis for axis in sweep.axes if axis.field == "tolerance"]
-    for method in _choices(sweep, "method", solver.method):
+    methods = list(_choices(sweep, "method", solver.method))
+    for method in methods:
         check_name("method", method, REGISTRY)
         finest = REGISTRY[method].finest
         least = float(varied[0].coordinates().min()) if varied else solver.tolerance
         asked = requested_tolerance(method, least)
         if not REGISTRY[method].is_fixed_step and not finest <= asked <= 1.0:
             raise InputError(f"tolerance is {asked:g}; allowed for {method}: {finest:.2g} to 1")
+    if methods and all(REGISTRY[method].is_fixed_step for method in methods):
+        if varied or solver.tolerance is not None:
+            raise InputError(f"{methods[0]} has a fixed step and no tolerance; give none")
     ends = [axis.coordinates() for axis in sweep.axes if axis.field == "t_end"]
     if solver.t_end == 0.0 or not all(each.all() for each in ends):
         raise InputError("t_end is 0; allowed: positive and negative times")

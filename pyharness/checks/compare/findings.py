@@ -107,14 +107,22 @@ class Comparison:
         return is_sensitive(self.growth, self.tolerance)
 
     @property
+    def is_complete(self) -> bool:
+        """Return whether every method has all rows."""
+        found = [each.trajectory for each in self.methods]
+        return all(each is not None and each.has_all_rows for each in found)
+
+    @property
     def unexpected(self) -> tuple[str, ...]:
         """Return a sentence for each unexpected result.
 
         With programs, a result is unexpected if Fortran and Python differ, or a corrected program
         misses its order. Without programs, it is unexpected if a method's error exceeds the limit
-        that follows from its tolerance, or rows are missing.
+        that follows from its tolerance, rows are missing, or no method has a result.
         """
         found = [] if self.programs else [*filter(None, map(self._excess, self.methods))]
+        if not self.programs and all(each.trajectory is None for each in self.methods):
+            found.append("no method has a result")
         for each in self.programs:
             if each.differences:
                 told = ", ".join(each.differences)

@@ -33,8 +33,9 @@ def flip_times(moments: ArrayLike, omega0: ArrayLike) -> Array:
     about1, about3 = np.sqrt(s2 * s3) * w1, np.sqrt(s1 * s2) * w3
     upper = np.hypot(np.sqrt(s1 * s3) * w2, np.maximum(about1, about3))
     lower = np.sqrt(np.abs(about1 - about3)) * np.sqrt(about1 + about3)
-    with np.errstate(divide="ignore"):
-        return np.where(lower > 0.0, np.pi / mean(upper, lower), np.inf)
+    turns = (lower > 0.0) & ((w2 > 0.0) | ((w1 > 0.0) & (w3 > 0.0)))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(turns, np.pi / mean(upper, lower), np.inf)
 
 
 def mean(upper: Array, lower: Array) -> Array:

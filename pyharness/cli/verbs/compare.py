@@ -78,7 +78,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _show(options: argparse.Namespace, found: Comparison) -> int:
-    failed = found.unexpected or (options.strict and found.is_sensitive)
+    failed = found.unexpected or (options.strict and (found.is_sensitive or not found.is_complete))
     return shared.show(comparison_report(found, options.numerics), options, failed=failed)
 
 

@@ -33,10 +33,9 @@ OPTIONS = {
     "rad.",
     "--ablate": "Run each program with every subset of its defects, and list the subsets, largest "
     "error first. Errors are compared up to the last step that all runs reached.",
-    "--numerics": "Show also the drifts of energy and momentum, the differences between the "
-    "Fortran and the Python version of each program (in units in the last place), the error "
-    "amplification, the errors of SciPy's solve_ivp, and the run times. JSON and CSV always have "
-    "them.",
+    "--numerics": "Show also drifts of energy and momentum, differences between the Fortran and the "
+    "Python programs (in units in the last place), error amplification, errors of SciPy's "
+    "solve_ivp, and run times. JSON and CSV always have them.",
     **shared.STRICT,
     **shared.EFFORT,
     **shared.outputs(),

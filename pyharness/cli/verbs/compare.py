@@ -33,8 +33,8 @@ OPTIONS = {
     "rad.",
     "--ablate": "Run each program with every subset of its defects, and list the subsets, largest "
     "error first. Errors are compared up to the last step that all runs reached.",
-    "--numerics": "Show also drifts of energy and momentum, differences between the Fortran and the "
-    "Python programs (in units in the last place), error amplification, errors of SciPy's "
+    "--numerics": "Show also drifts of energy and momentum, differences between the Fortran and "
+    "the Python programs (in units in the last place), error amplification, errors of SciPy's "
     "solve_ivp, and run times. JSON and CSV always have them.",
     **shared.STRICT,
     **shared.EFFORT,

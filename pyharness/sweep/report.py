@@ -240,7 +240,9 @@ def _map(
     # A mesh needs ascending coordinates; listed values may have any order.
     rows, columns = np.argsort(y, kind="stable"), np.argsort(x, kind="stable")
     seen = seen[np.ix_(rows, columns)]
-    drawn = plot.pcolormesh(x[columns], y[rows], seen, norm=norm, shading="nearest", rasterized=True)
+    drawn = plot.pcolormesh(
+        x[columns], y[rows], seen, norm=norm, shading="nearest", rasterized=True
+    )
     down, across = axes
     for axis, set_label, set_scale in (
         (across, plot.set_xlabel, plot.set_xscale),

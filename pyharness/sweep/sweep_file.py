@@ -329,9 +329,9 @@ def _check_solvers(sweep: Sweep) -> None:
         asked = requested_tolerance(method, least)
         if not REGISTRY[method].is_fixed_step and not finest <= asked <= 1.0:
             raise InputError(f"tolerance is {asked:g}; allowed for {method}: {finest:.2g} to 1")
-    if methods and all(REGISTRY[method].is_fixed_step for method in methods):
-        if varied or solver.tolerance is not None:
-            raise InputError(f"{methods[0]} has a fixed step and no tolerance; give none")
+    is_fixed = bool(methods) and all(REGISTRY[method].is_fixed_step for method in methods)
+    if is_fixed and (varied or solver.tolerance is not None):
+        raise InputError(f"{methods[0]} has a fixed step and no tolerance; give none")
     ends = [axis.coordinates() for axis in sweep.axes if axis.field == "t_end"]
     if solver.t_end == 0.0 or not all(each.all() for each in ends):
         raise InputError("t_end is 0; allowed: positive and negative times")

@@ -397,8 +397,9 @@ def test_stepper_takes_an_inertia_that_changes() -> None:
 def test_results_have_the_states_by_name(tmp_path: Any) -> None:
     scene = Scene("wheel", (0.3, -0.2, 1.0), MOMENTS, torque=wheel, states={"wheel": 1.5})
     found = solve(
-        scene, [4.0, 2.0], attitude=True, events=lambda t, omega, states: states["wheel"] - 1.7
-    )
+        scene, [4.0, 2.0], attitude=True, events=lambda t, omega, states: states["wheel"] - 1.7,
+        sensitivities=["omega"],
+    )  # fmt: skip
     assert found.to_pandas()["wheel"].tolist() == found.states["wheel"].tolist()
     assert found.to_xarray()["wheel"].sel(time=2.0) == found.states["wheel"][1]
     assert found.y.shape == (8, 2)
@@ -406,6 +407,9 @@ def test_results_have_the_states_by_name(tmp_path: Any) -> None:
     read = load(tmp_path / "wheel.npz")
     assert read.states["wheel"].tolist() == found.states["wheel"].tolist()
     assert read.scene == scene
+    assert found.sensitivities is not None
+    assert read.sensitivities is not None
+    assert (read.sensitivities["omega"] == found.sensitivities["omega"]).all()
     assert read.y_events is not None
     assert read.y_events[0].tolist() == found.y_events[0].tolist()  # type: ignore[index]
     again = solve(read.scene, [4.0, 2.0], attitude=True)

@@ -199,6 +199,19 @@ def test_events_return(tmp_path: Path) -> None:
     assert [each.tolist() for each in found.y_events] == [[[1.0] * 7] * 2]
 
 
+@pytest.mark.parametrize("times", [[-10.0, 10.0], [-10.0, -5.0, 5.0, 10.0]])
+@pytest.mark.parametrize("ends", [[1.0], [1.0, -1.2]])
+def test_events_of_few_rows_return(times: list[float], ends: list[float], tmp_path: Path) -> None:
+    """Terminal events leave no row, one row, or rows before time 0 alone."""
+    events: list[Any] = [flip(2)]
+    for end in ends:
+        events.append(lambda t, omega, end=end: t - end)
+        events[-1].terminal = True
+    found = solve(Scene("top", (0.1, 2, 0.1), moments=(1, 2, 3)), times, events=events)
+    found.save(tmp_path / "found.npz")
+    check_same(load(tmp_path / "found.npz"), found)
+
+
 @pytest.mark.campaign
 def test_attitudes_and_numbers_of_scenes_return() -> None:
     """Draw scenes whose numbers have all digits; quaternions are not rounded again."""

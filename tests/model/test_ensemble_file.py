@@ -26,6 +26,7 @@ def ensembles() -> dict[str, Ensemble]:
         "times": solve_many(SCENE, times=[1.0, 2.0, 5.0], omega=STARTS, estimates=True),
         "events": solve_many(SCENE, 9.0, omega=STARTS[:3], events=[crossing, lambda t, y: y[1]]),
         "sensitivities": solve_many(SCENE, 1.0, omega=STARTS[:2], sensitivities=["moments"]),
+        "both": solve_many(SCENE, times=[1.0, 2.0], omega=STARTS[:2], sensitivities=["moments"]),
         "omega alone": solve_many(Scene(omega=(1, 2, 3), moments=(3, 2, 1)), 2.0, omega=STARTS),
     }
 
@@ -42,7 +43,9 @@ def same(first: Any, second: Any) -> bool:
     return bool(first == second)
 
 
-@pytest.mark.parametrize("name", ["final", "times", "events", "sensitivities", "omega alone"])
+@pytest.mark.parametrize(
+    "name", ["final", "times", "events", "sensitivities", "both", "omega alone"]
+)
 def test_files_restore_every_bit(name: str, tmp_path: Path) -> None:
     found = ensembles()[name]
     found.save(tmp_path / "bodies")

@@ -128,9 +128,18 @@ def test_torque_in_space_may_be_that_of_an_axis_alone(tmp_path: Path) -> None:
         assert rows.attitude is not None
         assert np.abs(found["attitude"][i] - rows.attitude[-1]).max() < 1e-11
         assert np.abs(found["end"][i] - rows.omega[-1]).max() < 1e-11
+    program = text(axes, top="", scene=scene + "[solve]\nprogram = 'two-term'\n")
     with pytest.raises(InputError, match="about the axes of space"):
-        program = scene + "[solve]\nprogram = 'two-term'\n"
-        _found(tmp_path, text(axes, top="", scene=program))
+        _found(tmp_path, program)
+
+
+def test_component_that_begins_at_zero_has_no_flip(tmp_path: Path) -> None:
+    """Two motions are mirror images, and omega 2 leaves 0 in opposite directions."""
+    scene = BASE.replace("[0.0, 1.0, 0.0]", "[1.0, 0.0, 1.0]").replace("100", "10")
+    top = 'reductions = ["flips", "flip-time"]'
+    _, found = _found(tmp_path, text(axis("omega.1", [-1.0, 1.0, 0.0]), top=top, scene=scene))
+    assert found["flips"].tolist() == [0, 0, 0]
+    assert np.isfinite(found["flip-time"]).tolist() == [True, True, False]
 
 
 def test_scenes_without_solution_have_no_count(tmp_path: Path) -> None:
@@ -259,7 +268,8 @@ def test_every_reduction_has_words_for_people() -> None:
 
 def test_error_is_relative_to_the_largest_component_up_to_there(tmp_path: Path) -> None:
     """A torque makes omega much larger than its initial value, which would be no scale."""
-    scene = _COARSE.replace("[0.0, 1.0, 0.0]", "[0.0, 1e-3, 0.0]").replace(
+    coarse = _COARSE.partition("[solve]")[0]
+    scene = coarse.replace("[0.0, 1.0, 0.0]", "[0.0, 1e-3, 0.0]").replace(
         "[scene.run]", "[scene.torque]\nconstant = [0.1, -0.2, 0.3]\n[scene.run]"
     )
     top = 'reductions = ["end", {name = "error", samples = 4, as = "on-the-way"}]'

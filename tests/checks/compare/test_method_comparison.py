@@ -120,3 +120,14 @@ def test_verb_compares_methods(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     assert main(shlex.split(f"{command} --format json --out {out}")) == 0
     methods = json.loads(out.read_text())["methods"]
     assert [each["method"] for each in methods] == ["auto", "dop853"]
+
+
+def test_methods_without_rows_are_not_as_expected() -> None:
+    """No method solves the first scene, and both end early in the second, as the reference does."""
+    found = compare_methods(case_scene(5), ["closed-form"])
+    assert (found.unexpected, found.is_complete) == (("no method has a result",), False)
+    fast = Scene(
+        "fast", (1, 0.1, 1), moments=(1, 2, 3), step_size=0.3, steps=10,
+        torque=lambda t, w: [w[0] ** 2, 0, 0],
+    )  # fmt: skip
+    assert not compare_methods(fast, ["auto"]).is_complete

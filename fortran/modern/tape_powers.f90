@@ -5,7 +5,6 @@ module tape_powers
   !! the product stays invisible. The mean order of a product is the sum of those of its factors.
   use kinds, only: dp
   use operations, only: LINEAR, PRODUCT, QUOTIENT, SELECT_OF => SELECT, SQUARE_ROOT => SQRT, TABLE
-  use storage, only: PERTURBATION_LENGTH
   use tape, only: tape_t
   implicit none(type, external)
   private
@@ -16,7 +15,7 @@ module tape_powers
   real(dp), parameter :: LEAST_NUMBER = 1e-300_dp ! whose logarithm is computed
 
   integer, parameter :: NONE = 0, SEVERAL = huge(1) ! divisors
-  integer, parameter :: TOGETHER = 8 ! sums that do not wait for each other
+  integer, parameter :: TOGETHER = 8 ! slots whose terms are summed
 
   ! What is below exp(-INVISIBLE), relative to the unknowns or to a divisor, changes no digit of a
   ! result, unless its factor is huge.
@@ -209,7 +208,10 @@ contains
     if (powers%order == 0) return
     has_least = .false.
     do while (factor > 0.0_dp)
-      call show(a(:order - 1, :), factor, powers%alone(:powers%n_alone), powers%shown)
+      do n = 1, powers%n_alone, TOGETHER
+        call show(a(:order - 1, :), factor, &
+                  powers%alone(n:min(n + TOGETHER - 1, powers%n_alone)), powers%shown)
+      end do
       if (.not. has_least) then
         ! Where all means are small enough, it does not matter which products are visible.
         powers%least = -huge(0.0_dp)
@@ -275,39 +277,28 @@ contains
   end subroutine resolve
 
   pure subroutine show(terms, factor, slots, shown)
-    !! Compute the sums of the absolute terms of some slots, and their mean orders.
+    !! Compute the sums of the absolute terms of some slots, and their mean orders. No addition
+    !! waits for that of another slot.
     real(dp), intent(in) :: terms(0:, :)
     real(dp), intent(in) :: factor        !! on the step
-    integer, intent(in) :: slots(:)
+    integer, intent(in) :: slots(:)       !! at most TOGETHER
     real(dp), intent(inout) :: shown(:, :)
-    real(dp) :: powers(0:PERTURBATION_LENGTH), total(0:TOGETHER - 1), weighted(0:TOGETHER - 1), part
-    integer :: i, k, n, order
+    real(dp) :: total(TOGETHER), weighted(TOGETHER)
+    integer :: each(TOGETHER), i, k
 
-    order = ubound(terms, 1)
-    powers(0) = 1.0_dp
-    powers(1) = factor
-    do k = 2, TOGETHER
-      powers(k) = powers(k/2)*powers(k - k/2)
+    do i = 1, TOGETHER
+      each(i) = slots(min(i, size(slots)))
     end do
-    do k = TOGETHER + 1, order
-      powers(k) = powers(k - TOGETHER)*powers(TOGETHER)
+    total = 0.0_dp
+    weighted = 0.0_dp
+    do k = ubound(terms, 1), 0, -1
+      do i = 1, TOGETHER
+        weighted(i) = factor*weighted(i) + total(i)
+        total(i) = factor*total(i) + abs(terms(k, each(i)))
+      end do
     end do
-    do n = 1, size(slots)
-      total = 0.0_dp
-      weighted = 0.0_dp
-      do k = 0, order - TOGETHER + 1, TOGETHER
-        do i = 0, TOGETHER - 1
-          part = powers(k + i)*abs(terms(k + i, slots(n)))
-          total(i) = total(i) + part
-          weighted(i) = weighted(i) + (k + i)*part
-        end do
-      end do
-      do k = k, order
-        part = powers(k)*abs(terms(k, slots(n)))
-        total(0) = total(0) + part
-        weighted(0) = weighted(0) + k*part
-      end do
-      shown(:, slots(n)) = [sum(total), sum(weighted)/max(LEAST_NUMBER, sum(total))]
+    do i = 1, size(slots)
+      shown(:, slots(i)) = [total(i), factor*weighted(i)/max(LEAST_NUMBER, total(i))]
     end do
   end subroutine show
 

@@ -15,7 +15,7 @@ module tape_powers
   real(dp), parameter :: LEAST_NUMBER = 1e-300_dp ! whose logarithm is computed
 
   integer, parameter :: NONE = 0, SEVERAL = huge(1) ! divisors
-  integer, parameter :: TOGETHER = 8 ! slots whose terms are summed
+  integer, parameter :: TOGETHER = 4 ! slots whose terms are summed
 
   ! What is below exp(-INVISIBLE), relative to the unknowns or to a divisor, changes no digit of a
   ! result, unless its factor is huge.

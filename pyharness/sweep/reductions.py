@@ -26,7 +26,7 @@ RANKS = ("least", "middle", "largest")
 
 @dataclass(frozen=True)
 class Reduction:
-    """A quantity that a sweep can store for each scene, and its computation.
+    """A quantity for each scene, and its computation.
 
     `compute` takes a batch of n scenes and the parameters. It returns n values, or n rows with a
     value for each of `labels`; `dimension` names this dimension in the store. `only` is `program`

@@ -63,7 +63,7 @@ class Sweep:
 
     @property
     def n_scenes(self) -> int:
-        """Return the number of scenes of the whole grid."""
+        """Return the number of scenes."""
         return math.prod(self.shape)
 
     @property
@@ -90,7 +90,7 @@ class Sweep:
 
     @property
     def n_chunks(self) -> int:
-        """Return the number of chunks of the whole grid."""
+        """Return the number of chunks."""
         return math.prod(self.chunk_counts)
 
     def position_of(self, chunk: int) -> tuple[int, ...]:

@@ -108,8 +108,8 @@ class Comparison:
 
     @property
     def is_complete(self) -> bool:
-        """Return whether every method has all rows."""
-        found = [each.trajectory for each in self.methods]
+        """Return whether every method has all rows, if there are no programs."""
+        found = [] if self.programs else [each.trajectory for each in self.methods]
         return all(each is not None and each.has_all_rows for each in found)
 
     @property

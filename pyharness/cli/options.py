@@ -61,11 +61,10 @@ _EFFORT = (
 EFFORT = {"--effort F": _EFFORT.format(" (30 for a program of the thesis)")}
 EFFORT_WITHOUT_PROGRAMS = {"--effort F": _EFFORT.format("")}
 STRICT = {
-    "--strict": "Exit with status 1 also if a method ends early, or amplified rounding errors may "
-    "exceed the tolerance. "
-    "In any case, the status is 1 if the Fortran and the Python version of a program differ, a "
-    "corrected program misses its order of convergence, or a method of --method misses its "
-    "tolerance or ends early."
+    "--strict": "Exit with status 1 also if amplified rounding errors may exceed the tolerance, or "
+    "a method of --method lacks rows. In any case, the status is 1 if the Fortran and the Python "
+    "version of a program differ, a corrected program misses its order of convergence, or a method "
+    "of --method misses its tolerance or ends before the reference."
 }
 ALSO = {
     "--also FILE,...": "Write the result to these files too, each in the format of its ending: "

@@ -48,7 +48,7 @@ class Reduction:
 
     @property
     def fill(self) -> Any:
-        """Return the value of scenes not computed yet: NaN, or -1 in an integer array."""
+        """Return the value of scenes without one: NaN, or -1 in an integer array."""
         return np.nan if self.dtype == "f8" else -1
 
 

@@ -66,7 +66,7 @@ def summary(store: Store, asked: ReductionSpec) -> tuple[list[Found], Counter[in
             codes, counts = np.unique(values, return_counts=True)
             flags.update(dict(zip(codes.tolist(), counts.tolist(), strict=True)))
             continue
-        finite = np.isfinite(values)
+        finite = np.isfinite(values) & (values != reduction.fill)
         count += finite.sum(axis=0)
         none += (~finite).sum(axis=0)
         total += np.where(finite, values, 0.0).sum(axis=0)
@@ -222,7 +222,8 @@ def _panels(
         for number, label in labels[: max(1, room)]:
             index: list[Any] = [at.get(d, slice(None)) for d in store.sweep.dimensions]
             index += [] if number is None else [number]
-            values = np.asarray(store.array(asked.name)[tuple(index)], dtype=np.float64)
+            stored = np.asarray(store.array(asked.name)[tuple(index)])
+            values = np.where(stored == REDUCTIONS[asked.reduction].fill, np.nan, stored)
             told = [_label_of(axis_of[d], i) for d, i in at.items()] + ([label] if label else [])
             found.append((", ".join(told), values[np.ix_(*places.values())]))
     return found

@@ -17,6 +17,8 @@ from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import STOP_VARIABLES
 from pyharness.sweep.batches import batches, listing_of, solve_chunk
 from pyharness.sweep.reductions import REDUCTIONS
+from pyharness.sweep.report import summary, sweep_picture
+from pyharness.sweep.run import swept
 from pyharness.sweep.sweep import Sweep, points
 from pyharness.sweep.sweep_file import read_sweep
 from tests.sweep.claims import CLAIMS
@@ -133,6 +135,13 @@ def test_torque_in_space_may_be_that_of_an_axis_alone(tmp_path: Path) -> None:
         _found(tmp_path, program)
 
 
+def test_step_that_overflows_is_refused_silently(tmp_path: Path) -> None:
+    solver = "[solve]\nprogram = 'two-term'\n"
+    steps = axis("step_size", [0.1, 1e308])
+    _, found = _found(tmp_path, text(steps, top='reductions = ["status"]', scene=BASE + solver))
+    assert found["status"][1] != Statuses.COMPLETE
+
+
 def test_component_that_begins_at_zero_has_no_flip(tmp_path: Path) -> None:
     """Two motions are mirror images, and omega 2 leaves 0 in opposite directions."""
     scene = BASE.replace("[0.0, 1.0, 0.0]", "[1.0, 0.0, 1.0]").replace("100", "10")
@@ -144,10 +153,30 @@ def test_component_that_begins_at_zero_has_no_flip(tmp_path: Path) -> None:
 
 def test_scenes_without_solution_have_no_count(tmp_path: Path) -> None:
     top = 'reductions = ["flips", "axis-flips", "status"]'
-    _, found = _found(tmp_path, text(axis("omega.1", [1.0, 1e200]), top=top))
+    sweep, found = _found(tmp_path, text(axis("omega.1", [1.0, 1e200]), top=top))
     assert (found["status"] == [Statuses.COMPLETE, Statuses.GAVE_UP]).all()
-    for name in ("flips", "axis-flips"):
-        assert (found[name] >= 0).tolist() == [True, False]
+    with swept(sweep, str(tmp_path / "store")) as (store, _):
+        for asked in sweep.reductions[:2]:
+            assert (found[asked.name] >= 0).tolist() == [True, False]
+            ((_, _, n, none, least, *_),), _ = summary(store, asked)
+            assert (n, none, least) == (1, 1, found[asked.name][0])
+            values = [row[-1] for row in sweep_picture(store, asked).numbers.rows]
+            assert np.isfinite(values).tolist() == [True, False]
+
+
+def test_map_of_values_in_any_order_is_that_of_ascending_values(tmp_path: Path) -> None:
+    one, two = [3.0, 1.0, 2.0], [0.5, 4.0, 0.1]
+    drawn: list[Any] = []
+    mesh: Any
+    for name, given in (("any", (one, two)), ("ascending", (sorted(one), sorted(two)))):
+        axes = axis("omega.1", given[0]) + axis("omega.2", given[1])
+        folder = tmp_path / name
+        folder.mkdir()
+        sweep, _ = _found(folder, text(axes, top='reductions = ["flip-time"]'))
+        with swept(sweep, str(folder / "store")) as (store, _):
+            (mesh,) = sweep_picture(store, sweep.reductions[0]).figure.axes[0].collections
+        drawn.append((mesh.get_array().tolist(), mesh.get_coordinates().tolist()))
+    assert drawn[0] == drawn[1]
 
 
 @pytest.mark.campaign

@@ -22,6 +22,7 @@ from pyharness.model.extension import ENDS
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
 from pyharness.thesis.many import ProgramEnsemble, run_many
 
@@ -187,7 +188,8 @@ class Batch:
     def _needs_attitude(self) -> bool:
         torque = self.scene.torque
         # A torque in space may be 0 in `scene`, and another in `arrays`.
-        return torque.needs_attitude or getattr(torque, "frame", "") == "space"
+        in_space = isinstance(torque, TorqueLaw) and torque.frame == "space"
+        return in_space or torque.needs_attitude
 
     @cached_property
     def _shared(self) -> Scene:

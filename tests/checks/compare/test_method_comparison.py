@@ -122,12 +122,18 @@ def test_verb_compares_methods(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     assert [each["method"] for each in methods] == ["auto", "dop853"]
 
 
-def test_methods_without_rows_are_not_as_expected() -> None:
-    """No method solves the first scene, and both end early in the second, as the reference does."""
+@pytest.mark.campaign
+def test_methods_without_rows_are_not_as_expected(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """No method solves the first scene; in the second, method and reference end early."""
     found = compare_methods(case_scene(5), ["closed-form"])
     assert (found.unexpected, found.is_complete) == (("no method has a result",), False)
-    fast = Scene(
-        "fast", (1, 0.1, 1), moments=(1, 2, 3), step_size=0.3, steps=10,
-        torque=lambda t, w: [w[0] ** 2, 0, 0],
-    )  # fmt: skip
-    assert not compare_methods(fast, ["auto"]).is_complete
+    path = tmp_path / "fast.toml"
+    path.write_text(
+        "body.moments = [1, 2, 3]\ninitial.omega = [1, 0.1, 1]\n"
+        "torque.expression = ['w1*w1', '0', '0']\nrun = {step_size = 0.3, steps = 10}\n"
+    )
+    command = ["compare", "--scene", str(path), "--method", "auto"]
+    assert (main(command), main([*command, "--strict"])) == (0, 1)
+    assert "as expected" not in capsys.readouterr().out

@@ -140,10 +140,10 @@ def _ends(found: "Trajectory") -> tuple[float, float]:
         # If the rows are all before 0, the motion runs backward from 0.
         ends = [found.sol.t_min, found.sol.t_max][:: -1 if ends[1] < 0.0 else 1]
     if ends[0] == ends[1]:
-        raise InputError(
-            f"animate: the trajectory ({found.ended}) is at one time only; give two or more times "
-            "that it reaches, or dense_output=True"
-        )
+        one = f"animate: the trajectory ({found.ended}) is at one time only"
+        if found.sol is None:
+            raise InputError(f"{one}; give two or more times that it reaches, or dense_output=True")
+        raise InputError(f"{one}; give times other than 0 that it reaches")
     return ends[0], ends[1]
 
 

@@ -44,6 +44,10 @@ def comparison_report(comparison: Comparison, numerics: bool = False) -> Report:
     scene = heading(comparison.scene, [each.listing for each in comparison.programs])
     truth, bound = comparison.reference, comparison.bound
     reference = [f"reference: {truth.source}, error of any w at most {bound.text()}"]
+    rows, due = len(truth.time), len(comparison.scene.times())
+    if rows < due:
+        reference = [f"reference: {truth.source}; only {rows} of {due} rows have a finite omega"]
+        reference += [f"error of any w at most {bound.text()}"] if rows else []
     reference += [f"WARNING: {bound.warning}"] if bound.warning else []
     legend = _PROGRAMS_LEGEND if has_programs else _METHODS_LEGEND
     motion = []
@@ -72,7 +76,13 @@ def comparison_report(comparison: Comparison, numerics: bool = False) -> Report:
         short_runs = [f"{x} ended at step {n} of {steps}: {end}" for x, n in ended if n < steps]
         tables.append([_programs(comparison, numerics), *short_runs])
     if numerics:
-        tables.append([_methods(comparison)])
+        runs = [(x.method, x.trajectory) for x in comparison.methods if x.trajectory]
+        endings = [
+            f"{name} ended after {len(run.time)} of {due} rows: {run.ended}"
+            for name, run in runs
+            if not run.has_all_rows
+        ]
+        tables.append([_methods(comparison), *endings])
     last = [*(failures if numerics else [_MORE]), *told]
     return Report(
         "compare",

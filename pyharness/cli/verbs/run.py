@@ -43,7 +43,7 @@ OPTIONS = {
     "decreasing order (default: the ends of the scene's steps); not with --program.",
     "--attitude [FORM]": "Compute the attitude (orientation) of the body, even if the scene has "
     f"none. FORM is {', '.join(FORMS)} (default {FORMS[0]}); 3-1-3 and 3-2-1 are Euler angles "
-    "about these axes.",
+    "about these axes. JSON always has quaternions.",
     "--animate FILE": "Write an animation of the rotating body to this file (.gif or .html). It "
     "needs --attitude or a scene with an attitude; not with --program.",
     "--tolerance E": "Largest allowed error of omega, relative to its largest component (default: "

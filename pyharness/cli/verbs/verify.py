@@ -105,6 +105,8 @@ def run(options: argparse.Namespace) -> int:
         checks.append(check)
         shared.progress(kinds.index(check.suite), len(kinds), check.id)
     if not checks:
+        if kinds == ["random"] and not chosen.draws:
+            raise InputError("--draws 0 leaves no random scene to check; allowed: 1 or more")
         if chosen.may_ask("decks") and compiler() is None:
             raise InputError(
                 "the check needs gfortran to compile decks; install it, or put it on the PATH"
@@ -114,8 +116,7 @@ def run(options: argparse.Namespace) -> int:
                 "there are no stored trajectories (golden) here; give --record DIR, or run in a "
                 "source checkout"
             )
-        asked = f"--only {options.only}" if options.only else "--draws 0"
-        raise InputError(f"{asked}: there is no such check; allowed: {', '.join(KINDS)}")
+        raise InputError(f"--only {options.only}: there is no such check; allowed: {', '.join(KINDS)}")
     drawn = samples(checks, ROUNDING) if options.draws is not None else []
     more = [*drawn, *references(checks)]
     text = summary([*_title(chosen), *_unjudged(chosen, checks)], checks, more=more)

@@ -5,7 +5,7 @@ module many_tape
   use kinds, only: dp
   use levels, only: tape_bodies
   use places, only: TOLERANCE, WAVES
-  use tape, only: arrays_of, tape_bodies_t, tape_of, tape_t
+  use tape, only: arrays_of, COARSEST, tape_bodies_t, tape_of, tape_t
   implicit none(type, external)
   private
 
@@ -33,7 +33,7 @@ contains
     bodies%table_starts = c_loc(equations%table_starts)
     bodies%breaks = c_loc(equations%breaks)
     bodies%pieces = c_loc(equations%pieces)
-    bodies%tolerance = packed(TOLERANCE)
+    bodies%tolerance = min(packed(TOLERANCE), COARSEST)
     bodies%n_slots = equations%n_slots
     bodies%n_tables = size(equations%table_starts) - 1
     bodies%n = many%n

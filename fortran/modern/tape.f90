@@ -9,6 +9,8 @@ module tape
   integer, parameter, public :: TIME_SLOT = 1
   integer, parameter, public :: FIRST_UNKNOWN = 2
   integer, parameter, public :: N_INPUTS = 8 !! time, omega and attitude
+  ! A coarser tolerance saves no time, because integrations are repeated more often.
+  real(dp), parameter, public :: COARSEST = 1e-3_dp
 
   type, public :: tape_t
     integer :: n_unknowns                            !! 3, or 7 with attitude; plus own states

@@ -6,7 +6,7 @@ module tape_solve
   use kinds, only: dp
   use problem, only: request_t, solution_t
   use statuses, only: COMPLETE, GAVE_UP, SENSITIVE, SLIDING
-  use tape, only: FIRST_UNKNOWN, tape_t
+  use tape, only: COARSEST, FIRST_UNKNOWN, tape_t
   use tape_march, only: attempt_t, march, outcome_t
   use tape_series, only: allocate_series, series_t, SIDE_BY_SIDE
   use tape_switches, only: find_switches, switches_t
@@ -82,7 +82,7 @@ contains
     cost = max(1.0_dp, tape%n_slots/CHEAP_SLOTS)
     most = min(4e18_dp, request%effort*(MOST_STEPS/cost))
     attempt%stride = 1 + int(STEPS_BETWEEN_LOOKS/cost, int64)
-    attempt%tolerance = request%tolerance
+    attempt%tolerance = min(request%tolerance, COARSEST)
     spent = 0.0_dp
     planned = PLANNED_GROWTH
     do

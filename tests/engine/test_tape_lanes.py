@@ -47,6 +47,7 @@ def test_most_bodies_of_a_batch_are_solved_side_by_side() -> None:
     orbit = torques.gravity_gradient(MOMENTS, 0.5)
     turning = Scene("", (1.0, 0.0, 0.0), moments=MOMENTS, torque=orbit, attitude=(1, 0, 0, 0))
     assert len(lanes(turning, starts, 5.0, turns)[1]) <= 10
+    assert len(lanes(turning, starts, 5.0, turns, 0.1)[1]) <= 10
 
 
 SPACE_LAWS = {

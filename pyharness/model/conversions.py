@@ -181,8 +181,8 @@ class Conversions:
     def work(self) -> Array:
         """Return the work of the torque on the body from time 0 to each row.
 
-        The work equals the change of the kinetic energy. It is computed as (omega - omega0) .
-        I (omega + omega0)/2, with the inertia I and the initial omega0; this form loses no digits
+        The work, equal to the change of the kinetic energy, is computed as (omega - omega0) . I
+        (omega + omega0)/2, with the inertia I and the initial omega0. This form loses no digits
         where omega has changed little. Its error is the error of omega times the angular momentum.
         The work of the motors of `pyharness.torques.wheels` on the wheels is not included.
 
@@ -328,7 +328,7 @@ class Conversions:
         Parameters
         ----------
         ax : matplotlib.axes.Axes, optional
-            The diagram in which to draw. The default is a new one.
+            The diagram; by default a new one.
 
         Returns
         -------
@@ -371,8 +371,8 @@ class Conversions:
         Parameters
         ----------
         path : str or path
-            The path of the file, which ends in ``.gif`` or ``.html`` (a page with buttons and a
-            slider). An existing file is replaced.
+            A path that ends in ``.gif`` or ``.html`` (a page with buttons and a slider). An
+            existing file is replaced.
 
         Raises
         ------
@@ -395,15 +395,14 @@ class Conversions:
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the trajectory with its scene to a file, from which `pyharness.load` restores it.
 
-        The restored numbers are bit-for-bit the same. The format is that of `numpy.savez`, with an
-        array for each attribute that is an array. The array `scene` is the text of a scene file;
-        `header`, in JSON, has the other attributes and the operations of a recorded torque.
+        Numbers are restored bit for bit. The format is that of `numpy.savez`, with an array for
+        each attribute that is an array. The array `scene` is the text of a scene file; `header`, in
+        JSON, has the other attributes and the operations of a recorded torque.
 
         Parameters
         ----------
         path : str or path
-            The path of the file; a new one without an ending gets ``.npz``. An existing file is
-            replaced.
+            A new file without an ending gets ``.npz``. An existing file is replaced.
 
         Raises
         ------

@@ -44,10 +44,10 @@ class Ensemble(BatchResult):
     refusals : dict of str, or None
         The reasons for missing events and sensitivities, by index of the body.
     own, names : ndarray, shape (n, k), or None, and tuple of str
-        The values and names of the scene's own states, the unknowns that `Scene.states` adds.
+        The values and names of the scene's own states (`Scene.states`).
     times : ndarray, shape (m,), or None
-        The times (s) of the results of all bodies. All arrays then have an axis of length m after
-        the first axis: for example, `omega` has the shape (n, m, 3).
+        The times (s) of all bodies' results. Each array of results then has a second axis of length
+        m; `omega` has the shape (n, m, 3).
     leaves : str or None
         Whether the series of a recorded torque were ``compiled`` for bodies side by side, or
         computed by an ``interpreter``, with the reason if `compiled` was requested.
@@ -110,7 +110,7 @@ class Ensemble(BatchResult):
         Returns
         -------
         ndarray, shape (n, 3) or (n, m, 3)
-            The angular momenta, kg m2/s, in the shape of `omega`.
+            The angular momenta, kg m2/s.
 
         Raises
         ------
@@ -188,7 +188,6 @@ class Ensemble(BatchResult):
         return frame
 
     def _columns(self) -> list[tuple[str, tuple[str, ...], Array]]:
-        """Return unit, names of columns, and values of each attribute that is not None."""
         given = (
             ("rad/s", ("omega1", "omega2", "omega3"), self.omega),
             ("1", ("q0", "q1", "q2", "q3"), self.attitude),
@@ -241,7 +240,7 @@ class Ensemble(BatchResult):
         Parameters
         ----------
         ax : matplotlib.axes.Axes, optional
-            The diagram in which to draw. The default is a new one.
+            The diagram; by default a new one.
 
         Returns
         -------
@@ -282,8 +281,7 @@ class Ensemble(BatchResult):
         Parameters
         ----------
         path : str or path
-            The path of the file; a new one without an ending gets ``.npz``. An existing file is
-            replaced.
+            A new file without an ending gets ``.npz``. An existing file is replaced.
 
         Raises
         ------

@@ -1,9 +1,4 @@
-"""Listings: programs of the thesis with a choice of their defects, readings and conjectures.
-
-A card is one line of a program. A defect is a mistake of the printed program, active if not
-corrected. A reading is an interpretation of a doubtful card that differs from ours. A conjecture is
-an assumption about a statement for which no card exists.
-"""
+"""Listings: programs of the thesis with a choice of their defects, readings and conjectures."""
 
 from collections.abc import Iterable, Set
 from dataclasses import dataclass
@@ -29,11 +24,11 @@ class Listing:
     defects : frozenset of str
         The active defects: mistakes of the printed program that are not corrected.
     readings : frozenset of str
-        The active readings: interpretations of doubtful statements, other than the one that we
-        adopt. None changes a corrected program.
+        The active readings: interpretations of doubtful cards, other than the one that we adopt.
+        None changes a corrected program.
     conjectures : frozenset of str
-        The active assumptions about missing statements. The argument `defects` also accepts the
-        names of conjectures and readings.
+        The active assumptions about statements for which no card exists. The argument `defects`
+        also accepts the names of conjectures and readings.
 
     Raises
     ------
@@ -67,7 +62,7 @@ class Listing:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        """Assign the names to their kinds; raise InputError for an unknown program or name."""
+        """Assign the names to their kinds, and check them."""
         _check_program(self.program)
         given = {field: _names(field, getattr(self, field)) for field in _FIELDS.values()}
         for kind in ("reading", "conjecture"):
@@ -154,23 +149,21 @@ def subset(
 ) -> Listing:
     """Return a Listing: a program with a selection of its defects, readings and conjectures.
 
-    `Listing` explains the three kinds; the parameters are also options of the command line.
+    `Listing` explains the three kinds.
 
     Parameters
     ----------
     program : {"two-term", "four-term", "runge-kutta"}
         The name of the program.
     base : {"original", "corrected"}, optional
-        The listing to start from. The default is `corrected` if only `keep` has names, else
-        `original`.
+        The listing to start from. The default is `corrected` if `keep` has names and `fix` has
+        none, else `original`. In a corrected base only `keep` activates a reading or conjecture.
     fix, keep : iterable of str
-        Names of defects, readings and conjectures: `fix` corrects them, `keep` leaves them active.
+        Names of any kind: `fix` corrects them, `keep` leaves them active.
     readings : iterable of str
-        The readings to activate. In a corrected base only `keep` activates a reading, because a
-        corrected statement is the same under every reading.
+        The readings to activate.
     conjectures : iterable of str, optional
-        The conjectures to activate, or ``none``; by default those of `Listing.original`. In a
-        corrected base only `keep` activates a conjecture.
+        The conjectures to activate, or ``none``; by default those of `Listing.original`.
 
     Returns
     -------

@@ -89,19 +89,18 @@ class ImpossibleBodyWarning(UserWarning):
 class Scene:
     """A problem to solve: a body, its torque and its initial conditions.
 
-    Exactly one of `moments`, `coefficients` and `inertia` is required. Three numbers may be a list,
-    a tuple or an array; the fields are tuples of floats.
+    Exactly one of `moments`, `coefficients`, `inertia` and `changing` is required. Three numbers
+    may be a list, a tuple or an array; the fields are tuples of floats.
 
     Parameters
     ----------
     name : str, optional
-        A title, "body" by default; shortened to one line of 60 printable characters.
+        A title, shortened to one line of 60 printable characters.
     omega : three numbers
         The angular velocity about the body axes at time 0 (rad/s).
     moments : three numbers, ChangingMoments, or function of t, optional
         The principal moments of inertia (kg m2). A function of the time t (s) must be continuous;
-        `inertia_table` makes moments from a table. If the moments change with time, the attribute
-        `changing` has them, and `moments` is None.
+        `inertia_table` makes moments from a table.
     coefficients : three numbers, optional
         The dimensionless coefficients A, B, C of Euler's equations (13-15 of the thesis).
     torque : TorqueLaw, three numbers, StateTorque, or function of (t, omega[, attitude])
@@ -112,10 +111,10 @@ class Scene:
     attitude : four numbers or scipy.spatial.transform.Rotation, optional
         The quaternion from body to space at time 0, scalar first. It is normalised.
     inertia : three rows of three numbers, ChangingInertia, or function of t, optional
-        A symmetric inertia matrix about the body axes (kg m2). If it changes with time, the
-        attribute `changing` has it, and `inertia` is None.
+        A symmetric inertia matrix about the body axes (kg m2).
     changing : ChangingMoments, ChangingInertia, or a recorded function, optional
-        An inertia that changes with time.
+        An inertia that changes with time; the field `moments` or `inertia` from which it comes is
+        None.
     states : dict of str to float, or to pair of floats, optional
         Own states: at most eight unknowns beside omega and attitude, in any unit. The dict has each
         name with its value at time 0, or with a pair of this value and a scale. The torque is then
@@ -186,7 +185,7 @@ class Scene:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        """Check the fields, or raise InputError."""
+        """Check the fields."""
         if not isinstance(self.name, str):
             raise InputError(
                 f"name is {kind_of(self.name)}; allowed: text, or no name with omega=, moments="
@@ -246,7 +245,7 @@ class Scene:
         _warn_of_impossible(self)
 
     def __repr__(self) -> str:
-        """Return the fields as the arguments of a call."""
+        """Return a call with the fields that differ from the defaults."""
         shown = {each.name: getattr(self, each.name) for each in fields(self) if each.repr}
         usual = {each.name: each.default for each in fields(self)}
         usual |= {x.name: x.default_factory() for x in fields(self) if callable(x.default_factory)}
@@ -285,7 +284,7 @@ class Scene:
 
     @property
     def has_attitude(self) -> bool:
-        """Whether the attitude is computed by default: the scene has it, or the torque needs it."""
+        """Whether the attitude is computed by default."""
         return self.attitude is not None or self.torque.needs_attitude
 
     @property

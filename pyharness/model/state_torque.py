@@ -32,8 +32,8 @@ _WITH_STATES = (
 class StateTorque:
     """A torque about the body axes that depends on time, omega and attitude.
 
-    It is in N m for a body with moments or inertia; for a body with coefficients it is torque over
-    moment, in rad/s2. A scene converts a function to a StateTorque, or to an equal TorqueLaw.
+    Its unit is N m; for a body with coefficients, it is torque over moment in rad/s2. A scene
+    converts a function to a StateTorque, or to an equal TorqueLaw.
 
     Attributes
     ----------
@@ -44,8 +44,8 @@ class StateTorque:
     needs_attitude : bool
         Whether the torque depends on the attitude.
     expression, constants : tuple
-        If the torque was recorded from a scene file: its three expressions, and pairs of name and
-        value of their constants; else empty.
+        For a torque from a scene file: its three expressions, followed by one for the rate of each
+        own state, and pairs of name and value of their constants; else empty.
     terms : tuple
         The other summands that a scene file has: at most one `TorqueLaw`, and ready terms. A ready
         term is a torque of `pyharness.torques`, as pairs of key and value.
@@ -54,8 +54,8 @@ class StateTorque:
     varied : Tape or None
         The recorded operations, with `parameters` as further inputs.
     own : tuple of str
-        The names of the scene's own states, the unknowns that `Scene.states` adds. Their values are
-        further inputs of the tape, and their time derivatives further outputs.
+        The names of the scene's own states (`Scene.states`). Their values are further inputs of the
+        tape, and their time derivatives further outputs.
     starts : tuple of OwnState
         Own states that a scene with this torque gets if it defines none.
     parts : tuple
@@ -189,8 +189,7 @@ def turned_law(law: TorqueLaw, time: Symbol, attitude: Any) -> Array:
 def recorded(function: Function, states: Sequence[str] = ()) -> StateTorque:
     """Return the torque that a user's function computes, recorded with symbols.
 
-    Use it for a function that is one of several summands. A function that is the only torque of a
-    scene can be passed to `Scene` directly.
+    Use it for one of several summands; a scene's only torque can be passed to `Scene` directly.
 
     Parameters
     ----------
@@ -198,9 +197,9 @@ def recorded(function: Function, states: Sequence[str] = ()) -> StateTorque:
         A function of (t, omega) or (t, omega, attitude) that returns the torque about the body axes
         (N m). Keyword arguments with numbers as defaults are parameters for sensitivities.
     states : sequence of str
-        The names of the scene's own states, the unknowns that `Scene.states` adds. If there are
-        any, the function has a further argument, the dict of their values. It then returns the
-        torque and a dict of their time derivatives.
+        The names of the scene's own states (`Scene.states`). With states, the function has a
+        further argument, the dict of their values, and returns the torque and a dict of their time
+        derivatives.
 
     Returns
     -------
@@ -240,7 +239,6 @@ def recorded(function: Function, states: Sequence[str] = ()) -> StateTorque:
 
 
 def _with_states(function: Function, names: tuple[str, ...]) -> StateTorque:
-    """Return a torque recorded from a function that also returns the rates of own states."""
     takes_attitude = count_arguments(function, "[torque]", _WITH_STATES) == 4
 
     def called(time: Symbol, omega: Any, attitude: Any, *states: Symbol) -> list[Any]:

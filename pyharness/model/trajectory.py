@@ -125,25 +125,24 @@ class Trajectory(Conversions):
     attitude : ndarray, shape (n, 4), or None
         Quaternions from body to space, scalar first, with continuous signs.
     own : ndarray, shape (n, k), or None
-        The scene's own states: the unknowns that `Scene.states` adds, in this order.
+        The own states, in the order of `Scene.states`.
     moments : tuple of three floats, ChangingMoments, ChangingInertia, or None
-        Principal moments (kg m2), or an inertia that changes; None if the body has coefficients.
+        Principal moments (kg m2), or a changing inertia; None if the body has coefficients.
     axes : ndarray, shape (3, 3), or None
         The principal axes in columns; None if they are the body axes.
     exact : ndarray of object, shape (n, 8), or None
         Time, recorded time, omega and velocity of a program in another arithmetic than binary64;
         the other attributes have the nearest floats.
     tolerance : float or None
-        The tolerance; None for methods with a fixed step.
+        None for methods with a fixed step.
     scene : Scene or None
         The scene, if `solve` returned the trajectory.
     sol : DenseOutput or None
         The solution as a function of time; `save` does not write it.
     t_events : list of ndarray, or None
-        For each function, the times (s) of its events, in the order of `time`.
+        The times (s) of each function's events, in the order of `time`.
     y_events : list of ndarray, or None
-        The states at these times, shape (k, m) for k events; each row is ordered as a column of
-        `y`.
+        The states at these times, shape (k, m) for k events and the m unknowns of `y`.
     sensitivities : dict of ndarray, or None
         By name of a parameter with m values, the derivatives of omega (rad/s), shape (n, 3, m), or
         of omega and the quaternion, shape (n, 7, m).
@@ -177,7 +176,7 @@ class Trajectory(Conversions):
     def y(self) -> Array:
         """The state at each time in columns, shape (m, n).
 
-        It is omega (rad/s), the quaternion if requested, and the scene's own states.
+        It is omega (rad/s), the quaternion if requested, and the own states.
         """
         parts = [each.T for each in (self.omega, self.attitude, self.own) if each is not None]
         return np.concatenate(parts) if len(parts) > 1 else parts[0]

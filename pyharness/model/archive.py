@@ -1,8 +1,8 @@
-"""Archives in the format of `numpy.savez` with a digest, for trajectories and ensembles.
+"""Archives of trajectories and ensembles, in the format of `numpy.savez`.
 
-The array `header` is JSON with the kind of the content and its schema number, and `sha256` is a
-digest of all other arrays. Files are not trusted: nothing is executed or unpickled, and a file is
-rejected if an array claims to be larger than the file.
+The array `header` is JSON with the kind of the content and its schema number; `sha256` is a digest
+of all other arrays. Files are not trusted: nothing is executed or unpickled, and no array may claim
+to be larger than the file.
 """
 
 import hashlib
@@ -48,7 +48,7 @@ def checked_file(where: str, path: object) -> str:
 
 
 def archive_of(arrays: dict[str, Any]) -> bytes:
-    """Return the bytes of an npz archive of the arrays, with their SHA-256 digest as last entry."""
+    """Return the bytes of an archive of the arrays, with their SHA-256 digest as last entry."""
     buffer, digest = io.BytesIO(), hashlib.sha256()
     with zipfile.ZipFile(buffer, "w") as archive:
         for name in [*(each for each in arrays if each != DIGEST), DIGEST]:
@@ -73,8 +73,8 @@ def read_archive(
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return the arrays and the header of an archive, or raise InputError.
 
-    Messages begin with `where`, and describe a valid file by `written`. `kinds` are the names of
-    the kind of file in the header and in messages; `known` are the names of allowed arrays.
+    Messages begin with `where`, and describe a valid file by `written`. `kinds` has the kind of
+    file as named in the header and in messages; `known` has the allowed arrays.
     """
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     content = read_input(name, where, memory // 4, written)
@@ -104,7 +104,7 @@ def read_archive(
 def _arrays(
     content: bytes, known: Iterable[str], names: Sequence[str] = ()
 ) -> tuple[dict[str, Any], str]:
-    """Return the arrays with these names, by default all, and the digest of all but `DIGEST`."""
+    """Return the arrays `names`, by default all, and the digest of all but `DIGEST`."""
     found, digest = {}, hashlib.sha256()
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         allowed = {f"{name}.npy" for name in ("header", DIGEST, *known)}
@@ -134,7 +134,7 @@ def _array(data: bytes) -> Any:
 
 
 def text_of(arrays: dict[str, Any], name: str) -> str:
-    """Return a text; raise ValueError or KeyError if the array is missing, or no text."""
+    """Return a text; raise KeyError if the array is missing, ValueError if it is no text."""
     array = arrays[name]
     if array.shape != () or array.dtype.kind != "U":
         raise ValueError("no text")

@@ -1,6 +1,7 @@
 """Checks of a user's arrays for many bodies: shape, type, values and number of rows.
 
-An array has one row per body, or one row for all. Each InputError begins with `where`.
+An array has one row per body, or one row for all. Functions with an argument `where` or `name`
+raise InputError, which begins with it.
 """
 
 from collections.abc import Callable, Mapping
@@ -26,7 +27,7 @@ FROM_ZERO: Rule = (lambda x: x >= 0.0, "a number from 0")
 
 
 def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = None) -> Array:
-    """Return user values as a float array of rows, or raise InputError; a single row is allowed.
+    """Return user values as a float array of rows; a single row is allowed.
 
     `shape` is the shape of a row, in which a letter, such as "k", is any length. `rule` tests each
     number.
@@ -48,7 +49,7 @@ def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = N
 
 
 def numbers_of(where: str, values: object) -> Array:
-    """Return real numbers of any type and shape as float64, or raise InputError."""
+    """Return real numbers of any type and shape as float64."""
     if type(values) is not np.ndarray and unit_of(values):  # NumPy would drop it
         number(where, values)
     try:
@@ -115,7 +116,7 @@ def threads_of(threads: object) -> int:
 
 
 def buffer_of(where: str, array: Any, shape: tuple[int, ...], kind: str) -> Any:
-    """Return the user's output array if a kernel can write to it, or raise InputError.
+    """Return the user's output array, to which a kernel can write.
 
     It must have `shape` and the type character `kind`, such as "d", and be writable, contiguous and
     aligned.
@@ -129,21 +130,21 @@ def buffer_of(where: str, array: Any, shape: tuple[int, ...], kind: str) -> Any:
 
 
 def spread(rows: Array, n: int) -> Array:
-    """Return `rows` for `n` bodies; a single row is repeated."""
+    """Return `n` rows; a shared row is repeated."""
     if len(rows) == n:
         return rows
     return np.ascontiguousarray(np.broadcast_to(rows, (n, *rows.shape[1:])))
 
 
 def rows_within(rows: Array, piece: slice) -> Array:
-    """Return the rows of the bodies in `piece`; a single row is repeated."""
+    """Return the rows of the bodies in `piece`; a shared row is repeated."""
     if len(rows) > 1:
         return rows[piece]
     return np.ascontiguousarray(np.broadcast_to(rows, (piece.stop - piece.start, *rows.shape[1:])))
 
 
 def unit_quaternions(rows: Array) -> Array:
-    """Return quaternions, (n, 4), divided by their norms; NaN if a norm is 0 or not finite."""
+    """Return quaternions, (n, 4), normalised; NaN if a norm is 0 or not finite."""
     with np.errstate(all="ignore"):
         found = rows / np.abs(rows).max(axis=1, keepdims=True)
         units: Array = found / np.sqrt((found * found).sum(axis=1, keepdims=True))

@@ -23,7 +23,7 @@ def assumptions() -> list[dict[str, Any]]:
 
 
 def open_starts() -> dict[int, str]:
-    """Return the cases for which the thesis gives no omega(0), with the source of our value."""
+    """Return the cases without omega(0) in the thesis, with the source of our value."""
     cases = facts("cases")["case"]
     return {each["number"]: each["assumed_omega"] for each in cases if "assumed_omega" in each}
 
@@ -31,7 +31,7 @@ def open_starts() -> dict[int, str]:
 def assumed(scene: Scene, listings: Iterable[Listing] = ()) -> list[dict[str, Any]]:
     """Return the assumptions on which the numbers of a case and its runs of `listings` depend.
 
-    A scene that is no case, and a value that the user supplies, depend on none.
+    A scene that is no case, and a user's value, depend on none.
     """
     among = list(listings)
     return [each for each in assumptions() if _is_made(each, scene, among)]
@@ -59,7 +59,7 @@ def _is_in(each: dict[str, Any], listing: Listing) -> bool:
 
 
 def mark(scene: Scene, listing: Listing) -> str:
-    """Return `MARK` if a run depends on an assumption about the cards of its listing, else ""."""
+    """Return `MARK` if a run depends on an assumption about its listing, else ""."""
     return MARK if any(each["on"] == "listing" for each in assumed(scene, [listing])) else ""
 
 
@@ -69,7 +69,7 @@ def case_mark(case: int) -> str:
 
 
 def assumption_records(runs: Runs) -> list[dict[str, Any]]:
-    """Return records for JSON of the assumptions on which runs depend, each with its cases."""
+    """Return the assumptions on which runs depend, each with its cases, for JSON."""
     found: dict[tuple[str, str], dict[str, Any]] = {}
     for scene, listings in runs:
         for each in assumed(scene, listings):
@@ -82,7 +82,7 @@ def assumption_records(runs: Runs) -> list[dict[str, Any]]:
 
 
 def claim_records() -> list[dict[str, Any]]:
-    """Return records for JSON of the assumptions on which claims alone depend."""
+    """Return the assumptions on which claims alone depend, for JSON."""
     return [_record(each, each["what"]) for each in assumptions() if each["on"] == "claim"]
 
 
@@ -91,7 +91,7 @@ def _record(each: dict[str, Any], what: str) -> dict[str, Any]:
 
 
 def legend(runs: Sequence[tuple[Scene, Iterable[Listing]]]) -> list[str]:
-    """Return a list of the line that explains the marks of runs, empty without marks."""
+    """Return the line that explains the marks of runs, in a list; empty without marks."""
     every = {scene.case for scene, _ in runs}
     told = []
     for each in assumption_records(runs):

@@ -33,7 +33,7 @@ _PARALLEL = 2.0**-51  # sine of half an angle that is a rounding error
 
 
 def scalar_first(values: object) -> Any:
-    """Return the quaternions of a SciPy `Rotation`, scalar first, or any other value unchanged."""
+    """Return the quaternions of a `Rotation`, scalar first; any other value unchanged."""
     as_quat = getattr(values, "as_quat", None)
     return values if as_quat is None else np.asarray(as_quat())[..., [3, 0, 1, 2]]
 
@@ -60,9 +60,9 @@ def unit_quaternion(where: str, values: object) -> tuple[Quaternion, float]:
 
 
 def of_angles(where: str, angles_deg: object, sequence: object) -> Quaternion:
-    """Return the attitude after rotations by three angles (degrees) about the body axes `sequence`.
+    """Return the attitude after three rotations (degrees) about the body axes in `sequence`.
 
-    Raise InputError unless `sequence` is in `SEQUENCES`, as "3-1-3", and the angles are finite.
+    Raise InputError unless `sequence` is in `SEQUENCES` and the angles are finite.
     """
     if not isinstance(sequence, str) or sequence not in SEQUENCES:
         name = sequence if isinstance(sequence, str) else kind_of(sequence)
@@ -88,7 +88,7 @@ def product(p: Iterable[Any], q: Iterable[Any]) -> tuple[Any, Any, Any, Any]:
 
 
 def quaternion_rates(omega: Iterable[Any], q: Iterable[Any]) -> list[Any]:
-    """Return q' = q (0, omega)/2, for numbers, arrays, symbols or other expressions."""
+    """Return q' = q (0, omega)/2, for numbers, arrays or symbols."""
     (x, y, z), (a, b, c, d) = omega, q
     return [
         -0.5 * (b * x + c * y + d * z),
@@ -128,7 +128,7 @@ def matrices(attitude: Array) -> Array:
 
 
 def rows_to_body(attitude: Iterable[Any]) -> tuple[tuple[Any, ...], ...]:
-    """Return the rows of the rotation matrix from space to body, for numbers, arrays or symbols."""
+    """Return the rotation matrix from space to body, for numbers, arrays or symbols."""
     w, x, y, z = attitude
     return (
         (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)),
@@ -151,13 +151,13 @@ def angle_between(attitude: Array, other: Array) -> Array:
 
 
 def quaternion_of_axes(axes: Array) -> Quaternion:
-    """Return the attitude of a right-handed frame, whose unit vectors are columns of `axes`."""
+    """Return the attitude of a right-handed frame with unit vectors as columns, (3, 3)."""
     w, x, y, z = quaternions_of_axes(axes[None])[0].tolist()
     return w, x, y, z
 
 
 def quaternions_of_axes(axes: Array) -> Array:
-    """Return the attitudes of n right-handed frames, whose axes are columns, shape (n, 3, 3)."""
+    """Return the attitudes, (n, 4), of n right-handed frames with columns as axes, (n, 3, 3)."""
     # Imported only here, because only a full inertia matrix needs SciPy.
     from scipy.spatial.transform import Rotation
 
@@ -167,7 +167,7 @@ def quaternions_of_axes(axes: Array) -> Array:
 
 
 def rotated(vectors: Array, matrix: Array) -> Array:
-    """Return the products of one or n matrices (3, 3) with one or n vectors (3,)."""
+    """Return one or n matrices, (3, 3), times one or n vectors, (3,)."""
     # In this order, the sums have the same bits for any n, and as in C.
     x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
     return np.stack(
@@ -177,7 +177,7 @@ def rotated(vectors: Array, matrix: Array) -> Array:
 
 
 def turned_back(attitudes: Array, turn: Any) -> Array:
-    """Return the attitudes of a body from attitudes of axes rotated by `turn` against it."""
+    """Return a body's attitudes from those of axes rotated by `turn` against it."""
     w, x, y, z = np.moveaxis(np.asarray(turn), -1, 0)
     first, *rest = np.moveaxis(attitudes, -1, 0)
     parts: Any = product((first, rest[0], rest[1], rest[2]), (w, -x, -y, -z))

@@ -148,7 +148,6 @@ def _ends(found: "Trajectory") -> tuple[float, float]:
 
 
 def _motion(found: "Trajectory", times: Array) -> _Motion:
-    """Return the frames at `times` (s): from dense output, or else the nearest rows."""
     attitude, omega = found.attitude, found.omega
     assert attitude is not None
     if found.sol is not None:
@@ -165,7 +164,6 @@ def _motion(found: "Trajectory", times: Array) -> _Motion:
 
 
 def _scene_of_brick(figure: "Figure", motion: _Motion, rate: float) -> Any:
-    """Return the function that draws frame n and returns the changed artists."""
     axes: Any = figure.add_axes((0.02, 0.02, 0.96, 0.86), projection="3d")
     _frame(axes)
     corners, turned = motion.corners, motion.turned

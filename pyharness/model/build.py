@@ -74,7 +74,7 @@ def build() -> Build:
 
 
 def installation() -> dict[str, Any]:
-    """Return data on the installation and the machine for a bug report; None means unknown.
+    """Return data on the installation and the machine for a bug report; None if unknown.
 
     "arithmetic" names the option or library that changes the kernels' arithmetic, or is ``as
     written``. "environment" has the variables of `INFLUENCES` that are set.
@@ -105,7 +105,6 @@ def _installer() -> str:
 
 
 def _ask_kernels() -> dict[str, str | None]:
-    """Return the best instruction set that build and processor share, and faults of arithmetic."""
     try:
         from pyharness._kernels import arithmetic_faults, choose_instructions
     except ImportError:

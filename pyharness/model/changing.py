@@ -22,7 +22,7 @@ _MATRICES = f"allowed: a list of 1 to {_MOST} matrices, each of three rows of th
 
 
 class Changing:
-    """The base class of inertias that change with time; its methods are those of polynomials."""
+    """The base class of changing inertias; its methods are those of polynomials."""
 
     if TYPE_CHECKING:
 
@@ -32,7 +32,7 @@ class Changing:
 
     @property
     def elements(self) -> Sequence[Sequence[Polynomial]]:
-        """The polynomials of the inertia matrix: three rows of three."""
+        """The polynomials of the inertia matrix, in three rows."""
         raise NotImplementedError
 
     @property
@@ -54,7 +54,7 @@ class Changing:
             )
 
     def matrix(self, time: Any) -> list[list[Any]]:
-        """Return the inertia matrix (kg m2) at a time (s): a float, a symbol or an array."""
+        """Return the inertia matrix (kg m2) at a time (s), a float, symbol or array."""
         return self._values(self.elements, time)
 
     def matrix_rate(self, time: Any) -> list[list[Any]]:
@@ -150,7 +150,7 @@ class ChangingMoments(Changing):
             """Return the three moments (kg m2) at `time` (s)."""
 
     def __post_init__(self) -> None:
-        """Check the polynomials, and convert coefficients to floats."""
+        """Check the polynomials; convert coefficients to floats."""
         where = "[body] moments"
         given = _items(where, self.polynomials, 4, _POLYNOMIALS)
         if len(given) != 3:
@@ -173,7 +173,7 @@ class ChangingMoments(Changing):
 
     @property
     def elements(self) -> Sequence[Sequence[Polynomial]]:
-        """The polynomials of the inertia matrix; those of zero elements are empty."""
+        """The polynomials of the inertia matrix, empty for zero elements."""
         first, second, third = self.polynomials
         return (first, (), ()), ((), second, ()), ((), (), third)
 
@@ -220,7 +220,7 @@ class ChangingInertia(Changing):
             """Return the inertia matrix (kg m2) at `time` (s)."""
 
     def __post_init__(self) -> None:
-        """Check the matrices, and convert elements to floats."""
+        """Check the matrices; convert elements to floats."""
         from pyharness.model.inertia import checked_inertia, symmetric_matrix
 
         where = "[body] inertia"
@@ -269,7 +269,7 @@ def _derivative(polynomial: Polynomial) -> Polynomial:
 
 
 def rates_of_changing(changing: Changing, time: Any, omega: Any, torque: Any) -> list[Any]:
-    """Return the derivative of omega for an inertia that changes with time."""
+    """Return the derivative of omega for a changing inertia."""
     matrix, rate, (x, y, z) = changing.matrix(time), changing.matrix_rate(time), omega
     if changing.is_diagonal:
         a, b, c = (matrix[k][k] for k in range(3))

@@ -1,4 +1,4 @@
-"""Integers and other constants that Python and the Fortran kernels share.
+"""Constants that Python and the Fortran kernels share.
 
 The script fortran/make_codes.py writes each class as a Fortran module.
 """
@@ -67,7 +67,7 @@ class Series:
 
 
 class Waves:
-    """The limit of the angle (rad) of our sine in binary128, as a power of 2."""
+    """The limit of the angle (rad) of our sine in binary128."""
 
     ANGLE_BITS = 60  # the angle must be below 2**ANGLE_BITS rad; otherwise its sine is NaN
 

@@ -1,4 +1,4 @@
-"""Conversion of a changing inertia, or a torque about axes of space, to a recorded torque."""
+"""Conversion of changing inertias, and torques about axes of space, to recorded torques."""
 
 from dataclasses import replace
 from typing import Any

@@ -34,7 +34,7 @@ def to_coefficients(count: int) -> Array:
 
 
 def nodes(low: Array, high: Array, at: Array) -> Array:
-    """Return the points `at`, from -1 to 1, mapped to each interval; one row per interval."""
+    """Return the points `at`, from -1 to 1, mapped to each interval, in one row each."""
     middle, half = 0.5 * low + 0.5 * high, 0.5 * high - 0.5 * low
     found: Array = middle[:, None] + half[:, None] * at
     found[:, 0], found[:, -1] = low, high
@@ -88,9 +88,9 @@ class Pieces:
 def sizes_of(largest: Array, n_own: int) -> Array:
     """Return the sizes to which errors are relative, from the largest values of m unknowns.
 
-    `largest` and the result have the shape (..., m). The size of each component of omega is the
-    largest of the three values. The size of the quaternion is 1. Each of the last `n_own` unknowns,
-    the own states, has its own value as size. A size of 0 becomes 1.
+    `largest` and the result have the shape (..., m). The size is the largest component for omega, 1
+    for the quaternion, and the value itself for the last `n_own` unknowns, the own states. A size
+    of 0 becomes 1.
     """
     sizes = np.ones_like(largest)
     sizes[..., :3] = largest[..., :3].max(axis=-1, keepdims=True)
@@ -101,7 +101,7 @@ def sizes_of(largest: Array, n_own: int) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class DenseOutput:
-    """The solution of a scene as a function of time, the attribute `sol` of a trajectory.
+    """The solution of a scene as a function of time: `sol` of a trajectory.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ class DenseOutput:
         attitude if requested, and the own states. `rates` is a function of times and such rows; it
         returns their time derivatives.
     n_own : int
-        The number of own states, the unknowns that `Scene.states` adds.
+        The number of own states (`Scene.states`).
 
     Examples
     --------
@@ -173,7 +173,7 @@ class DenseOutput:
         return self._at(t, self.rates)
 
     def normalized(self, states: Array) -> Array:
-        """Return states, shape (..., m), whose quaternions, if any, have norm 1."""
+        """Return the states, (..., m), with normalised quaternions, in place."""
         own = states.shape[-1] - self.n_own
         if own > 3:
             q = states[..., 3:own]

@@ -19,7 +19,7 @@ def version() -> str:
 
 
 def install_command(extra: str) -> str:
-    """Return the pip command for a group of optional packages, such as ``plots``."""
+    """Return the pip command for optional packages, such as ``plots``."""
     return f"pip install '{DISTRIBUTION}[{extra}]'"
 
 
@@ -34,7 +34,7 @@ def check_package(name: str, what: str, command: str) -> None:
 
 
 def checked_axes(ax: object) -> "Axes":
-    """Return `ax`, or a new diagram of matplotlib if None; raise InputError for anything else."""
+    """Return `ax`, or a new diagram if None; raise InputError for anything but an Axes."""
     check_package("matplotlib", "plot", install_command("plots"))
     from matplotlib.axes import Axes
 

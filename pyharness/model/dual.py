@@ -15,13 +15,13 @@ _MORE, _FEWER = 100, 10
 
 
 class Dual:
-    """A value in any arithmetic, with its derivatives with respect to some unknowns."""
+    """A value in any arithmetic, with its derivatives with respect to unknowns."""
 
     def __init__(self, value: Any, slopes: Sequence[Any]) -> None:
         self.value, self.slopes = value, slopes
 
     def chained(self, value: Any, slope: Any) -> "Dual":
-        """Return a function of this number, whose `value` and derivative `slope` are given."""
+        """Return the function of this number with the given value and derivative `slope`."""
         return Dual(value, [slope * each for each in self.slopes])
 
     def __add__(self, other: Any) -> "Dual":
@@ -67,7 +67,7 @@ class Dual:
 
 
 def dual(value: Any, count: int) -> Dual:
-    """Return `value` as a dual number, with `count` derivatives of 0 if it is a plain number."""
+    """Return `value` as a dual number; a plain number has `count` derivatives of 0."""
     return value if isinstance(value, Dual) else Dual(value, [0.0] * count)
 
 

@@ -38,7 +38,7 @@ class Integrator(Protocol):
 
 
 def advice(instead: str, effort: float, needed: float | None = None) -> str:
-    """Return the end of a message about an exceeded work limit: `instead`, or a larger effort."""
+    """Return the end of a message on an exceeded work limit: `instead`, or a larger effort."""
     factor = suggested(effort, needed)
     return f"{instead}, or allow more work: --effort {factor} (effort={factor} in Python)"
 
@@ -53,7 +53,7 @@ def suggested(effort: float, needed: float | None = None) -> str:
 
 
 def waves(scene: Scene) -> int:
-    """Return the number of sines and cosines in the torque; 0 if it depends on the state."""
+    """Return the number of sines and cosines in the torque; 0 for a StateTorque."""
     if isinstance(scene.torque, StateTorque):
         return 0
     return len(scene.law.sines) + len(scene.law.cosines)
@@ -62,8 +62,8 @@ def waves(scene: Scene) -> int:
 def check_steps(scene: Scene, program: str, implementation: str, effort: float) -> None:
     """Raise InputError if a program exceeds the work limit of an `implementation`.
 
-    The work is steps times (1 + c w), where w is the number of sines and cosines in the torque, and
-    c the work for one of them (`_LIMITS`).
+    The work is steps times (1 + c w) for w sines and cosines in the torque, each of work c
+    (`_LIMITS`).
     """
     if implementation not in _LIMITS:
         raise unknown("implementation", implementation, _LIMITS)
@@ -73,7 +73,7 @@ def check_steps(scene: Scene, program: str, implementation: str, effort: float) 
 
 
 def check_bodies(scene: Scene, program: str, bodies: int, effort: Number) -> None:
-    """Raise InputError if a compiled program on many bodies exceeds the work limit.
+    """Raise InputError if a compiled program exceeds the work limit on many bodies.
 
     The work is bodies times steps times (1 + c w), as in `check_steps`, with c = 1.
     """

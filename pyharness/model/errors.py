@@ -1,4 +1,4 @@
-"""Exceptions for users. Each message is one line: what is wrong, where, and what is allowed."""
+"""Exceptions for users, and words for their messages."""
 
 from collections.abc import Iterable
 
@@ -43,7 +43,7 @@ class TimedError(InputError):
     """An InputError whose message names a time (s), which `slower` converts from rescaled time."""
 
     def __init__(self, message: str, time: float) -> None:
-        """Store the message, with `time` in place of ``{time}``."""
+        """Put `time` in place of ``{time}`` in the message."""
         super().__init__(message.replace("{time}", f"{time:.6g}"))
         self.time = time
         self._message = message
@@ -82,7 +82,7 @@ def printable(text: str, kept: str = "") -> str:
 
 
 def kind_of(value: object) -> str:
-    """Return the type of a value in words, such as "a list", for TOML, Python and NumPy."""
+    """Return the type of a value of TOML, Python or NumPy in words, such as "a list"."""
     kinds = {
         "text": (str, bytes, bytearray), "true or false": (bool,), "a whole number": (int,),
         "a number": (float,), "a complex number": (complex,), "a list": (list, tuple),
@@ -103,7 +103,7 @@ def kind_of(value: object) -> str:
 
 
 def known(what: str, name: object, allowed: Iterable[str]) -> str:
-    """Return the allowed name that equals `name` in lower case; raise InputError if none does."""
+    """Return `name` in lower case; raise InputError unless it is allowed."""
     names = list(allowed)
     found = name.lower() if isinstance(name, str) else ""
     if found not in names:
@@ -112,7 +112,7 @@ def known(what: str, name: object, allowed: Iterable[str]) -> str:
 
 
 def unknown(what: str, name: object, allowed: Iterable[str], where: str = "") -> InputError:
-    """Return the InputError for a name that is not `allowed`; its message suggests a similar name.
+    """Return the InputError for a name that is not `allowed`, which suggests a similar one.
 
     `what` is the kind of name, such as "case"; `where`, such as "--fix", begins the message.
     """

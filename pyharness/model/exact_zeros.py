@@ -20,7 +20,7 @@ def _product(first: Sequence[Fraction], second: Sequence[Fraction]) -> list[Frac
 
 
 def determinant(elements: Sequence[Sequence[Sequence[float]]]) -> list[Fraction]:
-    """Return the coefficients of the determinant of a symmetric matrix of polynomials."""
+    """Return the determinant of a symmetric matrix of polynomials, as coefficients."""
     (a, f, e), (_, b, d), (_, _, c) = ([[Fraction(x) for x in p] for p in row] for row in elements)
     terms = ((1, (a, b, c)), (2, (d, e, f)), (-1, (a, d, d)), (-1, (b, e, e)), (-1, (c, f, f)))
     products = [[sign * each for each in _product(_product(x, y), z)] for sign, (x, y, z) in terms]
@@ -30,7 +30,7 @@ def determinant(elements: Sequence[Sequence[Sequence[float]]]) -> list[Fraction]
 def first_zeros(polynomial: Iterable[float | Fraction]) -> tuple[float, float]:
     """Return the last zero (s) of a polynomial before time 0, and the first after time 0.
 
-    The polynomial is above 0 at time 0. A missing zero is -inf or inf.
+    The polynomial must be above 0 at time 0. A missing zero is -inf or inf.
     """
     exact = [Fraction(c) for c in polynomial]
     backward = [-c if n % 2 else c for n, c in enumerate(exact)]
@@ -40,8 +40,8 @@ def first_zeros(polynomial: Iterable[float | Fraction]) -> tuple[float, float]:
 def _first_zero(polynomial: Sequence[Fraction]) -> float:
     """Return the first zero (s) of a polynomial after time 0, or infinity.
 
-    A polynomial is above 0 in an interval if its coefficients in Bernstein's basis are above 0
-    (Farouki 2012, Computer Aided Geometric Design 29). Other intervals are halved.
+    A polynomial is above 0 in an interval if its coefficients in Bernstein's basis are (Farouki
+    2012, Computer Aided Geometric Design 29). Other intervals are halved.
     """
     if min(polynomial) >= 0:
         return math.inf

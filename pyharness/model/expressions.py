@@ -62,9 +62,9 @@ def parsed(
     """Return the torque of three expressions about the body axes, as a torque law if possible.
 
     They may contain t (s), w1, w2, w3 (rad/s), the quaternion q0, q1, q2, q3, pi, the names in
-    `constants`, and own states (unknowns that `Scene.states` adds). `rates` has an expression for
-    the time derivative of each own state. Values are in N m, or in rad/s2 for a body with
-    coefficients. Raise InputError for an invalid expression.
+    `constants`, and own states (`Scene.states`). `rates` has an expression for the time derivative
+    of each own state. Values are in N m, or in rad/s2 for a body with coefficients. Raise
+    InputError for an invalid expression.
     """
     values = _checked_constants(constants)
     texts = _three_texts(expressions)
@@ -87,13 +87,13 @@ def parsed(
 def components(
     texts: Mapping[str, str], inputs: Sequence[Any], constants: Mapping[str, Any]
 ) -> list[Any]:
-    """Return the values of checked expressions, `texts` by place, for the eight input symbols."""
+    """Return checked expressions, `texts` by place, evaluated for the eight input symbols."""
     names = {**dict(zip(INPUTS, inputs, strict=True)), "pi": math.pi, **constants}
     return [_component(text, names, place) for place, text in texts.items()]
 
 
 def text_components(values: Mapping[str, object], inputs: Sequence[Any]) -> list[Any]:
-    """Return numbers, and the values of expressions for symbols of the eight inputs."""
+    """Return numbers, and expressions evaluated for the eight input symbols."""
     found = []
     for place, value in values.items():
         if isinstance(value, str):
@@ -196,7 +196,6 @@ def _tree(text: str, place: str) -> ast.expr:
 def _operations(
     text: str, names: Mapping[str, Any], place: str
 ) -> list[tuple[ast.expr, Sequence[ast.expr], Callable[..., Any]]]:
-    """Return each node of a checked expression, its operands, and a function of their values."""
     found, waiting = [], [(_tree(text, place), 1)]
     while waiting:
         node, depth = waiting.pop()

@@ -1,7 +1,7 @@
 """Elementary functions of floats and of the numbers of `pyharness.thesis.word`.
 
-Functions of floats are the C library's. The other numbers have other formats than binary64; their
-functions round correctly.
+Functions of floats are the C library's. The other numbers, in formats other than binary64, have
+correctly rounded functions.
 """
 
 import math

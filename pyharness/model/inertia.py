@@ -1,8 +1,8 @@
 """Principal moments and principal axes of full inertia matrices.
 
 Symmetric matrices are diagonalised in integers, because in binary64 a small eigenvalue would have
-few correct digits. The elements are integer multiples of a power of 2, the unit. The absolute
-determinant of a regular matrix is therefore at least the cube of the unit. This bounds the smallest
+few correct digits. The elements are integer multiples of a power of 2, the unit, so that the
+absolute determinant of a regular matrix is at least the cube of the unit. This bounds the smallest
 absolute eigenvalue from below, which determines how many bits are enough.
 """
 
@@ -65,7 +65,7 @@ def checked_inertia(where: str, values: object) -> Matrix:
 
 
 def symmetric_matrix(where: str, values: object) -> Matrix:
-    """Return a user's symmetric matrix, or raise InputError; it may be not positive definite."""
+    """Return a user's symmetric matrix, perhaps not positive definite, or raise InputError."""
     allowed = "allowed: three rows of three finite numbers, kg m2"
     rows = list(number_list(where, values, allowed))
     if any(isinstance(converted(row), float) for row in rows):

@@ -1,4 +1,4 @@
-"""Inertias that are functions of time, recorded as tapes from functions, expressions or tables."""
+"""Inertias that are functions of time, recorded from functions, expressions or tables."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
@@ -30,7 +30,7 @@ class InertiaFunction(Changing):
     """An inertia that is a continuous function of time.
 
     The outputs of `tape` are the three moments, or the nine elements of the matrix by rows.
-    `written` has the values in a scene file: expressions and numbers, or a table's items.
+    `written` has the values of a scene file: expressions and numbers, or a table's items.
     """
 
     place: str
@@ -38,7 +38,7 @@ class InertiaFunction(Changing):
     written: tuple[Any, ...] = field(default=(), compare=False)
 
     def __repr__(self) -> str:
-        """Return one line without the operations of the tape."""
+        """Return one line without operations."""
         return f"InertiaFunction({self.place}, {self.phrase})"
 
     @property
@@ -52,7 +52,7 @@ class InertiaFunction(Changing):
         return ", ".join(str(each).replace("'", "") for each in values)
 
     def values(self) -> list[Any] | dict[str, Any] | None:
-        """Return the inertia as a scene file has it; None for a Python function."""
+        """Return the inertia as in a scene file; None for a Python function."""
         is_table = self.written and isinstance(self.written[0], tuple)
         return dict(self.written) if is_table else list(self.written) or None
 
@@ -81,7 +81,7 @@ class InertiaFunction(Changing):
 
     @cached_property
     def span(self) -> tuple[float, float]:
-        """Infinite times, because a moment that reaches 0 ends the integration as a singularity."""
+        """Infinite, because a moment that reaches 0 ends the integration as a singularity."""
         return -np.inf, np.inf
 
     def check(self, times: Iterable[float]) -> None:
@@ -119,7 +119,7 @@ def _outputs(tape: Tape, time: Any) -> list[Any]:
 
 
 def inertia_function(place: str, function: Callable[[Any], Any]) -> InertiaFunction:
-    """Return the moments or inertia that a user's function of time computes.
+    """Return the moments or inertia matrix of a user's function of time.
 
     Raise InputError if the function can't be recorded, depends on more than time, jumps, or gives
     no inertia at time 0.
@@ -138,7 +138,7 @@ def inertia_function(place: str, function: Callable[[Any], Any]) -> InertiaFunct
 
 
 def inertia_of_texts(place: str, values: Any) -> InertiaFunction:
-    """Return the moments or inertia that a scene file gives by expressions of t and numbers."""
+    """Return the moments or inertia matrix from a scene file's expressions of t and numbers."""
     where = f"[body] {place}"
     rows = [values] if place == "moments" else values
     if not isinstance(values, list) or not all(
@@ -157,7 +157,7 @@ def inertia_of_texts(place: str, values: Any) -> InertiaFunction:
 def inertia_of_tables(
     place: str, tables: Iterable[Table], written: tuple[Any, ...]
 ) -> InertiaFunction:
-    """Return the inertia whose elements are `tables` of time; scene files have `written`."""
+    """Return the inertia with `tables` of time as elements; scene files have `written`."""
     recorder = Recorder(place=f"[body] {place}")
     time, *_ = recorder.inputs()
     values = [value_of_table(without_equal_constants(each), time) for each in tables]

@@ -1,9 +1,8 @@
 """NumPy's functions for arrays of symbols, while a user's function is recorded.
 
-Symbols can't overload NumPy's choices (such as where), comparisons and linear algebra, nor can they
-be assigned to elements of numpy.zeros. During recording these functions are therefore replaced in
-the modules numpy, numpy.linalg and math. Calls from other threads or without symbols reach the
-originals.
+Symbols can't overload NumPy's choices (such as where), comparisons and linear algebra, nor be
+assigned to elements of numpy.zeros. During recording, these functions are therefore replaced in
+numpy, numpy.linalg and math. Calls from other threads or without symbols reach the originals.
 """
 
 import math
@@ -31,7 +30,7 @@ _originals: list[tuple[Any, str, Any]] = []
 
 @contextmanager
 def replaced_functions(with_targets: bool) -> Iterator[None]:
-    """Replace NumPy's functions in this thread; if `with_targets`, also those that make arrays."""
+    """Replace functions for this thread; with `with_targets`, also those that make arrays."""
     global _installed
     before = getattr(_here, "targets", None)
     with _lock:
@@ -58,7 +57,7 @@ def _install() -> None:
 
 
 class _Replaced:
-    """A replacement of a function, for symbols, with the attributes of the original."""
+    """A replacement of a function, for symbols."""
 
     def __init__(self, original: Callable[..., Any], function: Callable[..., Any]) -> None:
         self._original, self._function = original, function
@@ -80,7 +79,7 @@ class _Replaced:
 
 
 class _Target(_Replaced):
-    """A replacement of a function that makes an array; symbols can be assigned to the array."""
+    """A replacement of a function that makes an array, to which symbols can be assigned."""
 
     def __init__(self, original: Callable[..., Any], value: float) -> None:
         super().__init__(original, lambda shape, *_, **__: symbol_array(np.full(shape, value)))
@@ -144,7 +143,7 @@ def _viewed(found: Any) -> Any:
 
 
 def _by_element(function: Callable[..., Any], count: int) -> Callable[..., Any]:
-    """Return a function of arrays that acts on their elements; for scalars it returns a scalar."""
+    """Return `function` for arrays, by element, and for scalars."""
     loop = np.frompyfunc(function, count, 1)
 
     def called(*given: Any) -> Any:

@@ -82,7 +82,7 @@ def write_files(contents: dict[str, bytes], option: str) -> None:
 
 
 class DeferredInterrupt:
-    """A context that defers Ctrl-C, which might otherwise leave temporary files behind."""
+    """A context that defers Ctrl-C, which might leave temporary files behind."""
 
     def __enter__(self) -> Self:
         """Install a handler that only records an interrupt."""
@@ -95,7 +95,7 @@ class DeferredInterrupt:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Restore the previous handler, and call it if Ctrl-C was pressed."""
+        """Restore the previous handler, and call it after Ctrl-C."""
         if self._holds:
             signal.signal(signal.SIGINT, self._before)
         if self._came and callable(self._before):
@@ -111,7 +111,6 @@ class DeferredInterrupt:
 
 
 class _File:
-    """A file to write, with the paths of its `new` content and its `old` copy."""
 
     def __init__(self, path: str) -> None:
         self.path = path

@@ -1,4 +1,4 @@
-"""Own states: unknowns that a user adds to omega and attitude, such as integral terms or lags."""
+"""Own states: a user's unknowns beside omega and attitude, such as integral terms or lags."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple

@@ -16,7 +16,7 @@ def read_input(path: str | os.PathLike[str], where: str, limit: int, what: str) 
     """Return the content of a file or pipe that a user named.
 
     Raise InputError, beginning with `where`, for an unreadable path, a folder, a device, more than
-    `limit` bytes, or a pipe without data for 10 s; the message names the expected content, `what`.
+    `limit` bytes, or a pipe without data for 10 s; `what` is the expected content.
     """
     try:
         content = _read(os.fspath(path), limit)
@@ -54,7 +54,6 @@ def _read(path: str, limit: int) -> bytes | None:
 
 
 def _is_quiet(handle: int) -> bool:
-    """Return whether a device is a terminal or /dev/null, which may be read."""
     return os.isatty(handle) or os.fstat(handle).st_rdev == os.stat(os.devnull).st_rdev
 
 

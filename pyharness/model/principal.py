@@ -21,7 +21,6 @@ class PrincipalScene(Scene):
     """A scene about the principal axes, with moments in double-double precision.
 
     In double precision, A, B, C of nearly equal moments would have large relative rounding errors.
-    `moments_low` is the exact moments minus `moments` (kg m2).
     """
 
     moments_low: Triple = (0.0, 0.0, 0.0)
@@ -40,7 +39,7 @@ class PrincipalScene(Scene):
 
 
 def in_double(scene: Scene) -> Scene:
-    """Return a scene whose moments are in double precision."""
+    """Return a scene with moments in double precision."""
     if not isinstance(scene, PrincipalScene):
         return scene
     return Scene(**_fields(scene))
@@ -117,7 +116,7 @@ def in_scene_axes(found: Trajectory, axes: Array) -> Trajectory:
 def states_in_scene_axes(states: Array, axes: Array, own: int) -> Array:
     """Return rows of states, transformed from principal `axes` (columns) to the body's own.
 
-    Columns from `own` on, unknowns that `Scene.states` adds, remain unchanged.
+    Columns from `own` on, the own states, are unchanged.
     """
     turned, rest = states[:, 3:own], states[:, own:]
     if own > 3:

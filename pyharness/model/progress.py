@@ -29,7 +29,7 @@ def no_progress(done: int, total: int, what: str) -> None:
 
 @contextmanager
 def bar_of_bodies(is_shown: bool) -> Iterator[None]:
-    """Show tqdm's progress bar of bodies in this context, if `is_shown`."""
+    """Show tqdm's progress bar of bodies, if `is_shown`."""
     if not is_shown:
         yield
         return
@@ -59,7 +59,7 @@ def count_done(n: int) -> None:
 
 @contextmanager
 def progress_of(choice: bool | Progress, what: str) -> Iterator[Progress]:
-    """Provide a function that reports progress: `choice`, or for True one that shows a bar."""
+    """Provide a function that reports progress: `choice`, or for True one with a bar."""
     if callable(choice):
         yield choice
     elif not boolean("progress", choice):
@@ -82,7 +82,7 @@ def for_each_piece(
     threads: int,
     pieces: Sequence[slice] | None = None,
 ) -> None:
-    """Call ``work(piece, given_up)`` in threads for ranges of n bodies, by default of equal size.
+    """Call ``work(piece, given_up)`` in threads for ranges of n bodies, by default equal.
 
     After an exception, for example Ctrl-C, `given_up[0]` is 1; kernels poll it, and then return.
     """

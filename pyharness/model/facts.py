@@ -25,6 +25,6 @@ def facts_folder() -> Path:
 
 
 def shipped(name: str) -> Path:
-    """Return the path of a name in `SHIPPED`, in a checkout or an installed package."""
+    """Return a path, such as ``fortran``, in a checkout or an installed package."""
     installed = _FOLDER / name
     return installed if installed.exists() else _PACKAGE.parent / name

@@ -111,7 +111,6 @@ class DeferredInterrupt:
 
 
 class _File:
-
     def __init__(self, path: str) -> None:
         self.path = path
         # A link is followed to its target, as in an ordinary write. Temporary files are in the

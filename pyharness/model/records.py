@@ -72,7 +72,7 @@ def listing_record(listing: Listing) -> dict[str, Any]:
 
 
 def ending_record(trajectory: Trajectory) -> dict[str, Any]:
-    """Return "steps", "evaluations", "ended" and "stop" (or None) of a run for JSON."""
+    """Return the work and the end of a run for JSON."""
     stop = trajectory.stop
     return {
         "steps": trajectory.steps,
@@ -83,7 +83,7 @@ def ending_record(trajectory: Trajectory) -> dict[str, Any]:
 
 
 def estimate_record(trajectory: Trajectory) -> dict[str, float | None]:
-    """Return "error", "growth" and "digits" of a method for JSON."""
+    """Return a method's estimates for JSON."""
     return {name: getattr(trajectory, name) for name in ("error", "growth", "digits")}
 
 

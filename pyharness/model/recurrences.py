@@ -11,11 +11,11 @@ from pyharness.model.codes import Operations
 class Operation(NamedTuple):
     """The recurrence and the slopes of an operation, as C.
 
-    The letters o, p and q stand for the slots of its results, x and y for the slots of its
-    operands. For each slot, such as o, t_o is term k of the series (l_o if known before), b_o term
-    k - 1, z_o term 0, f_o term 1, and m_o the value at a node. i is 1/k. s0 and s1 are sums of
-    products of terms 1 to k - 1 of the slots in `pairs`. The rounding error of a result is its own
-    and those of the operands, times the absolute slopes.
+    The letters o, p and q stand for the slots of its results, x and y for those of its operands.
+    For each slot, such as o, t_o is term k of the series (l_o if known before), b_o term k - 1, z_o
+    term 0, f_o term 1, and m_o the value at a node. i is 1/k. s0 and s1 are sums of products of
+    terms 1 to k - 1 of the slots in `pairs`. To its own rounding error, a result adds those of the
+    operands times the absolute slopes.
     """
 
     series: tuple[str, ...]

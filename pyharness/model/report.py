@@ -1,7 +1,7 @@
 """Reports: the results of a subcommand as data, which `pyharness.views` renders.
 
-The types are named tuples, because every start of the program creates them, and the creation of
-dataclasses would take five times as long.
+The types are named tuples, because dataclasses would take five times as long to create at every
+start of the program.
 """
 
 import math
@@ -31,7 +31,7 @@ def plain(value: Any) -> str:
 
 
 def short(x: "float | Decimal | None") -> str:
-    """Return a number as text with two significant digits, such as 1.2e-3; None is a dash."""
+    """Return a number with two significant digits, such as 1.2e-3; None is a dash."""
     if x is None:
         return "-"
     if math.isnan(x) or math.isinf(x) or x == 0:
@@ -51,7 +51,7 @@ def counted(number: int, what: str) -> str:
 
 
 def format_duration(seconds: float) -> str:
-    """Return a duration as text, in seconds to days."""
+    """Return a duration in seconds to days."""
     for limit, unit, name in ((120.0, 1.0, "s"), (7200.0, 60.0, "min"), (172800.0, 3600.0, "h")):
         if seconds < limit:
             return f"{seconds / unit:{'.2g' if seconds < 100.0 else '.0f'}} {name}"
@@ -59,12 +59,12 @@ def format_duration(seconds: float) -> str:
 
 
 def format_count(number: int) -> str:
-    """Return a count as text, with four digits from ten million on."""
+    """Return a count, with four digits from ten million on."""
     return str(number) if number < 10**7 else f"{float(number):.4g}"
 
 
 def format_bytes(number: float) -> str:
-    """Return a number of bytes as text, such as 1.25 MB."""
+    """Return a number of bytes, such as 1.25 MB."""
     for unit in ("bytes", "kB", "MB", "GB", "TB"):
         if number < 1000.0:
             return f"{number:.3g} {unit}"
@@ -73,7 +73,7 @@ def format_bytes(number: float) -> str:
 
 
 class Column(NamedTuple):
-    """A column of a table: head and format of rounded numbers, and both again for CSV."""
+    """A column of a table: head and format for rounded numbers, and for CSV."""
 
     head: str
     write: Callable[[Any], str] = plain
@@ -96,11 +96,11 @@ class Table(NamedTuple):
     rows: "Sequence[Sequence[Any]] | Array"
 
     def written(self) -> list[list[str]]:
-        """Return heads and rows as texts with rounded numbers."""
+        """Return heads and rows with rounded numbers."""
         return self._cells([(each.head, each.write) for each in self.columns])
 
     def in_full(self) -> list[list[str]]:
-        """Return heads and rows as texts with all digits."""
+        """Return heads and rows with all digits."""
         return self._cells([(each.name or each.head, each.full) for each in self.columns])
 
     def _cells(self, columns: list[tuple[str, Callable[[Any], str]]]) -> list[list[str]]:
@@ -132,7 +132,7 @@ Section = Sequence[str | Field | Table]
 
 
 class Picture:
-    """A matplotlib figure, the table of its numbers, and the paragraphs of its title."""
+    """A matplotlib figure, its numbers, and the paragraphs of its title."""
 
     def __init__(self, figure: "Figure", numbers: Table, title: Sequence[str] = ()) -> None:
         self.figure, self.numbers, self.title = figure, numbers, title

@@ -169,7 +169,7 @@ def _torque_lines(scene: Scene) -> list[str]:
 
 
 def _term_lines(term: tuple[tuple[str, Any], ...], changing: Changing | None) -> list[str]:
-    """Return the lines of a ready term; an inertia in it that changes must be that of the body."""
+    """Return the lines of a ready term, whose changing inertia, if any, must be the body's."""
     if any(isinstance(value, Changing) and value != changing for _, value in term):
         raise InputError(
             f"[torque]: a term {term[0][1]} whose changing inertia differs from the body's "
@@ -209,7 +209,7 @@ def _toml(value: Any) -> str:
 
 
 def body_of(scene: Scene) -> tuple[str, Any]:
-    """Return key ("moments", "coefficients" or "inertia") and value of a scene file's body."""
+    """Return the key and the value of the body in a scene file."""
     if isinstance(scene.changing, InertiaFunction):
         return scene.changing.place, scene.changing.values()
     if isinstance(scene.changing, ChangingMoments):
@@ -221,7 +221,7 @@ def body_of(scene: Scene) -> tuple[str, Any]:
 
 
 def as_lists(value: Any) -> Any:
-    """Return the value with lists for tuples, and tables for torque laws, as in JSON."""
+    """Return the value with lists for tuples, and tables for torque laws."""
     if isinstance(value, TorqueLaw):
         return law_table(value)
     return list(map(as_lists, value)) if isinstance(value, tuple) else value

@@ -20,7 +20,7 @@ _LONGEST_TEXT = 60
 
 
 def heading(scene: Scene, listings: Iterable[Listing] = ()) -> list[str]:
-    """Return lines that describe a scene, with marks on values that runs of `listings` assume."""
+    """Return lines on a scene, with marks on values that runs of `listings` assume."""
     if scene.inertia is not None:
         body = f"I = {', '.join(map(_tuple, scene.inertia))} kg m2"
     elif isinstance(scene.changing, InertiaFunction):
@@ -66,7 +66,6 @@ def _polynomials(coefficients: Sequence[Sequence[float]]) -> str:
 
 
 def _polynomial(coefficients: Sequence[float]) -> str:
-    """Return a polynomial of time as text, such as "40 + 0.5 t - 0.01 t^2"."""
     text = ""
     for power, coefficient in enumerate(coefficients):
         if coefficient:
@@ -127,7 +126,7 @@ def _tuple(values: Sequence[float]) -> str:
 
 
 def ending(trajectory: Trajectory) -> str:
-    """Return a line that says how a run ended."""
+    """Return a line on the end of a run."""
     steps = counted(trajectory.steps, "step")
     counts = f"{steps}, {counted(trajectory.evaluations, 'right-hand side')}"
     if trajectory.stop is not None:

@@ -23,7 +23,7 @@ The number is increased if an old version would misread a new file, or a new ver
 
 
 def check_schema(where: str, kind: str, found: object, remedy: str) -> None:
-    """Raise InputError unless `found` is the schema number of a `kind` that this version reads.
+    """Raise InputError unless `found` is the schema number of a `kind` of file.
 
     The message begins with `where`, such as "scene file 'a.toml'", and ends with `remedy`.
     """

@@ -1,4 +1,4 @@
-"""Symbols: arguments with which a function is called so that its arithmetic is recorded on a tape.
+"""Symbols: arguments of a function that record its arithmetic on a tape.
 
 A symbol is a linear combination of slots (places of inputs and results) of a tape. Sums, and
 products with numbers, only change its coefficients. Any other operation has a slot for its result;
@@ -59,9 +59,9 @@ class Recorder:
         instead: str = "opaque(function), which SciPy's methods solve",
         has_lines: bool = True,
     ) -> None:
-        """Begin an empty tape; messages begin with `place` and suggest `instead`.
+        """Begin a tape; messages begin with `place`, and suggest `instead`.
 
-        With `has_lines`, messages name the line of the function that is recorded.
+        With `has_lines`, they name the line of the recorded function.
         """
         self._has_lines = has_lines
         self.place = place
@@ -75,13 +75,13 @@ class Recorder:
         return [Symbol(self, 0.0, {slot: 1.0}) for slot in range(self._n_inputs)]
 
     def refusal(self, what: str, write: str = _ALLOWED) -> InputError:
-        """Return the exception for an operation that can't be recorded; it suggests `write`."""
+        """Return the exception for an operation that can't be recorded, which suggests `write`."""
         allowed = f"allowed: {write}, or {self._instead}"
         where = _line() if self._has_lines else ""
         return InputError(f"{self.place}: {what} can't be recorded{where}; {allowed}")
 
     def refusal_of_numbers(self, reason: str) -> InputError:
-        """Return the exception for a function that accepts no symbols; it states the `reason`."""
+        """Return the exception for a function that accepts no symbols, with the `reason`."""
         return InputError(
             f"{self.place}: the function accepts numbers only, not the symbols that record it "
             f"({reason}); allowed: a formula of {_ALLOWED}, or {self._instead}"
@@ -131,7 +131,7 @@ class Recorder:
 def _of_symbols(
     operator: Callable[["Symbol", "Symbol"], Any],
 ) -> Callable[["Symbol", Any], "Symbol"]:
-    """Return an operator of a symbol and any real number; NotImplemented for other values."""
+    """Return an operator of a symbol and a real number; NotImplemented for other values."""
 
     @wraps(operator)
     def called(self: "Symbol", value: Any) -> "Symbol":
@@ -183,7 +183,7 @@ _COMPOSED: dict[str, Callable[[Any], Any]] = {
 
 
 class Symbol:
-    """A linear combination of slots of a tape, which records the operations on it."""
+    """A linear combination of slots, which records the operations on it."""
 
     __slots__ = ("_constant", "_terms", "recorder")
     __hash__ = None  # type: ignore[assignment]
@@ -229,7 +229,7 @@ class Symbol:
 
     @_of_symbols
     def __add__(self, other: "Symbol") -> "Symbol":
-        """Return the sum with any real number."""
+        """Return the sum."""
         terms = dict(self._terms)
         for slot, coefficient in other._terms.items():
             total = terms.pop(slot, 0.0) + coefficient
@@ -252,7 +252,7 @@ class Symbol:
 
     @_of_symbols
     def __mul__(self, other: "Symbol") -> "Symbol":
-        """Record and return the product with any real number."""
+        """Return the product."""
         if not other._terms:
             return self._scaled(other._constant)
         if not self._terms:
@@ -266,7 +266,7 @@ class Symbol:
 
     @_of_symbols
     def __truediv__(self, other: "Symbol") -> "Symbol":
-        """Record and return the quotient; raise InputError for the constant 0."""
+        """Return the quotient; raise InputError for the constant 0."""
         if not other._terms:
             if other._constant == 0.0:
                 raise InputError(f"{self.recorder.place}: division by the constant 0")
@@ -287,7 +287,7 @@ class Symbol:
     __rtruediv__ = _of_symbols(lambda x, y: y / x)
 
     def __pow__(self, power: Any) -> "Symbol":
-        """Record and return a power; a negative base requires an integer."""
+        """Return the power; a negative base requires an integer exponent."""
         if isinstance(power, Symbol):
             if not self.recorder.has_powers:
                 raise self.recorder.refusal("a power that is not a number")
@@ -310,7 +310,7 @@ class Symbol:
         return 1.0 / result if exponent < 0.0 else result
 
     def __rpow__(self, base: Any) -> "Symbol":
-        """Record and return a power of a positive number."""
+        """Return a power of a positive number."""
         number = converted(base)
         if not isinstance(number, float) or not number > 0.0:
             raise self.recorder.refusal("a power of a number that is not positive")
@@ -347,7 +347,7 @@ class Symbol:
         return 2.0 * half.arctan()
 
     def switch(self) -> "Condition | bool":
-        """Return the condition that this symbol is positive; bool if it is constant."""
+        """Return the condition that this symbol is positive; a bool if it is constant."""
         if not self._terms:
             return self._constant > 0.0
         slot, factor = self._slot()
@@ -370,7 +370,7 @@ class Symbol:
         return 2.0 * (self > 0.0) - 1.0
 
     def with_terms_of(self, others: "Iterable[Symbol]") -> "Symbol":
-        """Record this sum with the terms of `others` too, whose factors are 0; 0 stays 0."""
+        """Record this sum plus 0 times the terms of `others`; 0 stays 0."""
         if not (self._terms or self._constant):
             return self
         terms = {slot: 0.0 for each in others for slot in each._terms} | self._terms
@@ -382,7 +382,7 @@ class Symbol:
         return not self._constant and self._terms == {TIME: 1.0}
 
     def of_table(self, table: Table) -> "Symbol":
-        """Return a table at this symbol; raise InputError unless the symbol is the time."""
+        """Return a table at this symbol; raise InputError unless it is the time."""
         if not self.is_time():
             raise InputError(
                 f"{self.recorder.place}: a table of a variable other than time can't be recorded"
@@ -408,7 +408,7 @@ class Symbol:
         )
 
     def __abs__(self) -> "Symbol":
-        """Record and return the absolute value."""
+        """Return the absolute value."""
         found: Symbol = select(self > 0.0, self, -self)
         return found
 
@@ -455,7 +455,7 @@ class Condition(Symbol):
         return _condition(select(self, negated(other), other))
 
     def __invert__(self) -> "Condition":
-        """Return the condition that this one does not hold."""
+        """Return the opposite condition."""
         return _condition(1.0 - self)
 
     __rand__, __ror__, __rxor__ = __and__, __or__, __xor__
@@ -466,12 +466,12 @@ def _condition(value: Symbol) -> Condition:
 
 
 def negated(condition: Any) -> Any:
-    """Return the condition that `condition` does not hold."""
+    """Return the opposite condition."""
     return ~condition if isinstance(condition, Condition) else not condition
 
 
 def select(condition: Any, first: Any, second: Any) -> Any:
-    """Return `first` if the condition holds, else `second`; each may be a number or a symbol."""
+    """Return `first` if the condition holds, else `second`, numbers or symbols."""
     if not isinstance(condition, Symbol):
         return first if condition else second
     if not isinstance(condition, Condition):
@@ -489,7 +489,6 @@ def select(condition: Any, first: Any, second: Any) -> Any:
 
 
 def _line() -> str:
-    """Return name and line of the user's function being recorded."""
     frame = sys._getframe(2)
     while frame.f_back and frame.f_code.co_filename.startswith(_LIBRARIES):
         frame = frame.f_back
@@ -498,7 +497,7 @@ def _line() -> str:
 
 
 def recorded_twice(record: Callable[[Recorder], Tape], recorder: Callable[[], Recorder]) -> Tape:
-    """Return the tape of a user's function; raise InputError if a second call differs."""
+    """Return the tape of a user's function; raise InputError if a second recording differs."""
     first, again = record(recorder()), recorder()
     if record(again) != first:
         raise again.impure()
@@ -511,7 +510,7 @@ def _selected(condition: Any, x: Any, y: Any) -> Any:
 
 
 def _combined(linear: Linear, values: Sequence[Any]) -> Any:
-    """Return a linear combination of symbols and numbers, with its terms whose factor is 0."""
+    """Return a linear combination of symbols and numbers, with terms of factor 0."""
     terms: dict[int, float] = {}
     constant, recorder = 0.0, None
     for slot, factor in linear.terms:

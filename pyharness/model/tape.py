@@ -1,7 +1,7 @@
-"""The tape: a function of time, omega and attitude, recorded as a list of arithmetic operations.
+"""The tape: a function of time, omega and attitude, recorded as a list of operations.
 
-It is recorded with symbols (`pyharness.model.symbols`), and evaluated in any arithmetic: floats,
-decimal numbers, Taylor series, or symbols again. A slot is the place of an input or of a result.
+It is recorded with symbols (`pyharness.model.symbols`), and evaluated with floats, decimal numbers,
+Taylor series, or symbols again. A slot is the place of an input or result.
 """
 
 import math
@@ -38,15 +38,14 @@ class Linear(NamedTuple):
 
 
 class Table:
-    """A function of time that consists of cubic polynomials.
+    """A piecewise cubic function of time.
 
     Row k of `pieces`, shape (n, 4), has c0 to c3 of c0 + c1 s + c2 s^2 + c3 s^3, where s is the
-    time (s) minus breaks[k]. Row k applies from breaks[k] to the next break; row 0 also applies
-    before breaks[0], and the last row to all later times.
+    time (s) minus breaks[k]. Row k applies from breaks[k] to the next break, row 0 also before
+    breaks[0], and the last row to all later times.
     """
 
     def __init__(self, breaks: Any, pieces: Any) -> None:
-        """Store floats of shapes (n,) and (n, 4)."""
         self.breaks: Array = np.asarray(breaks, dtype=float)
         self.pieces: Array = np.asarray(pieces, dtype=float).reshape(-1, 4)
 
@@ -67,8 +66,8 @@ class Operation(NamedTuple):
     """An operation of a tape: "linear", "table", or another kind on one to three slots.
 
     "log", "atan" and "asin" have the slot of their derivative as second operand. "switch" is 1
-    where its operand is positive, else 0. "select" is its second operand where its first operand is
-    1, and its third where the first is 0.
+    where its operand is positive, else 0. "select" is its second operand where the first is 1, and
+    its third where the first is 0.
     """
 
     kind: str
@@ -87,7 +86,7 @@ class Tape:
 
     @property
     def inputs(self) -> frozenset[int]:
-        """The slots of inputs on which the function depends."""
+        """The inputs, as slots, on which the function depends."""
         used = {slot for each in self.operations for slot in slots_of(each)}
         used |= {slot for output in self.outputs for slot, _ in output.terms}
         return frozenset(slot for slot in used if slot < self.n_inputs)
@@ -116,7 +115,7 @@ class Tape:
 
     @property
     def n_switches(self) -> int:
-        """The number of operations of the kinds `SWITCHES`."""
+        """The number of operations in `SWITCHES`."""
         return sum(each.kind in SWITCHES for each in self.operations)
 
     @property
@@ -205,8 +204,8 @@ def live_slots(
     """Compute the operations on which the outputs depend, operands first, and return their slots.
 
     Of a "select" only the chosen operand is computed; the other may be singular. `compute` is
-    called for each slot, `is_true` for the slot of a computed condition. The derivatives of
-    `WITH_DERIVATIVE` are computed only if `for_series`.
+    called for each slot, `is_true` for that of a computed condition. Derivatives
+    (`WITH_DERIVATIVE`) are computed only if `for_series`.
     """
     known = set(range(tape.n_inputs))
     wanted = [slot for output in tape.outputs for slot, _ in output.terms]
@@ -264,12 +263,12 @@ def step(x: float) -> float:
 
 
 def whole(x: float) -> float:
-    """Return the largest whole number up to x."""
+    """Return the largest whole number up to x, or NaN unless x is finite."""
     return float(math.floor(x)) if math.isfinite(x) else math.nan
 
 
 def selected(condition: float, first: float, second: float) -> float:
-    """Return `first` if the condition is not 0, else `second`."""
+    """Return `first` if the condition holds, else `second`."""
     return first if condition else second
 
 
@@ -327,7 +326,7 @@ def float_outputs(tape: Tape, inputs: Sequence[float]) -> list[float]:
 
 
 def _without_branches(tape: Tape, inputs: Sequence[float]) -> Tape:
-    """Return the tape with 0 in place of operations that have no effect for these inputs."""
+    """Return the tape with 0 for operations without effect for these inputs."""
     values: list[Any] = [*inputs, *[0.0] * len(tape.operations)]
 
     def compute(slot: int) -> None:

@@ -1,4 +1,4 @@
-"""The torque law: a torque that depends on time alone, and its values for symbols."""
+"""The torque law: a torque that depends on time alone."""
 
 import itertools
 from collections.abc import Iterable
@@ -25,8 +25,8 @@ class TorqueLaw:
 
     N(t) = constant + rate t + sum of amplitude sin(frequency t) + sum of amplitude cos(frequency t)
 
-    For a body with moments or inertia, N is a torque in N m. For a body with coefficients, N is
-    torque over moment in rad/s2. The fields are tuples of floats.
+    N is a torque in N m; for a body with coefficients, torque over moment in rad/s2. The fields are
+    tuples of floats.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class TorqueLaw:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        """Check the fields, and convert numbers to floats."""
+        """Check the fields; convert numbers to floats."""
         for name in ("constant", "rate"):
             object.__setattr__(self, name, three(f"[torque] {name}", getattr(self, name)))
         for name in ("sines", "cosines"):
@@ -113,13 +113,13 @@ class TorqueLaw:
 
     @property
     def varies(self) -> bool:
-        """Whether the torque N depends on time."""
+        """Whether N depends on time."""
         waves = self.sines + self.cosines
         return any(self.rate) or any(any(amplitude) for amplitude, _ in waves)
 
     @property
     def is_zero(self) -> bool:
-        """Whether the torque N is zero at all times."""
+        """Whether N is zero at all times."""
         return not (self.varies or any(self.constant))
 
     @property
@@ -155,7 +155,7 @@ def _waves(where: str, values: object) -> tuple[Wave, ...]:
 
 
 def law_value(law: TorqueLaw, time: Any) -> Array:
-    """Return the three components of a law at a time, about the law's axes."""
+    """Return the components of a law at a time, about the law's axes."""
     found: list[Any] = [c + r * time for c, r in zip(law.constant, law.rate, strict=True)]
     waves = [(amplitude, np.sin(frequency * time)) for amplitude, frequency in law.sines]
     waves += [(amplitude, np.cos(frequency * time)) for amplitude, frequency in law.cosines]
@@ -165,7 +165,7 @@ def law_value(law: TorqueLaw, time: Any) -> Array:
 
 
 def law_integral(law: TorqueLaw, time: Any) -> Array:
-    """Return the three components of the integral of a law from time 0."""
+    """Return the components of the integral of a law from time 0."""
     square = time * time
     found: list[Any] = [
         c * time + 0.5 * r * square for c, r in zip(law.constant, law.rate, strict=True)
@@ -191,7 +191,7 @@ def law_derivative(law: TorqueLaw) -> TorqueLaw:
 
 
 def to_body(vector: Any, attitude: Any) -> Array:
-    """Return the components about the body axes of a vector about the axes of space.
+    """Return a vector about the axes of space in components about the body axes.
 
     The rotation matrix is used so that all terms of a recorded torque share its products.
     """

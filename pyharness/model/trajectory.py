@@ -1,4 +1,4 @@
-"""Trajectories, the results for one scene; and the base class of results for many bodies."""
+"""Trajectories, and the base class of results for many bodies."""
 
 import math
 import textwrap
@@ -183,7 +183,7 @@ class Trajectory(Conversions):
 
     @property
     def states(self) -> dict[str, Array]:
-        """The scene's own states by name, each of shape (n,)."""
+        """The own states by name, each of shape (n,)."""
         if self.own is None or self.scene is None:
             return {}
         return {each.name: self.own[:, k] for k, each in enumerate(self.scene.states)}
@@ -202,7 +202,7 @@ class Trajectory(Conversions):
 
     @property
     def message(self) -> str:
-        """A sentence that says how the integration ended."""
+        """A sentence on how the integration ended."""
         if self.stop is not None:
             return (
                 f"The Lipschitz test ended the run at step {self.stop.step}, because the Lipschitz "

@@ -2,8 +2,8 @@
 
 The archive has an array for each attribute, the text `scene` of a scene file, and `header` with
 everything else in JSON, such as a tape (recorded torque). In a tape, a linear combination is a list
-of its constant and of pairs of slot and coefficient. An operation is a list of its kind, followed
-by its operands, its linear combination, or the breaks and pieces of its table.
+of its constant and of pairs of slot and coefficient. An operation is a list of its kind and its
+operands, its linear combination, or the breaks and pieces of its table.
 """
 
 import json
@@ -122,7 +122,7 @@ def _moments_record(moments: Any) -> Any:
 
 
 def _scene_record(scene: Scene) -> tuple[dict[str, Any], str]:
-    """Return the data that a scene file lacks, for JSON, and the text of the scene file."""
+    """Return, for JSON, the data that a scene file lacks, and the text of this file."""
     record: dict[str, Any] = {
         "masses": scene.masses,
         "forces": scene.forces,

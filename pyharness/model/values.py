@@ -1,6 +1,6 @@
 """Checks of user input, and conversions to plain Python numbers.
 
-Each InputError begins with `where`.
+A function with an argument `where` raises InputError, beginning with it, for any other value.
 """
 
 import itertools
@@ -32,7 +32,7 @@ def triple(values: Iterable[T]) -> tuple[T, T, T]:
 
 
 def number(where: str, value: object) -> float:
-    """Return a real number, perhaps not finite, as a float, or raise InputError."""
+    """Return a real number, perhaps not finite, as a float."""
     found = converted(value)
     if isinstance(found, float):
         return found
@@ -44,13 +44,13 @@ def number(where: str, value: object) -> float:
 
 
 def unit_of(value: object) -> str:
-    """Return the unit of a quantity, as of astropy or pint, or an empty text."""
+    """Return the unit of a quantity, as in astropy or pint, or an empty text."""
     unit = getattr(value, "unit", None) or getattr(value, "units", None)
     return str(unit) if unit is not None and hasattr(value, "to") else ""
 
 
 def converted(value: object) -> float | str:
-    """Return a real number as a float; for anything else, or beyond binary64, its description."""
+    """Return a real number as a float; for anything else, or beyond binary64, a description."""
     if type(value) is float:
         return value
     if is_no_number(value):
@@ -74,7 +74,7 @@ def is_no_number(value: object) -> bool:
 
 
 def parsed_float(text: str) -> float:
-    """Return the number in `text`, or raise ValueError, also for a number with underscores."""
+    """Return the number in `text`; raise ValueError for other text, also with underscores."""
     return float(_read_text(text))
 
 
@@ -90,12 +90,12 @@ def _read_text(text: str) -> str:
 
 
 def three(where: str, values: object) -> Triple:
-    """Return three finite numbers as floats, or raise InputError."""
+    """Return three finite numbers as floats."""
     return triple(finite(where, each) for each in three_floats(where, values))
 
 
 def three_floats(where: str, values: object) -> Triple:
-    """Return three real numbers, perhaps not finite, as floats, or raise InputError."""
+    """Return three real numbers, perhaps not finite, as floats."""
     if type(values) is tuple and [type(each) for each in values] == _THREE_FLOATS:
         return values
     allowed = "allowed: three numbers"
@@ -107,7 +107,7 @@ def three_floats(where: str, values: object) -> Triple:
 
 
 def finite(where: str, value: object) -> float:
-    """Return a finite number as a float, or raise InputError."""
+    """Return a finite number as a float."""
     found = number(where, value)
     if not math.isfinite(found):
         raise InputError(f"{where}: {found:g} is not finite; allowed: finite numbers")
@@ -115,7 +115,7 @@ def finite(where: str, value: object) -> float:
 
 
 def number_list(where: str, values: object, allowed: str) -> Iterable[object]:
-    """Return an iterator over a user's ordered collection, or raise InputError."""
+    """Return an iterator over a user's ordered collection."""
     if not isinstance(values, (str, bytes, bytearray, Mapping, Set)):
         try:
             return iter(values)  # type: ignore[call-overload, no-any-return]
@@ -127,7 +127,7 @@ def number_list(where: str, values: object, allowed: str) -> Iterable[object]:
 
 
 def integer(where: str, value: object) -> int:
-    """Return a whole number as an int; raise InputError for anything else, such as a float."""
+    """Return a whole number, not a float, as an int."""
     if type(value) is int:
         return value
     if not is_no_number(value):
@@ -139,14 +139,14 @@ def integer(where: str, value: object) -> int:
 
 
 def boolean(where: str, value: object) -> bool:
-    """Return True or False, of Python or NumPy, or raise InputError."""
+    """Return True or False, of Python or NumPy, as a bool."""
     if isinstance(value, bool) or kind_of(value) == "true or false":
         return bool(value)
     raise InputError(f"{where} is {kind_of(value)}; allowed: True or False")
 
 
 def tolerance_of(value: object, finest: float) -> float:
-    """Return a user's tolerance as a float, or raise InputError; its range is not checked."""
+    """Return a tolerance as a float, without a check of its range, or raise InputError."""
     found = converted(value)
     if isinstance(found, float):
         return found

@@ -1,9 +1,9 @@
 """Exact sums of the waves of a torque law that have the same frequency.
 
-A solver divides each amplitude by a moment, and rounds the quotient. If two amplitudes of opposite
-sign nearly cancel, to 1e-10 of their size, the sum of the rounded quotients has only six correct
-digits. The exact sum, rounded afterwards, has all. A merged law has at most one sine and one cosine
-of each frequency, and none of frequency 0.
+A solver rounds each quotient of amplitude and moment. If two amplitudes cancel to 1e-10 of their
+size, the sum of the rounded quotients has only six correct digits; the exact sum, rounded
+afterwards, has all. A merged law has at most one sine and one cosine of each frequency, and none of
+frequency 0.
 """
 
 import math
@@ -28,7 +28,7 @@ _ZERO = (Fraction(0), Fraction(0), Fraction(0))
 
 
 def merged(law: TorqueLaw) -> TorqueLaw:
-    """Return a merged torque law, or the argument itself if nothing changes."""
+    """Return the merged torque law, the argument itself if nothing changes."""
     return exact_law(law) if is_mergeable(law) else law
 
 
@@ -92,7 +92,7 @@ def with_merged_waves(scene: Scene) -> Scene:
 
 
 def with_merged_rows(constant: Array, sines: Array, cosines: Array) -> tuple[Array, Array, Array]:
-    """Return the constants, sines and cosines of m torque laws, merged in each finite law.
+    """Return the constants, sines and cosines of m torque laws, merged if finite.
 
     Shapes are (m, 3), (m, k, 4) and (m, l, 4), or one row for all; a wave is three amplitudes and a
     frequency (rad/s). Laws with fewer waves than others are padded with zeros.
@@ -142,6 +142,6 @@ def _mergeable_rows(sines: Array, cosines: Array) -> NDArray[np.bool_]:
 
 
 def _without_empty(waves: Array) -> Array:
-    """Return the waves, (m, k, 4), without those whose amplitudes are 0 in all laws."""
+    """Return the waves, (m, k, 4), without those of amplitude 0 in all laws."""
     is_one = waves[..., :3].any(axis=-1) | ~np.isfinite(waves[..., 3])
     return np.ascontiguousarray(waves[:, is_one.any(axis=0)])

@@ -73,8 +73,8 @@ def read_archive(
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return the arrays and the header of an archive, or raise InputError.
 
-    Messages begin with `where`, and describe a valid file by `written`. `kinds` has the kind of
-    file as named in the header and in messages; `known` has the allowed arrays.
+    Messages begin with `where`, and describe a valid file by `written`. `kinds` names the kind of
+    file in the header and in messages; `known` has the allowed arrays.
     """
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     content = read_input(name, where, memory // 4, written)
@@ -104,7 +104,6 @@ def read_archive(
 def _arrays(
     content: bytes, known: Iterable[str], names: Sequence[str] = ()
 ) -> tuple[dict[str, Any], str]:
-    """Return the arrays `names`, by default all, and the digest of all but `DIGEST`."""
     found, digest = {}, hashlib.sha256()
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         allowed = {f"{name}.npy" for name in ("header", DIGEST, *known)}

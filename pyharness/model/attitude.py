@@ -77,7 +77,7 @@ def of_angles(where: str, angles_deg: object, sequence: object) -> Quaternion:
 
 
 def product(p: Iterable[Any], q: Iterable[Any]) -> tuple[Any, Any, Any, Any]:
-    """Return Hamilton's product p q of quaternions, whose components are numbers or arrays."""
+    """Return Hamilton's product p q of quaternions of numbers or arrays."""
     (a, b, c, d), (e, f, g, h) = p, q
     return (
         a * e - b * f - c * g - d * h,

@@ -25,7 +25,7 @@ class Dual:
         return Dual(value, [slope * each for each in self.slopes])
 
     def __add__(self, other: Any) -> "Dual":
-        """Return the sum with any number."""
+        """Return the sum."""
         second = dual(other, len(self.slopes))
         slopes = [x + y for x, y in zip(self.slopes, second.slopes, strict=True)]
         return Dual(self.value + second.value, slopes)
@@ -33,15 +33,15 @@ class Dual:
     __radd__ = __add__
 
     def __sub__(self, other: Any) -> "Dual":
-        """Return this number minus any number."""
+        """Return this number minus `other`."""
         return self.__add__(-1.0 * other)
 
     def __rsub__(self, other: Any) -> "Dual":
-        """Return any number minus this one."""
+        """Return `other` minus this number."""
         return self.__mul__(-1.0).__add__(other)
 
     def __mul__(self, other: Any) -> "Dual":
-        """Return the product with any number."""
+        """Return the product."""
         second = dual(other, len(self.slopes))
         slopes = [
             x * second.value + self.value * y
@@ -52,7 +52,7 @@ class Dual:
     __rmul__ = __mul__
 
     def __truediv__(self, other: Any) -> "Dual":
-        """Return the quotient by any number."""
+        """Return the quotient."""
         second = dual(other, len(self.slopes))
         quotient = self.value / second.value
         slopes = [
@@ -62,7 +62,7 @@ class Dual:
         return Dual(quotient, slopes)
 
     def __rtruediv__(self, other: Any) -> "Dual":
-        """Return a number divided by this one."""
+        """Return `other` over this number."""
         return dual(other, len(self.slopes)) / self
 
 
@@ -105,7 +105,7 @@ def of_duals(
 ) -> Callable[[Any], Any]:
     """Return `function` for numbers and dual numbers; its derivative is ``slope(argument, value)``.
 
-    Unless it is None, `symbolic` computes the values of dual numbers.
+    `symbolic`, if any, computes the values of dual numbers.
     """
 
     def called(x: Any) -> Any:

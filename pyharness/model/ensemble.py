@@ -147,7 +147,7 @@ class Ensemble(BatchResult):
         return energy
 
     def with_times(self, times: Array) -> "Ensemble":
-        """Return this result for n * m bodies as a result for n bodies at m times, as views."""
+        """Return this result for n * m bodies as one for n bodies at m times, as views."""
 
         def divided(array: Any) -> Any:
             return None if array is None else array.reshape(-1, len(times), *array.shape[1:])
@@ -234,8 +234,8 @@ class Ensemble(BatchResult):
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Draw the three components of omega of all bodies with matplotlib.
 
-        With `times`, the median and the band of the middle 90 % of the bodies are drawn; else the
-        cumulative distribution of the final values.
+        With `times`, it draws the median and the middle 90 % of the bodies, else the cumulative
+        distribution of the final values.
 
         Parameters
         ----------
@@ -295,16 +295,6 @@ class Ensemble(BatchResult):
     @staticmethod
     def load(path: str | os.PathLike[str]) -> "Ensemble":
         """Return the ensemble that `Ensemble.save` wrote to a file.
-
-        Parameters
-        ----------
-        path : str or path
-            The path of the file.
-
-        Returns
-        -------
-        Ensemble
-            The ensemble.
 
         Raises
         ------

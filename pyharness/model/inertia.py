@@ -1,9 +1,9 @@
 """Principal moments and principal axes of full inertia matrices.
 
 Symmetric matrices are diagonalised in integers, because in binary64 a small eigenvalue would have
-few correct digits. The elements are integer multiples of a power of 2, the unit, so that the
-absolute determinant of a regular matrix is at least the cube of the unit. This bounds the smallest
-absolute eigenvalue from below, which determines how many bits are enough.
+few correct digits. The elements are integer multiples of a power of 2, the unit; the absolute
+determinant of a regular matrix is at least its cube. This bounds the smallest absolute eigenvalue
+from below, which determines how many bits are enough.
 """
 
 import math

@@ -117,7 +117,7 @@ def _comparison(compare: Callable[[Any, Any], Any]) -> Any:
 
 
 class SymbolArray(np.ndarray[Any, Any]):
-    """An array of symbols, whose comparisons are arrays of conditions instead of truth values."""
+    """An array of symbols, whose comparisons are arrays of conditions."""
 
     __lt__, __le__ = _comparison(operator.lt), _comparison(operator.le)
     __gt__, __ge__ = _comparison(operator.gt), _comparison(operator.ge)
@@ -187,7 +187,6 @@ def _arctan2(y: Any, x: Any) -> Any:
 
 
 def _interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None) -> Any:
-    """Return the piecewise linear function through points, constant beyond them by default."""
     places, values = np.asarray(xp, dtype=float), np.asarray(fp, dtype=float)
 
     def piecewise(at: Any) -> Any:
@@ -274,7 +273,7 @@ def called_once(
 ) -> list[Any]:
     """Return the components that a user's function returns for symbols.
 
-    Raise InputError if the function raises an exception; `allowed` describes allowed functions.
+    Raise InputError, which names `allowed` functions, if it raises an exception.
     """
     for with_targets in (False, True):
         try:

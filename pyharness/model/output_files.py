@@ -49,8 +49,8 @@ def check_writable(path: str, option: str) -> None:
 def write_files(contents: dict[str, bytes], option: str) -> None:
     """Write several files, all or none; raise InputError, which names `option`, on failure.
 
-    Files are written under temporary names, then renamed. After a failure or Ctrl-C, the previous
-    files are restored. Devices and pipes are written first, and never replaced.
+    They get temporary names, then are renamed. After a failure or Ctrl-C, the previous files are
+    restored. Devices and pipes are written first, and never replaced.
     """
     path = ""
     try:

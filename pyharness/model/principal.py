@@ -134,7 +134,7 @@ def _rotate(frame: PrincipalFrame, vector: Triple) -> Triple:
 
 
 def axes_and_turn(scene: Scene) -> tuple[Array, Quaternion]:
-    """Return the principal axes of a full inertia matrix, as columns and as a quaternion."""
+    """Return the principal axes of a full inertia matrix, as columns and quaternion."""
     assert scene.inertia is not None
     axes = principal_frame(scene.inertia).axes
     return axes.copy(), quaternion_of_axes(axes)

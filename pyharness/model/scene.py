@@ -291,7 +291,7 @@ class Scene:
     def euler_coefficients(self) -> Triple:
         """The coefficients A = (I2 - I3)/I1, B, C of Euler's equations (13-15 of the thesis).
 
-        Raise InputError for a full inertia matrix, or one that changes with time.
+        Raise InputError for a full inertia matrix or a changing inertia.
         """
         if self.coefficients is not None:
             return self.coefficients
@@ -304,7 +304,7 @@ class Scene:
     def exact_moments(self) -> "Exact | None":
         """The principal moments (kg m2) as exact fractions; None for a body with coefficients.
 
-        Raise InputError for a full inertia matrix, or one that changes with time.
+        Raise InputError for a full inertia matrix or a changing inertia.
         """
         if self.coefficients is not None:
             return None
@@ -339,10 +339,7 @@ class Scene:
 
     @property
     def law(self) -> TorqueLaw:
-        """The torque as a torque law.
-
-        Raise InputError if it depends on the state, or the inertia changes.
-        """
+        """The torque law; raise InputError for a StateTorque or a changing inertia."""
         if self.changing is not None:
             raise InputError(CHANGING)
         if isinstance(self.torque, StateTorque):
@@ -385,13 +382,12 @@ Scene.__init__ = with_hints(Scene.__init__)  # type: ignore[method-assign]
 
 
 def breaks_triangle(moments: Iterable[Any]) -> bool:
-    """Return whether the largest moment exceeds the sum of the others by more than rounding."""
+    """Return whether the largest moment exceeds the others' sum by more than rounding."""
     low, middle, high = sorted(moments)
     return bool((high - middle - low) * _ROUNDED > high)
 
 
 def _warn_of_impossible(scene: Scene) -> None:
-    """Warn of impossible moments, at the line of the user's code."""
     frame, level = sys._getframe(), 1
     while frame.f_back is not None and frame.f_globals.get("__name__") in _BETWEEN:
         frame, level = frame.f_back, level + 1
@@ -426,7 +422,7 @@ def checked_scene(
     changing: bool = False,
     states: bool = False,
 ) -> Scene:
-    """Return `scene`; raise InputError unless it is a Scene of a kind that the flags allow.
+    """Return `scene`; raise InputError unless it is a Scene that the flags allow.
 
     They allow a full inertia matrix (`any_axes`), a torque about the axes of space (`any_torque`)
     or dependent on the state (`any_state`), a changing inertia, and own states.

@@ -26,7 +26,7 @@ _WAVES = ("sines", "cosines")
 
 
 def case_numbers() -> list[int]:
-    """Return the numbers of the cases of Table 1 of the thesis."""
+    """Return the numbers of the cases of Table 1."""
     return [entry["number"] for entry in facts("cases")["case"]]
 
 
@@ -169,7 +169,6 @@ def _torque_lines(scene: Scene) -> list[str]:
 
 
 def _term_lines(term: tuple[tuple[str, Any], ...], changing: Changing | None) -> list[str]:
-    """Return the lines of a ready term, whose changing inertia, if any, must be the body's."""
     if any(isinstance(value, Changing) and value != changing for _, value in term):
         raise InputError(
             f"[torque]: a term {term[0][1]} whose changing inertia differs from the body's "

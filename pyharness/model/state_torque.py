@@ -81,7 +81,7 @@ class StateTorque:
     in_space: bool = field(default=False, init=False, repr=False)
 
     def __repr__(self) -> str:
-        """Return one line without the operations of the tape."""
+        """Return one line without operations."""
         if self.tape is None:
             return f"StateTorque(opaque, needs_attitude={self.needs_attitude})"
         # Expressions and constants may be long, and are shortened as one text.
@@ -102,10 +102,9 @@ class StateTorque:
         attitude: Sequence[float],
         own: Sequence[float] = (),
     ) -> Triple:
-        """Return the torque at `time` (s), omega (rad/s) and attitude; NaN where it is singular.
+        """Return the torque at `time` (s), omega (rad/s), attitude and own states; NaN if singular.
 
-        `own` has the values of the own states. Raise InputError if an opaque function does not
-        return three numbers.
+        Raise InputError if an opaque function does not return three numbers.
         """
         if self.tape is None:
             assert self.function is not None
@@ -390,7 +389,7 @@ def law_of(torque: StateTorque) -> TorqueLaw | None:
 
 
 def _with_parameters(torque: StateTorque, function: Function, called: Function) -> StateTorque:
-    """Return a torque whose parameters are the numeric keywords that its function can record."""
+    """Return the torque with its parameters: the numeric keywords that can be recorded."""
     values = {
         each.name: value
         for each in signature(function).parameters.values()

@@ -75,7 +75,7 @@ class Recorder:
         return [Symbol(self, 0.0, {slot: 1.0}) for slot in range(self._n_inputs)]
 
     def refusal(self, what: str, write: str = _ALLOWED) -> InputError:
-        """Return the exception for an operation that can't be recorded, which suggests `write`."""
+        """Return the exception for an operation that can't be recorded; it suggests `write`."""
         allowed = f"allowed: {write}, or {self._instead}"
         where = _line() if self._has_lines else ""
         return InputError(f"{self.place}: {what} can't be recorded{where}; {allowed}")
@@ -131,7 +131,6 @@ class Recorder:
 def _of_symbols(
     operator: Callable[["Symbol", "Symbol"], Any],
 ) -> Callable[["Symbol", Any], "Symbol"]:
-    """Return an operator of a symbol and a real number; NotImplemented for other values."""
 
     @wraps(operator)
     def called(self: "Symbol", value: Any) -> "Symbol":
@@ -142,7 +141,6 @@ def _of_symbols(
 
 
 def _is_moderate(factor: float) -> bool:
-    """Return whether a constant factor can be moved out of products without underflow."""
     return _LEAST_FACTOR <= abs(factor) <= 1.0 / _LEAST_FACTOR
 
 
@@ -211,7 +209,6 @@ class Symbol:
         return self.recorder.slot(Operation("linear", (), self.linear())), 1.0
 
     def _other(self, value: Any) -> "Symbol | None":
-        """Return the other operand as a symbol; None if it is no number."""
         if isinstance(value, Symbol):
             if value.recorder is not self.recorder:
                 raise self.recorder.impure()
@@ -428,7 +425,7 @@ class Symbol:
     __rmod__ = _of_symbols(lambda x, y: y - x * (y / x).floor())
 
     def __getattr__(self, name: str) -> Any:
-        """Return a composed function, and refuse others; NumPy looks them up by name."""
+        """Return a composed function, which NumPy looks up by name; refuse others."""
         if name in _COMPOSED:
             return partial(_COMPOSED[name], self)
         # NumPy's mean works without `dtype`.
@@ -447,7 +444,7 @@ class Condition(Symbol):
         return _condition(select(self, other, False))
 
     def __or__(self, other: Any) -> Any:
-        """Return the condition that at least one holds."""
+        """Return the condition that one or both hold."""
         return _condition(select(self, True, other))
 
     def __xor__(self, other: Any) -> Any:
@@ -497,7 +494,7 @@ def _line() -> str:
 
 
 def recorded_twice(record: Callable[[Recorder], Tape], recorder: Callable[[], Recorder]) -> Tape:
-    """Return the tape of a user's function; raise InputError if a second recording differs."""
+    """Return the tape of a user's function; raise InputError if a second one differs."""
     first, again = record(recorder()), recorder()
     if record(again) != first:
         raise again.impure()

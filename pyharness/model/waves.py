@@ -128,7 +128,7 @@ def with_merged_rows(constant: Array, sines: Array, cosines: Array) -> tuple[Arr
 
 
 def _mergeable_rows(sines: Array, cosines: Array) -> NDArray[np.bool_]:
-    """Return which of m torque laws `merged` changes, (m,), or (1,) for shared rows."""
+    """Return which of m laws `merged` changes, (m,), or (1,) for shared rows."""
     found = np.zeros(1, bool)
     for waves in (sines, cosines):
         if waves.size:
@@ -142,6 +142,5 @@ def _mergeable_rows(sines: Array, cosines: Array) -> NDArray[np.bool_]:
 
 
 def _without_empty(waves: Array) -> Array:
-    """Return the waves, (m, k, 4), without those of amplitude 0 in all laws."""
     is_one = waves[..., :3].any(axis=-1) | ~np.isfinite(waves[..., 3])
     return np.ascontiguousarray(waves[:, is_one.any(axis=0)])

@@ -407,8 +407,8 @@ class Conversions:
         Raises
         ------
         InputError
-            If the file can't be written, the torque is opaque, or a program in another arithmetic
-            than binary64 computed the trajectory.
+            If the file can't be written or has a text file's ending, the torque is opaque, or a
+            program in another arithmetic than binary64 computed the trajectory.
 
         Examples
         --------

@@ -273,7 +273,7 @@ def called_once(
 ) -> list[Any]:
     """Return the components that a user's function returns for symbols.
 
-    Raise InputError, which names `allowed` functions, if it raises an exception.
+    Raise InputError, which describes `allowed` functions, if the function raises an exception.
     """
     for with_targets in (False, True):
         try:

@@ -1,6 +1,6 @@
 """Recurrences, slopes and rounding errors of recorded operations, as C.
 
-The interpreter (by fortran/make_cases.py) and leaves.py take them from here.
+Users: the interpreter (by fortran/make_cases.py) and `pyharness.engine.leaves`.
 """
 
 from typing import NamedTuple

@@ -51,7 +51,7 @@ def counted(number: int, what: str) -> str:
 
 
 def format_duration(seconds: float) -> str:
-    """Return a duration in seconds to days."""
+    """Return a duration as text, in seconds to days."""
     for limit, unit, name in ((120.0, 1.0, "s"), (7200.0, 60.0, "min"), (172800.0, 3600.0, "h")):
         if seconds < limit:
             return f"{seconds / unit:{'.2g' if seconds < 100.0 else '.0f'}} {name}"
@@ -59,7 +59,7 @@ def format_duration(seconds: float) -> str:
 
 
 def format_count(number: int) -> str:
-    """Return a count, with four digits from ten million on."""
+    """Return a count as text, with four digits from ten million on."""
     return str(number) if number < 10**7 else f"{float(number):.4g}"
 
 

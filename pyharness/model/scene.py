@@ -113,8 +113,8 @@ class Scene:
     inertia : three rows of three numbers, ChangingInertia, or function of t, optional
         A symmetric inertia matrix about the body axes (kg m2).
     changing : ChangingMoments, ChangingInertia, or a recorded function, optional
-        An inertia that changes with time; the field `moments` or `inertia` from which it comes is
-        None.
+        An inertia that changes with time. One given as `moments` or `inertia` is moved here from
+        that field, which becomes None.
     states : dict of str to float, or to pair of floats, optional
         Own states: at most eight unknowns beside omega and attitude, in any unit. The dict has each
         name with its value at time 0, or with a pair of this value and a scale. The torque is then

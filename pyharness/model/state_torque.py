@@ -188,7 +188,8 @@ def turned_law(law: TorqueLaw, time: Symbol, attitude: Any) -> Array:
 def recorded(function: Function, states: Sequence[str] = ()) -> StateTorque:
     """Return the torque that a user's function computes, recorded with symbols.
 
-    Use it for one of several summands; a scene's only torque can be passed to `Scene` directly.
+    Use it for a function that is one of several summands; a scene's only torque can be passed to
+    `Scene` directly.
 
     Parameters
     ----------

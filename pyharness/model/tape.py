@@ -31,7 +31,7 @@ WITH_DERIVATIVE = ("log", "atan", "asin")
 
 
 class Linear(NamedTuple):
-    """A constant plus a linear combination: `terms` are pairs of slot and coefficient, by slot."""
+    """A constant plus a linear combination: `terms` are slot-coefficient pairs, sorted by slot."""
 
     constant: float
     terms: tuple[tuple[int, float], ...]

@@ -30,7 +30,7 @@ _HINTS = {
 
 
 def with_hints(function: Callable[P, R]) -> Callable[P, R]:
-    """Return the function, with a TypeError that names our keyword for one of SciPy."""
+    """Return the function; its TypeError for a keyword of SciPy names our keyword."""
     allowed = [each for each in inspect.signature(function).parameters if each != "self"]
     names = frozenset(allowed)
 

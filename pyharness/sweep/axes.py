@@ -1,4 +1,4 @@
-"""Axes of a sweep's grid. Each axis varies one field of the scene or of the solver."""
+"""Axes of a sweep's grid, each of which varies one field of the scene or of the solver."""
 
 import math
 import zlib
@@ -106,12 +106,12 @@ RIVALS = (
 
 
 def field_names() -> list[str]:
-    """Return the names of the fields that an axis may vary, without constants of expressions."""
+    """Return the fields that an axis may vary, except constants of a torque's expressions."""
     return [*NUMBERS, *CHOICES]
 
 
 def number_field(name: str) -> Field:
-    """Return the field `name`, a key of `NUMBERS` or a constant; raise KeyError for others."""
+    """Return the field `name`, a key of `NUMBERS` or a constant; raise KeyError if unknown."""
     if name.startswith(CONSTANTS):
         return Field("", "constant of the torque's expressions", looped=True)
     return NUMBERS[name]
@@ -158,11 +158,11 @@ class Axis:
 
     @property
     def is_choice(self) -> bool:
-        """Return whether the values are names instead of numbers."""
+        """Return whether the values are names."""
         return self.field in CHOICES
 
     def coordinates(self) -> NDArray[Any]:
-        """Return all values, shape (count,); cached, so callers must not change them."""
+        """Return all values, shape (count,); cached, so do not change them."""
         return _coordinates(self)
 
 
@@ -205,7 +205,7 @@ def _draw(axis: Axis) -> Floats:
 
 
 def _between(first: float, last: float, made: Callable[[float, float], Floats]) -> Floats:
-    """Return ``made(first, last)``, without an overflow if ``last - first`` is too large."""
+    """Return ``made(first, last)``, even if ``last - first`` overflows."""
     if math.isfinite(last - first):
         return made(first, last)
     # Numbers as large as these are halved and doubled exactly.
@@ -215,7 +215,7 @@ def _between(first: float, last: float, made: Callable[[float, float], Floats]) 
 
 
 def check_name(what: str, name: object, allowed: Iterable[str], where: str = "") -> str:
-    """Return `name`, read from a sweep file; raise InputError if it is not `allowed`."""
+    """Return `name`; raise InputError if it is not `allowed`."""
     if not isinstance(name, str) or name not in allowed:
         raise unknown(what, name, allowed, where)
     return name

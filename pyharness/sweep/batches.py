@@ -29,10 +29,9 @@ Columns = dict[str, Array]
 
 
 def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
-    """Solve chunk number `chunk` (counted from 0); every executor calls this function.
+    """Solve a chunk (numbered from 0); return an array for each reduction (stored quantity).
 
-    The result maps the name of each reduction (stored quantity) to an array with the shape of the
-    chunk, and one more dimension if the reduction has several components.
+    Each has the shape of the chunk, and one more dimension if the reduction has several components.
     """
     box = sweep.box(chunk)
     shape = tuple(part.stop - part.start for part in box)
@@ -43,7 +42,7 @@ def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
 def solve_points(sweep: Sweep, where: list[Indices]) -> Arrays:
     """Return the reductions of the scenes at `where`, an array of indices for each dimension.
 
-    The first dimension of each result runs over the scenes.
+    The first dimension of each reduction runs over the scenes.
     """
     n = len(where[0])
     found = {asked.name: empty(asked, n) for asked in sweep.reductions}
@@ -54,14 +53,14 @@ def solve_points(sweep: Sweep, where: list[Indices]) -> Arrays:
 
 
 def leaves_of_sweep(sweep: Sweep) -> str | None:
-    """Return `Ensemble.leaves` of the first scene."""
+    """Return what computed the Taylor terms of the first scene, as `Ensemble.leaves`."""
     first = [np.zeros(1, dtype=np.intp) for _ in sweep.shape]
     ((_, batch),) = batches(sweep, first)
     return batch.leaves
 
 
 def listing_of(program: str, listing: str, reading: str) -> Listing:
-    """Return the listing that the fields `listing` and `reading` of a sweep describe.
+    """Return the listing that a sweep's `listing` and `reading` describe.
 
     `listing` is ``original``, ``corrected``, ``fix:`` followed by the only defects to correct, or
     ``keep:`` followed by the only defects to keep. `reading` is ``adopted`` (our reading of every
@@ -77,7 +76,7 @@ def listing_of(program: str, listing: str, reading: str) -> Listing:
 
 
 def looped_fields(sweep: Sweep) -> list[str]:
-    """Return the varied fields whose values must be equal in all scenes of a batch."""
+    """Return the varied fields that must be equal in all scenes of a batch."""
     of_arrays = () if sweep.solver.program is None else OF_PROGRAMS
     own = ("body.",) if follows_body(sweep.scene) else ()
     names = [axis.field for axis in sweep.axes if axis.field not in of_arrays]
@@ -198,7 +197,7 @@ def _omega(scene: Scene, own: Columns, moments: Array | None, n: int) -> Array:
 
 
 def _tilted(scene: Scene, moments: Array | None, tilt: Array, azimuth: Array) -> Array:
-    """Return unit vectors, shape (n, 3), with given angles (rad) from the body's principal axes.
+    """Return unit vectors, shape (n, 3), at angles (rad) from the body's principal axes.
 
     `tilt` is the angle from the axis of the middle moment. `azimuth` is the angle about this axis,
     from the axis of the least moment towards the axis of the largest. `moments` (kg m2) has shape
@@ -239,7 +238,7 @@ def check_state_axis(scene: Scene, field: str) -> None:
 
 
 def check_state_solver(scene: Scene, methods: Sequence[str], has_program: bool) -> None:
-    """Raise InputError if a method, or a program, can't solve the scene's torque."""
+    """Raise InputError if a method or program can't solve the scene's torque."""
     torque = scene.torque
     if isinstance(torque, TorqueLaw):
         if torque.frame != "space":
@@ -268,7 +267,7 @@ def with_numbers(
 ) -> Scene:
     """Return the scene with other `constants` of its torque's expressions, and another body.
 
-    `values` are the moments, inertia or coefficients of the body, or None for the scene's own.
+    `values` are its moments, inertia or coefficients, or None for the scene's own.
     """
     data: dict[str, Any] = tomllib.loads(scene_text(scene))
     if constants:

@@ -39,8 +39,8 @@ _ADDRESS = re.compile(r"(?:(?:tcp|tls)://)?(?P<host>[\w.-]+|\[[\da-fA-F:.]+\]):(
 class Engine(NamedTuple):
     """A started executor.
 
-    `computed` takes a sweep and the numbers of the chunks to compute. As each chunk is completed,
-    it yields the number of the chunk and its results, an array for each reduction.
+    `computed` takes a sweep and the numbers of the chunks to compute. It yields the number of each
+    completed chunk, and an array for each reduction.
     """
 
     workers: int
@@ -52,11 +52,11 @@ class Engine(NamedTuple):
 def engine(
     executor: str, workers: int | None = None, address: str | None = None
 ) -> Iterator[Engine]:
-    """Start an executor, and yield it as an Engine.
+    """Start the executor ``here``, ``processes`` or ``dask``, and yield it as an Engine.
 
-    `executor` is ``here``, ``processes`` or ``dask``; `workers` is by default the number of
-    processors. Without the `address` of a scheduler, ``dask`` starts a cluster on this machine.
-    Raise InputError if no scheduler with a worker answers, and also later if no worker is left.
+    `workers` is by default the number of processors. Without the `address` of a scheduler, ``dask``
+    starts a cluster on this machine. Raise InputError if no scheduler with a worker answers;
+    `computed` raises it if workers die repeatedly.
     """
     if executor == "here":
         yield Engine(1, _solve_here, is_here=True)
@@ -127,8 +127,8 @@ def _by_pool(sweep: Sweep, chunks: list[int], workers: int) -> Results:
 def deaf_children() -> Iterator[None]:
     """Block Ctrl-C in all processes and threads that are started within this context.
 
-    A terminal sends SIGINT to all its processes, but only the parent process should react. Until
-    the context ends, the signal is also withheld from the calling thread.
+    A terminal sends SIGINT to all its processes, but only the parent should react. Until the
+    context ends, the calling thread does not receive it either.
     """
     # Children inherit a blocked signal. Python would start the resource tracker with the first
     # child, and then unblock the signal.
@@ -147,7 +147,7 @@ def deaf_children() -> Iterator[None]:
 
 
 def end_with_parent() -> None:
-    """Start a thread that ends this process as soon as its parent process, if any, ends."""
+    """Start a thread that ends this process when its parent process, if any, ends."""
     parent = multiprocessing.parent_process()
     if parent is None:
         return
@@ -170,7 +170,7 @@ def check_dask() -> None:
 
 @contextlib.contextmanager
 def _local_cluster(dask: Any, workers: int) -> Iterator[Any]:
-    """Start a Dask cluster on this machine, which Ctrl-C can interrupt, and yield a client."""
+    """Start a Dask cluster on this machine, interruptible by Ctrl-C, and yield a client."""
     started: list[Any] = []
     errors: list[Exception] = []
     wanted = threading.Event()
@@ -230,9 +230,9 @@ def _connected(dask: Any, address: str) -> Any:
 
 
 async def _has_workers(dask: Any, address: str, answered: list[bool]) -> None:
-    """Wait until the Dask scheduler has workers; the caller limits the time.
+    """Wait until the Dask scheduler has workers; append True to `answered` until then.
 
-    Each answer without workers appends True to `answered`.
+    The caller limits the time.
     """
     # A Dask client would wait half a minute for a server that accepts the connection but does not
     # answer; the scheduler is therefore called directly.

@@ -26,13 +26,13 @@ RANKS = ("least", "middle", "largest")
 
 @dataclass(frozen=True)
 class Reduction:
-    """A quantity for each scene, and its computation.
+    """A quantity of each scene, and its computation.
 
     `compute` takes a batch of n scenes and the parameters. It returns n values, or n rows with a
     value for each of `labels`; `dimension` names this dimension in the store. `only` is `program`
-    or `method` if the quantity exists for programs or methods alone. `needs` lists requirements of
-    the scene: `moments`, `no torque` or `attitude`. `parameters` has the defaults. If the values
-    are codes of outcomes, `flags` has their meanings.
+    or `method` if only programs or only methods have it. `needs` lists requirements of the scene:
+    `moments`, `no torque` or `attitude`. `parameters` has the defaults. If the values are codes of
+    outcomes, `flags` has their meanings.
     """
 
     title: str
@@ -295,14 +295,14 @@ def needs_attitudes(asked: Iterable[ReductionSpec]) -> bool:
 
 
 def empty(asked: ReductionSpec, n: int) -> Found:
-    """Return an array of missing values for n scenes, shape (n,) or (n, components)."""
+    """Return missing values for n scenes, shape (n,) or (n, components)."""
     reduction = REDUCTIONS[asked.reduction]
     shape = (n, len(reduction.labels)) if reduction.labels else (n,)
     return np.full(shape, reduction.fill, dtype=reduction.dtype)
 
 
 def reduced(asked: ReductionSpec, batch: Batch) -> Found:
-    """Return a reduction of a batch: for each scene, a value or a row of components."""
+    """Return a reduction of a batch: a value or a row of components for each scene."""
     given = {**dict(asked.parameters), "function": asked.function}
     # Infinities and NaN are valid results.
     with np.errstate(all="ignore"):

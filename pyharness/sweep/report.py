@@ -145,10 +145,9 @@ Scale = tuple[float, float, bool]
 
 
 def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
-    """Return the reduction `name`, or by default the first whose values are numbers.
+    """Return the reduction `name`, by default the first whose values are numbers.
 
-    If there are only codes of outcomes, the default is the first reduction. Raise InputError for an
-    unknown name.
+    If all have codes of outcomes, the default is the first. Raise InputError for an unknown name.
     """
     names = [asked.name for asked in sweep.reductions]
     if name is not None and name not in names:
@@ -158,11 +157,10 @@ def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
 
 
 def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
-    """Return the picture of a reduction.
+    """Return the picture of a reduction; its form depends on the dimensions with several numbers.
 
-    Its form depends on the dimensions that have several numbers which are not random. With two or
-    more, the picture is a map over the last two; with one, a line. With none, it shows dots over a
-    random dimension.
+    If two or more are not random, it is a map over the last two of these; if one, a line, or dots
+    at listed values; if none, dots over a random dimension.
     """
     from matplotlib.figure import Figure
 

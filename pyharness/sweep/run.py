@@ -43,7 +43,7 @@ class Estimate(NamedTuple):
 def forecast(sweep: Sweep, path: str, n_missing: int, own: Engine) -> float:
     """Return the time (s) to solve and write the missing chunks, and to read all chunks.
 
-    If other processes compute, solving and writing overlap, so that only the longer time counts.
+    If other processes compute, solving and writing overlap, and only the longer time counts.
     """
     write, read = seconds_of_files(sweep, path)
     solve = n_missing * seconds_per_chunk(sweep) / own.workers
@@ -78,7 +78,7 @@ def seconds_of_files(sweep: Sweep, path: str) -> tuple[float, float]:
 
 
 def _pattern(sweep: Sweep, chunk: int) -> Arrays:
-    """Return random arrays shaped as a chunk's results; equal values would be written too fast."""
+    """Return random results of a chunk; equal values would be written too fast."""
     draw = np.random.default_rng(chunk)
     shape = tuple(part.stop - part.start for part in sweep.box(chunk))
     found = {}
@@ -131,8 +131,7 @@ def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
     """Return the indices of sampled scenes, changed so that many share a batch.
 
     Along dimensions whose value all scenes of a batch share, only five distinct indices remain, or
-    more if the batches of a chunk are small. The batches of the sample are then about as large as
-    those of a chunk.
+    more if a chunk has small batches. Batches are then about as large as in a chunk.
     """
     shared = {axis.dimension for axis in sweep.axes if axis.field in looped_fields(sweep)}
     found, scenes = [], math.prod(sweep.chunk_shape)
@@ -158,7 +157,7 @@ class Outcome:
     """The outcome of one run of a sweep, whose computation took `seconds` (s).
 
     `estimate` is None if no chunk was missing. `before` counts the chunks of earlier runs,
-    `computed` the chunks of this run, and `repaired` those of this run that had been damaged.
+    `computed` those of this run, and `repaired` those of this run that had been damaged.
     """
 
     estimate: Estimate | None
@@ -171,8 +170,7 @@ class Outcome:
 def check_size(sweep: Sweep, path: str, workers: int, missing: int) -> tuple[int, int]:
     """Return the sizes (bytes) of the missing chunks on disk, and of all workers in memory.
 
-    Raise InputError if the disk or half of the memory is too small, or if there are too many
-    chunks.
+    Raise InputError if the disk or half of the memory is too small, or for too many chunks.
     """
     disk = os.statvfs(Path(path).absolute().parent)
     scenes = math.prod(sweep.chunk_shape)
@@ -233,10 +231,10 @@ def swept(
 
     `path` is the store's folder, made if missing, and locked until the context ends. `executor` is
     "here", "processes" or "dask"; "dask" starts a cluster on this machine unless `address` names a
-    scheduler, as in ``tcp://host:8786``. `before` is called with the forecast before the
-    computation. `progress` is True for a progress bar, or a function that is called after each
-    chunk with three arguments: the number of computed chunks, the number of chunks to compute, and
-    "chunks". With `repair`, damaged chunks and metadata are made again.
+    scheduler, as in ``tcp://host:8786``. `before` receives the forecast before the computation.
+    `progress` is True for a progress bar, or a function called after each chunk with the number of
+    computed chunks, the number to compute, and "chunks". With `repair`, damaged chunks and metadata
+    are made again.
 
     Raise InputError if the store belongs to another sweep or is damaged, if no cluster answers, or
     if disk or memory is too small. Chunks computed before an error remain in the store.

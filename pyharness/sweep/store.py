@@ -1,8 +1,7 @@
 """The store of a sweep: a Zarr group in a folder, with one array for each reduction.
 
-A chunk of the grid has a file for each array, and a file with their checksums, which is written
-last. Every file is written under a temporary name and then renamed. Therefore a chunk with
-checksums is complete.
+A chunk of the grid has a file for each array, and a file with their checksums. Each is written
+under a temporary name and then renamed, the checksums last; so a chunk with checksums is complete.
 """
 
 import contextlib
@@ -48,7 +47,7 @@ def check_zarr() -> None:
 class Store:
     """The open store of one sweep, made by `opened`.
 
-    `repaired` counts the damaged chunks that were removed when the store was opened.
+    `repaired` counts the damaged chunks that `check` removed.
     """
 
     def __init__(self, sweep: Sweep, folder: Path) -> None:
@@ -63,7 +62,7 @@ class Store:
         self._done = [False] * sweep.n_chunks
 
     def check(self, repair: bool = False) -> None:
-        """Compare the files of all complete chunks with their checksums.
+        """Compare all complete chunks with their checksums.
 
         Raise InputError for a damaged chunk, or with `repair` remove its files.
         """
@@ -140,9 +139,8 @@ class Store:
 def opened(sweep: Sweep, path: str, repair: bool = False) -> Iterator[Store]:
     """Make or open a sweep's store, lock it against other processes, check it, and yield it.
 
-    Raise InputError, without changing files, if `path` is the store of another sweep, no store,
-    damaged, or locked. With `repair`, remove damaged chunks and write damaged metadata again
-    instead.
+    Raise InputError, without changing files, if `path` is locked, damaged, or not the store of this
+    sweep. With `repair`, instead remove damaged chunks and rewrite damaged metadata.
     """
     check_zarr()
     folder = Path(path)
@@ -176,7 +174,7 @@ def opened(sweep: Sweep, path: str, repair: bool = False) -> Iterator[Store]:
 def check_store(sweep: Sweep, path: str) -> bool:
     """Return whether `path` is the store of this sweep; False if the folder is missing or empty.
 
-    Raise InputError if `path` is any other file or folder, or if the folder can't be made.
+    Raise InputError for any other file or folder, or if the folder can't be made.
     """
     folder = Path(path)
     if not path or "\0" in path:

@@ -1,9 +1,9 @@
 """Layout of a sweep's store: its arrays, their metadata, its identity, and checksums of its files.
 
-The command `sha256sum --check` can read a file of checksums. Its first line names the version of
-pyharness, the sweep and the part of the store, so that a file from elsewhere is detected. Each
-further line has the SHA-256 and the path of a file. In all functions `folder` is the folder of the
-store, and `name` a path in this folder.
+`sha256sum --check` can read a file of checksums. Its first line names the version of pyharness, the
+sweep and the part of the store, so that a file from elsewhere is detected. Each further line has
+the SHA-256 and the path of a file. In all functions `folder` is the store's folder, and `name` a
+path in it.
 """
 
 import contextlib
@@ -34,7 +34,7 @@ _PIECE = 1 << 20  # bytes read at once
 
 
 class DamageError(Exception):
-    """The exception for a damaged file of a store; its message names the file and the damage."""
+    """The exception for a damaged file of a store; its message names file and damage."""
 
 
 class Label(NamedTuple):
@@ -48,8 +48,8 @@ class Label(NamedTuple):
 def checksum_text(label: Label, part: str, folder: Path, names: Sequence[str], limit: int) -> bytes:
     """Return the content of a file of checksums for the files `names`.
 
-    `part` is the part of the store to which the files belong, as in "chunk 0/1". Raise DamageError
-    if a file is unreadable, not regular, or larger than `limit` (bytes).
+    `part` is their part of the store, as in "chunk 0/1". Raise DamageError if a file is unreadable,
+    not regular, or larger than `limit` (bytes).
     """
     identity = f"schema {label.schema}, version {label.version}, sweep {label.fingerprint}"
     lines = [f"# pyharness sweep store, {identity}, {part}"]
@@ -128,7 +128,7 @@ def exists(folder: Path, name: str) -> bool:
 
 
 def clear(folder: Path, name: str) -> None:
-    """Remove the file, link or folder at `folder / name`, and a file where a parent should be."""
+    """Remove the file, link or folder `name`, and a file where a parent folder should be."""
     path = folder
     for part in Path(name).parts[:-1]:
         path /= part
@@ -178,7 +178,7 @@ def label(sweep: Sweep) -> Label:
 def labels(folder: Path) -> list[Label]:
     """Return the identities that can be read in a store's metadata and in their checksums.
 
-    In an undamaged store there are two, which are equal.
+    An undamaged store has two equal ones.
     """
     found = []
     with contextlib.suppress(

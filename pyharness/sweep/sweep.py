@@ -1,7 +1,7 @@
-"""The data of a sweep, a grid of scenes: scene, axes of the grid, solver, reductions, and chunks.
+"""The data of a sweep, a grid of scenes: scene, axes, solver, reductions, and chunks.
 
-A reduction is a quantity that is stored for each scene. A chunk is a block of the grid, solved and
-stored at once, and numbered from 0.
+A reduction is a quantity stored for each scene. A chunk, numbered from 0, is a block of the grid
+that is solved and stored at once.
 """
 
 import math
@@ -24,7 +24,7 @@ Indices = NDArray[np.int64]
 class ReductionSpec:
     """A requested reduction: its array's `name`, its key in `REDUCTIONS`, and its parameters.
 
-    For the reduction `claim`, `function` returns for each scene of a batch whether the claim holds.
+    For `claim`, `function` returns for each scene of a batch whether the claim holds.
     """
 
     name: str
@@ -70,9 +70,9 @@ class Sweep:
     def chunk_shape(self) -> tuple[int, ...]:
         """Return the number of scenes of a chunk along each dimension.
 
-        A chunk covers as many of the last dimensions completely as fit, and part of the dimension
-        before them. It has length 1 along programs, methods, listings and readings, so that all its
-        scenes have the same solver.
+        A chunk covers as many of the last dimensions as fit, and part of the dimension before them.
+        It has length 1 along programs, methods, listings and readings, so that its scenes have the
+        same solver.
         """
         single = {axis.dimension for axis in self.axes if axis.is_choice}
         room = self.chunk
@@ -137,8 +137,7 @@ def value_columns(sweep: Sweep, where: list[Indices]) -> dict[str, NDArray[Any]]
 def groups(columns: list[NDArray[Any]], n: int) -> list[tuple[Indices, tuple[Any, ...]]]:
     """Return the groups of indices 0 to n - 1 with equal values in all columns.
 
-    For each group, return its indices in ascending order, and its value in each column. Without
-    columns there is one group.
+    Each has its ascending indices, and its value in each column. Without columns there is one.
     """
     if not columns:
         return [(np.arange(n), ())]

@@ -49,8 +49,8 @@ def read_sweep(path: str | os.PathLike[str], claims: Mapping[str, Claim] | None 
     """Return the sweep that a TOML file describes; raise InputError if it is invalid.
 
     The path of a scene file is relative to the sweep file. `claims` maps the name of each claim to
-    the function that checks it. For a `Batch` of n scenes this function returns n codes: 1 where
-    the claim holds, 0 where it fails, 2 where it does not apply, and 3 where it holds in part.
+    the function that checks it. For a `Batch` of n scenes it returns n codes: 1 where the claim
+    holds, 0 where it fails, 2 where it does not apply, and 3 where it holds in part.
     """
     path = os.fsdecode(path)
     where = f"sweep file '{path}'"
@@ -93,7 +93,7 @@ def _sweep(data: dict[str, Any], path: Path, text: str, claims: Mapping[str, Cla
 
 
 def _scene(table: object, path: Path) -> tuple[Scene, bytes]:
-    """Return the scene of the table [scene], and b"", or a zero byte and the bytes of its file."""
+    """Return the scene of [scene], and b"", or a zero byte and the bytes of its file."""
     if not isinstance(table, dict):
         raise InputError(f"scene is {kind_of(table)}; it must be a table [scene]")
     given = [key for key in ("case", "file") if key in table]

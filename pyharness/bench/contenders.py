@@ -1,4 +1,4 @@
-"""Contenders of `bench`: their interface, our methods, and the programs of the thesis."""
+"""Contenders of `bench`: interface, our methods, and the programs of the thesis."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -32,7 +32,7 @@ class Contender:
 
     @property
     def is_installed(self) -> bool:
-        """Return whether the required package, if any, is installed."""
+        """Return whether the package, if any, is installed."""
         return not self.package or find_spec(self.package) is not None
 
 
@@ -48,7 +48,7 @@ class SceneContender(Contender):
 
 
 def list_own_contenders() -> list[SceneContender]:
-    """Return our methods, and the programs, original and corrected."""
+    """Return our methods, and the original and corrected programs."""
     both = partial(SceneContender, attitude=True)
     found = [
         both("auto", "tolerance", partial(prepared_maker, "auto"), TOLERANCES),
@@ -73,7 +73,7 @@ def refuse_rounding(solver: str, setting: float) -> None:
 
 
 def prepared_maker(name: str, scene: Scene, compiled: bool = False) -> Maker:
-    """Return the maker of the prepared solver `name`; `compiled` is as in `prepare`."""
+    """Return the maker of the solver `name`; `compiled` is as in `prepare`."""
 
     def make(horizon: float, setting: float) -> Ready:
         attitude = scene.attitude is not None

@@ -1,4 +1,4 @@
-"""The problem of `bench --ensemble`, many bodies with equal moments, and our contenders."""
+"""The loads of `bench --ensemble`, many bodies with equal moments, and our contenders."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -23,7 +23,7 @@ _HARDEST = 1.0  # largest torque about an axis over the moment about this axis, 
 
 
 def coefficients() -> list[float]:
-    """Return the coefficients A, B, C of Euler's equations for the moments `MOMENTS`."""
+    """Return the coefficients A, B, C of Euler's equations for `MOMENTS`."""
     return [float(each) for each in exact_coefficients(Scene("", (0.0, 0.0, 0.0), MOMENTS))]
 
 
@@ -56,7 +56,7 @@ class EnsembleLoad:
         return np.asarray(self.torque / np.array(MOMENTS))
 
     def part(self, rows: "slice | list[int]") -> "EnsembleLoad":
-        """Return the load of some of the bodies."""
+        """Return the load of some bodies."""
         given = {name: getattr(self, name) for name in ("omega0", "torque", "attitude0")}
         own: dict[str, Any]
         own = {k: np.ascontiguousarray(x[rows]) for k, x in given.items() if x is not None}
@@ -65,7 +65,7 @@ class EnsembleLoad:
     def ends(self) -> Array:
         """Return omega at the end time (rad/s), shape (n, 3), by `solve` with tolerance 1e-15.
 
-        If attitudes are requested, return the quaternions instead, shape (n, 4).
+        If attitudes are requested, return their quaternions, shape (n, 4).
         """
         found = []
         for scene in self.scenes():
@@ -82,15 +82,15 @@ class EnsembleLoad:
             yield Scene(self.name, start, MOMENTS, torque=law, attitude=attitude)
 
 
-# A function of the bodies, the setting (tolerance or number of steps) and the number of threads. It
-# returns a function that integrates to `HORIZON` and returns omega, shape (n, 3), or the attitudes,
-# shape (n, 4), if the load requests them.
+# A function of the load, the setting and the number of threads. It returns a function that
+# integrates to the end time and returns omega, shape (n, 3), or the attitudes, shape (n, 4), if the
+# load requests them.
 EnsembleMaker = Callable[[EnsembleLoad, float, int], Callable[[], Array]]
 
 
 @dataclass(frozen=True)
 class EnsembleContender(Contender):
-    """A contender that computes omega or attitude of many bodies at the end time."""
+    """A contender for many bodies."""
 
     prepare: EnsembleMaker  # the first call of the prepared function may compile code
     threads: tuple[int, ...] = (1, 2)  # numbers of threads to measure with
@@ -101,12 +101,12 @@ class EnsembleContender(Contender):
 
     @property
     def ways(self) -> Mapping[str, EnsembleMaker]:
-        """Return all ways to prepare the solver, by note; a single way has an empty note."""
+        """Return the ways to prepare the solver, by note; a single way has an empty note."""
         return self.variants or {"": self.prepare}
 
 
 def draw(seed: str, n: int) -> list[EnsembleLoad]:
-    """Return two loads of the same n random bodies: without and with torques."""
+    """Return two loads of the same n random bodies, without and with torques."""
     source = text_generator(f"ensemble/{seed}")
     omega0 = source.uniform(-_FASTEST, _FASTEST, (n, 3))
     torque = source.uniform(-_HARDEST, _HARDEST, (n, 3)) * np.array(MOMENTS)

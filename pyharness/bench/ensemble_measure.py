@@ -1,8 +1,8 @@
 """Measurements of many bodies at once: speed at a target error, time by number of bodies, memory.
 
 Each contender uses the coarsest setting whose error on a sample is at most the target. Calls are
-interleaved in several rounds, and the shortest time counts, because other work of the machine can
-only lengthen it. Calls on one core are timed in processor time.
+interleaved in several rounds; the shortest time counts, as other work of the machine can only
+lengthen it. Calls on one core are timed in processor time.
 """
 
 import subprocess
@@ -50,7 +50,7 @@ _GROWTH_ROUNDS = 5
 
 @dataclass(frozen=True)
 class Rate:
-    """The speed of one contender on one task, with a number of threads."""
+    """The speed of one contender on one load, with a number of threads."""
 
     load: str
     target: float | None  # None where the steps were prescribed
@@ -59,7 +59,7 @@ class Rate:
     setting: float | None  # tolerance or number of steps; None for a closed form
     bodies: int  # number of bodies in a call
     seconds: float  # the shortest time of a call
-    error: float  # largest relative error of omega in the sample
+    error: float  # largest in the sample: of omega, relative, or of the attitude, rad
     note: str = ""  # names the fastest of several variants
 
     @property
@@ -69,13 +69,13 @@ class Rate:
 
     @property
     def rate(self) -> float:
-        """Return bodies per second or, without a target error, steps of all bodies per second."""
+        """Return bodies or, without a target error, steps of all bodies per second."""
         return self.bodies_a_second * (1 if self.target is not None else STEPS)
 
 
 @dataclass(frozen=True)
 class Rates:
-    """All measured speeds, and the reasons for missing measurements."""
+    """All measured speeds, and the reasons why others are missing."""
 
     seed: str
     bodies: int
@@ -95,11 +95,9 @@ class _Task:
 
     @property
     def place(self) -> str:
-        """Return the name of the task for messages, such as ``no torque, 1e-06``."""
         return f"{self.load.name}, {f'{self.target:g}' if self.target else f'{STEPS} steps of RK4'}"
 
     def takes(self, each: EnsembleContender) -> bool:
-        """Return whether a contender can solve the task."""
         torque = self.load.torque is not None and each.torque_free
         if torque or (self.load.attitude0 is not None and not each.attitude):
             return False
@@ -108,8 +106,8 @@ class _Task:
     def error(self, omega: Array) -> float:
         """Return the largest error of a body: of omega or, if requested, of the attitude (rad).
 
-        The error of omega is relative to the body's largest component at the start or the end. The
-        result is infinite if a component is not finite.
+        The error of omega is relative to the body's largest component at the start or the end. A
+        component that is not finite makes the result infinite.
         """
         n = min(len(omega), len(self.ends))
         ends, starts = self.ends[:n], self.sample.omega0[:n]
@@ -143,8 +141,8 @@ def measure_ensembles(
 ) -> Rates:
     """Return the measured speed of each contender on each load, at each target error.
 
-    On the last load, RK4 contenders also run `STEPS` steps. `seed`, with which the loads were
-    drawn, is only recorded. A call solves at least `least` bodies, or all if the load has fewer.
+    On the last load, RK4 contenders also run `STEPS` steps. `seed`, which determined the loads, is
+    only recorded. A call solves at least `least` bodies, or all if the load has fewer.
     """
     found = Rates(seed, loads[0].n)
     tasks: list[_Task] = []
@@ -201,7 +199,7 @@ def _ladder(each: EnsembleContender, target: float) -> Iterator[float]:
 def _enough(
     prepare: EnsembleMaker, load: EnsembleLoad, setting: float, threads: int, least: int
 ) -> tuple[EnsembleLoad, Callable[[], Array]]:
-    """Return a part of the load that takes long enough to be timed, and its solver."""
+    """Return a part of the load that takes long enough to time, and its solver."""
     n, before = min(load.n, least), 0.0
     while True:
         part = load.part(slice(0, n))
@@ -220,7 +218,7 @@ def clock_of(threads: int) -> Clock:
 
 @dataclass(frozen=True)
 class Size:
-    """The run times per body (s), by method, on one core, in one call for `bodies` bodies."""
+    """The run times per body (s), by method, in one call for `bodies` bodies on one core."""
 
     bodies: int
     seconds: dict[str, float]
@@ -237,7 +235,7 @@ class Memory:
 
     @property
     def ratio(self) -> float | None:
-        """Return the peak divided by the size of the arrays."""
+        """Return the peak over the size of the arrays."""
         return None if self.peak is None else self.peak / self.arrays
 
 
@@ -245,7 +243,7 @@ def sizes(seed: str, most: int, progress: Progress = no_progress) -> list[Size]:
     """Return the run times per body (s) for 1, 10, 100, ... up to `most` bodies.
 
     The closed form is measured without torque, by `solve_many` and, as "prepared", by a prepared
-    solver. The other methods are measured with a torque.
+    solver; the other methods with a torque.
     """
     free, pushed = draw(seed, most)
     found: list[Size] = []
@@ -273,7 +271,7 @@ def _prepared(load: EnsembleLoad) -> Callable[[], object]:
 def memory(bodies: int) -> list[Memory]:
     """Return the memory that a call of each of our methods takes.
 
-    Each method runs in a new process, because peak memory never decreases.
+    Each runs in a new process, because peak memory never decreases.
     """
     found = []
     for method in own_ensembles():
@@ -286,7 +284,7 @@ def memory(bodies: int) -> list[Memory]:
 
 
 def needed(method: str, bodies: int) -> None:
-    """Print the size (bytes) of a call's arrays, and the increase of peak memory (bytes)."""
+    """Print the size of a call's arrays, and the increase of peak memory, in bytes."""
     own = next(each for each in own_ensembles() if each.name == method)
     load = draw("memory", 512)[0 if own.torque_free else 1]
     own.prepare(load, SETTINGS[method], 1)()

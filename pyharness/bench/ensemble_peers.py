@@ -1,6 +1,6 @@
 """Third-party solvers for `bench --ensemble`.
 
-Each solver returns a function that computes omega (rad/s) at the end time, shape (n, 3).
+Each returns a function that computes omega (rad/s) at the end time, shape (n, 3).
 """
 
 from collections.abc import Callable
@@ -54,7 +54,7 @@ def heyoka_batch(
 ) -> Callable[[], Array]:
     """Return an integration by heyoka in batches of `size` bodies; `threads` has no effect.
 
-    It returns attitudes, shape (n, 4), instead of omega if the load requests them.
+    It returns attitudes, shape (n, 4), if the load requests them.
     """
     of_state = isinstance(load.scene.torque, StateTorque)
     scene = load.scene if of_state else None
@@ -112,7 +112,7 @@ def _integrator(
     with_torque: bool, tolerance: float, size: int, scene: Scene | None = None,
     with_attitude: bool = False,
 ) -> Any:  # fmt: skip
-    """Return a compiled integrator of `size` bodies for `scene`, by default the benchmark's."""
+    """Return a compiled integrator of `size` bodies for `scene`, by default with `MOMENTS`."""
     import heyoka
 
     attitude = IDENTITY if with_attitude else None
@@ -198,7 +198,7 @@ def _scipy_loop(load: EnsembleLoad, setting: float, threads: int) -> Callable[[]
 
 
 def in_threads(solve: Callable[[slice], None], n: int, threads: int, block: int) -> None:
-    """Call `solve` for slices of at most `block` of the n bodies, in `threads` threads."""
+    """Call `solve` for slices of at most `block` of n bodies, in `threads` threads."""
     pieces = [slice(first, min(n, first + block)) for first in range(0, n, block)]
     if threads == 1:
         for piece in pieces:
@@ -214,7 +214,7 @@ def numba_rk4(
     """Return an integration by RK4, compiled by numba.
 
     If `in_blocks`, each step is a loop over the bodies of a block; otherwise each body is
-    integrated to the end before the next body.
+    integrated to the end before the next.
     """
     blocks, bodies = _numba_kernels()
     kernel = blocks if in_blocks else bodies

@@ -20,7 +20,7 @@ _STYLES = {"prepared": "D-.", "closed-form": "o-", "taylor": "s--", "rk4": "^:"}
 
 @dataclass(frozen=True)
 class Ensembles:
-    """The speeds of all solvers, and our methods' run times by number of bodies, and memory."""
+    """The speeds of all solvers; our methods' run times by number of bodies, and memory."""
 
     rates: Rates
     sizes: Sequence[Size]
@@ -28,7 +28,7 @@ class Ensembles:
 
 
 def ensemble_report(found: Ensembles, packages: Iterable[str], command: str) -> Report:
-    """Return the report: tables of speeds, of time per body, and of memory."""
+    """Return the report: speeds, times per body, and memory."""
     text = [*_make_tables(found), _notes(found)]
     pictures = {"growth": partial(size_picture, found.sizes)}
     report = Report("bench", text, partial(_record, found), _data(found.rates), pictures=pictures)
@@ -36,7 +36,7 @@ def ensemble_report(found: Ensembles, packages: Iterable[str], command: str) -> 
 
 
 def ours_over(rows: Sequence[Rate], row: Rate) -> float | None:
-    """Return our fastest speed with as many threads over that of `row`; None without ours."""
+    """Return our fastest speed with as many threads over the speed in `row`; None without ours."""
     rates = [each.rate for each in rows if each.method in _STYLES and each.threads == row.threads]
     return max(rates) / row.rate if rates else None
 

@@ -21,7 +21,7 @@ _STARTS = 8
 
 @dataclass(frozen=True)
 class Growth:
-    """The Taylor method's error at one time, and the effect of rounding that time."""
+    """The Taylor method's error at one time, and the effect of rounding this time."""
 
     time: float  # s
     # Relative to the largest omega: `error` is the largest difference from the closed form, from

@@ -1,8 +1,8 @@
 """Run time against error, for our and third-party solvers, in one process.
 
-Every contender has settings from coarse to fine. A call with each setting is made once and compared
-with the reference. Batches of all calls are then timed in interleaved rounds, so that other work of
-the machine affects all alike; the median time counts.
+Every contender has settings from coarse to fine. A call with each setting is compared with the
+reference. Batches of all calls are then timed in interleaved rounds, so that other work of the
+machine affects all alike; the median time counts.
 """
 
 import math
@@ -69,15 +69,15 @@ class Workload:
 
     @property
     def place(self) -> str:
-        """Return the name for messages, such as ``case 5`` or ``scene 12``."""
+        """Return the name in messages, as in ``case 5`` or ``scene 12``."""
         return f"{'scene' if self.kinds else 'case'} {self.label}"
 
     @property
     def group(self) -> str:
         """Return the name of the workload's group, over which ratios are averaged.
 
-        A group has one end time. At 3 s, or if attitudes are requested, workloads with and without
-        torque are separate groups.
+        A group has one end time. At 3 s, or with attitudes, workloads with and without torque are
+        separate groups.
         """
         if self.horizon != HORIZON and self.scene.attitude is None:
             return f"T = {self.horizon:g}"
@@ -222,7 +222,7 @@ def error_of(end: End, truth: Reference, scale: float = 0.0) -> float | None:
 def relative_error(omega: Array, truth: Reference, scale: float = 0.0) -> float | None:
     """Return the error of omega over `scale` (rad/s) or, if larger, the largest true component.
 
-    The result is None if the error is not finite, or if the reference does not reach the end time.
+    The result is None if the error is not finite, or the reference does not reach the end time.
     """
     if len(truth.omega) == 0:
         return None
@@ -262,7 +262,7 @@ def _first_calls(
 ) -> tuple[list[tuple[Ready, Row]], float]:  # fmt: skip
     """Return a contender's tried calls on a workload, and the time (s) to prepare them.
 
-    Settings that cannot be run are appended to `refused`.
+    Settings that can't be run are appended to `refused`.
     """
     entries: list[tuple[Ready, Row]] = []
     errors: list[float | None] = []

@@ -104,10 +104,7 @@ def heyoka_maker(
 
 
 def _problem(scene: Scene) -> tuple[RightHandSide, Sequence[float], Any]:
-    """Return right-hand side, initial state, and the ratio of absolute to relative tolerance.
-
-    The ratio is a number, or an array with one for each unknown.
-    """
+    """Return right-hand side, initial state, and absolute over relative tolerance."""
     is_free, largest = scene.attitude is None, max(map(abs, scene.omega)) or 1.0
     if isinstance(scene.torque, StateTorque):
         slopes = slopes_of(scene)
@@ -169,7 +166,7 @@ def heyoka_equations(scene: Scene, formula: Formula | None = None) -> list[tuple
     """Return pairs (unknown, derivative) for omega and, if the scene has one, the attitude.
 
     A torque that depends on the state is computed by `formula`, or else from its tape (the recorded
-    operations). Raise InputError for a torque that is opaque or has a table.
+    operations). Raise InputError if it is opaque, or has a table or a floor.
     """
     import heyoka
 
@@ -259,7 +256,8 @@ def rates(
 ) -> list[str]:
     """Return the right-hand sides of omega's components as Python source.
 
-    `time` and `state` are names in the source. `coefficients` are A, B, C, by default the scene's.
+    `time` (an expression) and `state` (names) occur in it. `coefficients` are A, B, C, by default
+    the scene's.
     """
     x, y, z = state
     moments = scene.moments or (1.0, 1.0, 1.0)
@@ -284,7 +282,7 @@ def rates(
 
 
 def end_of(state: Array, evaluations: int | None = None) -> End:
-    """Return `state`, omega and perhaps attitude at the end time, as an `End`."""
+    """Return `state`, omega and perhaps attitude, as an `End`."""
     found = copied_result(state)
     attitude = found[3:] if len(found) > 3 else None
     return End(found[:3], evaluations=evaluations, attitude=attitude)

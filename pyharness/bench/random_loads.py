@@ -1,8 +1,7 @@
 """Random scenes of several kinds, on which no method was tuned.
 
 Torques and frequencies scale with the initial angular velocity, so that they affect slow and fast
-bodies alike. A seed and a number determine a scene. Its motion, by the second reference
-(`integer_series`), determines whether the scene is accepted or drawn again.
+bodies alike. A seed and a number determine a scene.
 """
 
 import math
@@ -41,10 +40,10 @@ KINDS = ("all", *LAWS, *SPEEDS, *BODIES, *_LENGTHS)
 def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
     """Return the workload that `seed` and `number`, from 1 on, determine.
 
-    The kind of torque changes with the number. A scene is drawn again if its error amplification is
-    `MOST_GROWTH` or more, or if the body makes less than 1 or more than 300 revolutions. With
-    `attitude`, the body is initially aligned with the axes of space, and the workload has no
-    `truth`, because `integer_series` propagates no attitude.
+    The kind of torque changes with the number. A scene is drawn again if, by the second reference
+    (`integer_series`), its error amplification is `MOST_GROWTH` or more, or the body makes less
+    than 1 or more than 300 revolutions. With `attitude`, the body is initially aligned with the
+    axes of space, and the workload has no `truth`, because `integer_series` has no attitude.
     """
     source = Random(f"bench/{seed}/{number}")
     place = number - 1

@@ -42,9 +42,9 @@ def measured_report(
 ) -> Report:
     """Return the report `found` of a benchmark, with machine and build added, and a Markdown page.
 
-    `title` is the heading of the page, `worth` a sentence on how comparable the numbers are. The
-    text of `found` has titled tables followed by the notes. The versions of `packages` are listed;
-    `command` repeats the benchmark.
+    `title` is the page's heading; `worth` says how comparable the numbers are. The text of `found`
+    has titled tables, then the notes. The page lists the versions of `packages`, and the `command`
+    that repeats the benchmark.
     """
     here, built = machine(packages), build()
     *parts, notes = found.text
@@ -65,7 +65,7 @@ def measured_report(
 def grouped(reasons: Iterable[tuple[str, str, str]], most: int | None = None) -> list[str]:
     """Return lines on missing results from tuples of contender, reason and task.
 
-    A line lists at most `most` tasks. Contenders with the same reason and tasks share a line.
+    Contenders with the same reason and tasks share a line, which lists at most `most` tasks.
     """
     places: dict[tuple[str, str], list[str]] = {}
     for who, why, where in reasons:
@@ -81,7 +81,7 @@ def grouped(reasons: Iterable[tuple[str, str, str]], most: int | None = None) ->
 
 
 def bench_report(finding: Finding, packages: Iterable[str], command: str) -> Report:
-    """Return the report: a table for each workload, mean ratios, and the machine.
+    """Return the report: a table for each workload, and mean ratios.
 
     For random scenes, the tables show distributions of ratios instead.
     """
@@ -124,7 +124,7 @@ def _data(finding: Finding) -> Table:
 
 
 def savings_report(found: Sequence[Saving]) -> Report:
-    """Return the report of run times with and without parts of a computation."""
+    """Return the report of run times with and without each part."""
     time = digits(".3g", 1e6)
     columns = (
         *words("skipped where"), Column("us with it", time, unit="s", full=time),
@@ -137,7 +137,7 @@ def savings_report(found: Sequence[Saving]) -> Report:
 
 
 def growth_report(found: Mapping[int, Sequence[Growth]]) -> Report:
-    """Return the report of the Taylor method's error against time, for cases of Table 1."""
+    """Return the report of the Taylor method's error against time, by case of Table 1."""
     time, error = digits(".3g"), digits(".2g")
     columns = (
         *words("case"), Column("time", time, unit="s", full=time),
@@ -184,7 +184,7 @@ def _settings_of(each: Row | Refusal) -> dict[str, Any]:
 
 
 def microseconds(seconds: float | None) -> str:
-    """Return a time (s) as text in microseconds, such as 12.3; "-" for None."""
+    """Return a time (s) as text in microseconds; "-" for None."""
     if seconds is None:
         return "-"
     value = seconds * 1e6
@@ -239,7 +239,7 @@ def _of_the_reference(finding: Finding, load: Workload) -> str:
 
 
 def power(target: float) -> str:
-    """Return a power of ten as text, such as 1e-6."""
+    """Return a power of ten as text, as in 1e-6."""
     return f"{target:.0e}".replace("e-0", "e-")
 
 

@@ -1,4 +1,4 @@
-"""Time saved by omitting the computations that a plan finds unnecessary for a scene."""
+"""Time saved by omitting computations that a plan finds unnecessary."""
 
 import subprocess
 import sys
@@ -21,7 +21,7 @@ _SECONDS = 2e-3  # duration (s) of a batch
 
 @dataclass(frozen=True)
 class Saving:
-    """Median run times (s) with and without a part of a computation that a plan can omit."""
+    """Median run times (s) with and without a part that a plan can omit."""
 
     part: str  # as the plan names it
     where: str  # name of the scene or program
@@ -30,7 +30,7 @@ class Saving:
 
     @property
     def ratio(self) -> float:
-        """Return the time with the part divided by the time without."""
+        """Return the time with the part over the time without."""
         return self.with_it / self.without
 
 

@@ -71,7 +71,7 @@ class TermScene:
 class TermBodies(EnsembleLoad):
     """Bodies with different initial omegas that share a torque, which depends on the state."""
 
-    body: Scene  # body, torque and initial attitude of all
+    body: Scene  # with the shared body, torque and initial attitude
 
     @property
     def scene(self) -> Scene:
@@ -118,7 +118,7 @@ def term_loads(scenes: Sequence[TermScene]) -> list[Workload]:
 
 
 def term_bodies(scenes: Sequence[TermScene], seed: str, n: int) -> list[TermBodies]:
-    """Return the problems of `n` bodies; `seed` determines their initial omegas."""
+    """Return a load of `n` bodies for each scene; `seed` determines their initial omegas."""
     source = text_generator(f"terms/{seed}")
     omega0 = np.array(_OMEGA) + source.uniform(-_SPREAD, _SPREAD, (n, 3))
     horizon = HORIZONS[0]
@@ -229,7 +229,7 @@ def term_methods(compiled: bool = False) -> list[SceneContender]:
 
 
 def term_leaves(scenes: Sequence[TermScene], compiled: bool) -> Counter[str]:
-    """Return what computes the Taylor terms of single bodies (`Solver.leaves`), by torques."""
+    """Count the torques by `Solver.leaves`, what computes their Taylor terms."""
     own: Any = partial(prepare, compiled=compiled)
     solvers = [own(each.scene, attitude=each.scene.attitude is not None) for each in scenes]
     return Counter(str(each.leaves) for each in solvers)
@@ -258,6 +258,6 @@ def term_peers(scenes: Sequence[TermScene]) -> list[SceneContender]:
 
 
 def body_contenders(compiled: bool = False) -> list[EnsembleContender]:
-    """Return our and heyoka's contender for many bodies, each on one core."""
+    """Return our and heyoka's contender for many bodies, on one core."""
     found = [*own_ensembles(compiled), *ensemble_peers()]
     return [replace(each, threads=(1,)) for each in found if each.name in (MANY_OURS, MANY_HEYOKA)]

@@ -48,7 +48,7 @@ _WORTH = (
 
 @dataclass(frozen=True)
 class Terms:
-    """The results for single and for many bodies."""
+    """The results for single and many bodies."""
 
     single: Finding
     many: Rates
@@ -57,7 +57,7 @@ class Terms:
 
 @dataclass(frozen=True)
 class Summary:
-    """The ratios over all scenes of a kind, at one target error."""
+    """The ratios over the scenes of a kind, at one target error."""
 
     kind: str
     bodies: int  # number of bodies in a call
@@ -68,7 +68,7 @@ class Summary:
 
 
 def term_report(found: Terms, packages: Iterable[str], command: str) -> Report:
-    """Return the report: run times and ratios for one and for many bodies, and mean ratios."""
+    """Return the report: run times and ratios for one and many bodies, and mean ratios."""
     text = [*_make_tables(found), _notes(found)]
     report = Report("bench", text, partial(_record, found), _data(found), pictures={})
     return measured_report("# Torques that depend on the state", _WORTH, report, packages, command)
@@ -102,7 +102,7 @@ def _summary(
 
 
 def _ratios(finding: Finding, load: Workload) -> list[float | None]:
-    """Return heyoka's run time over our own at each target error; None if one is missing."""
+    """Return heyoka's run time over ours at each target error, or None."""
     times = {each.method: each.seconds for each in scores(finding, load, TARGETS)}
     nowhere = (None,) * len(TARGETS)
     pairs = zip(times.get(HEYOKA, nowhere), times.get(OURS, nowhere), strict=True)
@@ -124,7 +124,7 @@ def _rows(finding: Finding, load: Workload, method: str) -> list[Row]:
 
 
 def _over(finding: Finding, load: Workload, peer: str) -> float | None:
-    """Return a peer's run time over our own at the tolerance `ONE_TOLERANCE`, or None."""
+    """Return a peer's run time over ours at `ONE_TOLERANCE`, or None."""
     times = []
     for rows in (_rows(finding, load, name) for name in (peer, OURS)):
         times.append(next((x.seconds for x in rows if x.setting == ONE_TOLERANCE), None))
@@ -133,7 +133,7 @@ def _over(finding: Finding, load: Workload, peer: str) -> float | None:
 
 
 def _preparing(finding: Finding, load: Workload, method: str) -> float | None:
-    """Return the time (s) that a method needs to prepare for a scene's shortest end time."""
+    """Return a method's time (s) to prepare for a scene's shortest end time, or None."""
     first = next(each for each in finding.workloads if each.label == load.label)
     times = [row.preparing for row in _rows(finding, first, method)]
     return (times[0] if method == OURS else statistics.median(times)) if times else None

@@ -30,7 +30,7 @@ def say(text: str) -> None:
 
 
 class _Terminal:
-    """A wrapper of standard error that ignores errors in writing."""
+    """Standard error, ignoring errors in writing."""
 
     def __getattr__(self, name: str) -> Any:
         return getattr(sys.stderr, name)
@@ -61,7 +61,7 @@ def progress(done: int, total: int, what: str) -> None:
 
 
 def end_progress() -> None:
-    """Remove the progress bar, if there is one."""
+    """Remove the progress bar, if any."""
     global _bar
     if _bar is not None:
         bar, _bar = _bar, None

@@ -124,7 +124,7 @@ def show_self_test(
     refuse: Callable[[], None] = lambda: None,
     **extra: Any,
 ) -> int:
-    """Write the report of a self-test; return 0 if every outcome passes, else 1.
+    """Write the report of a self-test; return 0 if every outcome passes, or 1.
 
     `outcomes` has a control without fault, then `count` planted faults. Call `refuse` if the
     control fails.

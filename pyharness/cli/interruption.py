@@ -1,8 +1,7 @@
 """Interruption: Ctrl-C ends a command at any time, with a one-line message and exit status 130.
 
 Python may lose a KeyboardInterrupt: an import may replace it by another exception, and a finalizer
-or a callback may drop it. This module therefore records the signal, and raises a dropped exception
-again.
+or callback may drop it. This module therefore records the signal, and raises a dropped one again.
 """
 
 import atexit
@@ -42,7 +41,7 @@ class _Interruption:
     def interrupt(self, number: int, frame: FrameType | None) -> None:
         """Raise KeyboardInterrupt; at the user's third interrupt, end the process at once.
 
-        A timer raises the exception again until the interrupt is reported.
+        A timer raises it again until the interrupt is reported.
         """
         self.count += 1
         if self.count >= _MOST:
@@ -153,6 +152,6 @@ def _show_warning(*arguments: Any, **more: Any) -> None:
 
 
 def _report_unraisable(hook: Callable[[Any], Any], unraisable: Any) -> None:
-    """Call the hook for unraisable exceptions, except for KeyboardInterrupt after Ctrl-C."""
+    """Call the hook for unraisable exceptions, except KeyboardInterrupt after Ctrl-C."""
     if not (came() and issubclass(unraisable.exc_type, KeyboardInterrupt)):
         hook(unraisable)

@@ -1,4 +1,4 @@
-"""The fields of a verb's JSON output, from the JSON Schema that documents them."""
+"""The fields of a verb's JSON output, from their JSON Schema."""
 
 import json
 import textwrap
@@ -9,13 +9,13 @@ from pyharness.model.facts import facts_folder
 
 
 def schema() -> dict[str, Any]:
-    """Return the JSON Schema of all verbs' output; its part `verb-NAME` describes one verb."""
+    """Return the JSON Schema of all verbs' output; `$defs` has a part `verb-NAME` for each."""
     found: dict[str, Any] = json.loads((facts_folder() / "output.schema.json").read_text())
     return found
 
 
 def fields(whole: dict[str, Any], part: dict[str, Any], path: str) -> Iterator[tuple[str, str]]:
-    """Yield the path and the meaning of each field of `part` of the schema `whole`."""
+    """Yield path and meaning of each field of `part` of the schema `whole`."""
     for name, each in part.get("properties", {}).items():
         own = each
         if "description" not in each:

@@ -54,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     - 3 if the Fortran extension is missing;
     - 130 after an interrupt.
     """
-    # Garbage collection during the imports takes 4 % of the time of a command and frees nothing.
+    # Garbage collection during the imports takes 4 % of a command's time and frees nothing.
     gc.set_threshold(100_000)
     # The package's matrices are too small for a second thread, and starting a thread pool takes a
     # seventh of the time of `compare`. The variable must be set before NumPy is imported.
@@ -121,7 +121,7 @@ def _run(arguments: list[str]) -> int:
 
 
 def _complete() -> int:
-    """Print completions for argcomplete; return 1 if it is not installed."""
+    """Print completions for argcomplete; return 1 if not installed."""
     from argparse import ArgumentParser
 
     try:

@@ -62,9 +62,9 @@ EFFORT = {"--effort F": _EFFORT.format(" (30 for a program of the thesis)")}
 EFFORT_WITHOUT_PROGRAMS = {"--effort F": _EFFORT.format("")}
 STRICT = {
     "--strict": "Exit with status 1 also if amplified rounding errors may exceed the tolerance, or "
-    "a method of --method lacks rows. In any case, the status is 1 if the Fortran and the Python "
-    "version of a program differ, a corrected program misses its order of convergence, or a method "
-    "of --method misses its tolerance or ends before the reference."
+    "a method of --method has no complete result. The status is always 1 if the Fortran and Python "
+    "versions of a program differ, a corrected program misses its order of convergence, or a "
+    "method of --method misses its tolerance or ends before the reference."
 }
 ALSO = {
     "--also FILE,...": "Write the result to these files too, each in the format of its ending: "
@@ -93,7 +93,7 @@ SCENES = Cost("random scenes", 8.0, 1e5, 10_000)
 
 
 def outputs(formats: Sequence[str] = FORMATS, plot: str = "the results") -> dict[str, str]:
-    """Return the options --format, --plot and --out, each with its help text.
+    """Return the help texts of --format, --plot and --out, by option.
 
     The first of `formats` is the default. `plot` names the content of the picture; if empty, there
     is no --plot.
@@ -109,29 +109,29 @@ def outputs(formats: Sequence[str] = FORMATS, plot: str = "the results") -> dict
 
 
 def chosen_effort(options: argparse.Namespace) -> float:
-    """Return the value of --effort, the factor on work limits; 1 by default."""
+    """Return --effort, the factor on work limits; 1 by default."""
     return positive(options.effort, "--effort", 1.0)
 
 
 def chosen_case(options: argparse.Namespace) -> int | None:
-    """Return the number of the case in --case, or None."""
+    """Return the case of --case, or None."""
     check_known("case", options.case, [str(each) for each in case_numbers()])
     return None if options.case is None else int(options.case)
 
 
 def chosen_cases(options: argparse.Namespace) -> list[int]:
-    """Return the number of the case in --case, or by default the numbers of all cases."""
+    """Return the case of --case, or all cases by default."""
     case = chosen_case(options)
     return list(case_numbers()) if case is None else [case]
 
 
 def chosen_tolerance(options: argparse.Namespace) -> float | None:
-    """Return the value of --tolerance; None for the method's default."""
+    """Return --tolerance; None for the method's default."""
     return None if options.tolerance is None else positive(options.tolerance, "--tolerance", 1.0)
 
 
 def chosen_seed(options: argparse.Namespace) -> str | None:
-    """Return the value of --seed, or None; raise InputError if it has unprintable characters."""
+    """Return --seed, or None; raise InputError if it has unprintable characters."""
     if options.seed is not None and not options.seed.isprintable():
         raise InputError(
             "--seed: contains characters that can't be printed; allowed: printable characters"
@@ -161,9 +161,8 @@ def chosen_names(text: str | None, what: str, allowed: Sequence[str]) -> list[st
 def chosen_scene(options: argparse.Namespace, **allowed: bool) -> Scene:
     """Return the scene of --case or --scene, changed by --omega, --step-size and --steps.
 
-    Warn of impossible moments, and of an attitude that was normalised. Raise InputError unless
-    exactly one of --case and --scene is given, and for a scene that `checked_scene` refuses with
-    the flags `allowed`.
+    Warn of impossible moments, and of a normalised attitude. Raise InputError unless exactly one of
+    --case and --scene is given, and if `checked_scene` with the flags `allowed` refuses the scene.
     """
     if (options.case is None) == (options.scene is None):
         raise InputError("give either --case N (1 to 7) or --scene FILE")
@@ -215,7 +214,7 @@ def chosen_listing(options: argparse.Namespace) -> Listing:
 def changes_of(options: argparse.Namespace) -> dict[str, Any]:
     """Return the names in --fix, --keep, --reading and --conjecture, as arguments of `subset`.
 
-    Raise InputError for a defect to fix in the corrected, or to keep in the original program.
+    Raise InputError for defects to fix in the corrected, or to keep in the original program.
     """
     if options.listing == "corrected":
         refuse(options, "--listing corrected", ("fix",))
@@ -249,7 +248,7 @@ def listing_text(listing: Listing) -> str:
 
 
 def chosen_stops(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the arguments `lipschitz` (limit of the stop test, 1/s) and `may_stop` of a run."""
+    """Return the arguments `lipschitz` (limit of the stop test, 1/s) and `may_stop`."""
     if options.program not in (None, "runge-kutta"):
         refuse(options, f"--program {options.program}", ("lipschitz", "no_stop"))
     if options.no_stop:
@@ -270,12 +269,12 @@ def refuse(options: argparse.Namespace, chosen: str, names: Iterable[str]) -> No
 
 
 def names(text: str | None) -> list[str]:
-    """Return the names in a list such as a,b; empty for None."""
+    """Return the names in a text such as a,b; none for None."""
     return [] if text is None else [name.strip() for name in text.split(",")]
 
 
 def numbers(text: str, option: str) -> list[float]:
-    """Return the numbers in a list such as 1,2; raise InputError for any other text."""
+    """Return the numbers in a text such as 1,2; raise InputError for any other text."""
     return [number(part, option) for part in text.split(",")]
 
 
@@ -319,7 +318,7 @@ def whole_up_to(most: int, text: str | None, option: str, default: int) -> int:
 def chosen_count(text: str | None, option: str, default: int, least: int, cost: Cost) -> int:
     """Return an option's number of draws, from `least` to `cost.most`, or the default.
 
-    Raise InputError for other numbers. Print a forecast if the draws take more than a minute.
+    Raise InputError for other numbers. Print a forecast if they take more than a minute.
     """
     if text is None:
         return default
@@ -359,7 +358,7 @@ def also_files(options: argparse.Namespace) -> dict[str, str]:
 
 
 def check_outputs(options: argparse.Namespace) -> None:
-    """Raise InputError if a file can't be written, or is an input or another output.
+    """Raise InputError if an output can't be written, or is an input or another output.
 
     Verbs call it before any computation.
     """
@@ -406,7 +405,7 @@ def _is_same(one: str, other: str) -> bool:
 
 
 def without_out(options: argparse.Namespace) -> argparse.Namespace:
-    """Return the options without --out, for verbs whose --out names a folder."""
+    """Return the options without --out, where it names a folder."""
     return argparse.Namespace(**{**vars(options), "out": None})
 
 
@@ -418,8 +417,8 @@ def show(
 ) -> int:
     """Write a report in the format of --format, the picture of --plot, and the files of --also.
 
-    `own` maps formats that only this report has, such as "tape5", to functions that return the
-    content. Return the exit status, 1 if `failed` is true, else 0.
+    `own` maps formats of this report alone, such as "tape5", to functions that return the content.
+    Return the exit status, 1 if `failed`, else 0.
     """
     from pyharness.views.render import render
 

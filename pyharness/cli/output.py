@@ -36,8 +36,8 @@ def check_folder(path: str, names: Iterable[str], option: str) -> None:
 def _why_not_made(folder: Path) -> str:
     """Return ": " and the reason why a folder can't be made, or "" if it can.
 
-    The folder is made and removed, because permissions do not show that a name is too long, or that
-    a file system accepts no folder.
+    The folder is made and removed: permissions do not show that a name is too long, or that a file
+    system accepts no folder.
     """
     if not folder.parent.is_dir():
         return ": there is no such folder"
@@ -50,7 +50,7 @@ def _why_not_made(folder: Path) -> str:
 
 
 def write_folder(path: str, contents: dict[str, bytes], option: str) -> None:
-    """Write all files, by name, into a folder; on failure write none and raise InputError."""
+    """Write files, by name, into a folder; on failure write none and raise InputError."""
     folder = Path(path)
     files = {str(folder / name): content for name, content in contents.items()}
     with DeferredInterrupt():
@@ -79,7 +79,7 @@ def check_tree(path: str, mark: str, option: str, kind: str = "edition") -> None
 def check_replaceable(path: str, made: Callable[[Path], set[str]], option: str) -> None:
     """Raise InputError unless `write_tree` may replace the folder, which may be missing or empty.
 
-    `made` returns the paths in a folder of the files that the verb made.
+    `made` returns the paths of the files in a folder that the verb made.
     """
     check_folder(path, (), option)
     folder = Path(os.path.realpath(path))
@@ -132,8 +132,8 @@ def _beside(folder: Path) -> tuple[Path, Path]:
 def write_tree(path: str, contents: dict[str, bytes], option: str) -> None:
     """Replace a folder by one with only the files in `contents`, by path.
 
-    The new folder is complete before the old one is removed. If writing fails, the old folder
-    remains unchanged, and InputError is raised.
+    The new folder is complete before the old one is removed. On failure, the old one remains
+    unchanged, and InputError is raised.
     """
     folder = Path(os.path.realpath(path))
     new, old = _beside(folder)

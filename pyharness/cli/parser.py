@@ -17,7 +17,7 @@ _NARROWEST, _WIDEST = 80, 100  # columns
 
 
 class _Formatter(argparse.HelpFormatter):
-    """A help formatter that keeps an example's lines; its usage shows only required options."""
+    """A help formatter whose usage has only required options; it keeps an example's lines."""
 
     def _split_lines(self, text: str, width: int) -> list[str]:
         from textwrap import wrap
@@ -76,7 +76,7 @@ class Parser(argparse.ArgumentParser):
         groups["output"].add_argument("-h", "--help", action="help", help="Print this help.")
 
     def format_help(self) -> str:
-        """Return the help in the terminal's width, from 80 to 100 columns."""
+        """Return the help in the terminal's width, 80 to 100 columns."""
         from shutil import get_terminal_size
 
         self._width = min(max(get_terminal_size().columns, _NARROWEST), _WIDEST)
@@ -87,7 +87,7 @@ class Parser(argparse.ArgumentParser):
         raise InputError(message)
 
     def option_names(self) -> list[str]:
-        """Return the long names of all options, as in ``--case``."""
+        """Return the options' long names, as in ``--case``."""
         return [name for name in self._option_string_actions if name.startswith("--")]
 
     def read(self, verb: str, arguments: Sequence[str]) -> argparse.Namespace:
@@ -105,7 +105,7 @@ class Parser(argparse.ArgumentParser):
     def _joined(self, arguments: Sequence[str]) -> list[str]:
         """Return the arguments with negative numbers joined to their options, as in --x=-1.
 
-        Argparse would take such numbers for options. Old names of options are replaced by new ones.
+        Argparse would take such numbers for options. Old option names are replaced by new ones.
         """
         result: list[str] = []
         for argument in arguments:

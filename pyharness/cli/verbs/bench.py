@@ -1,4 +1,4 @@
-"""The verb `bench`: measure run time against error of our and of third-party solvers."""
+"""The verb `bench`: measure run time against error of our and third-party solvers."""
 
 import argparse
 import shlex
@@ -103,7 +103,7 @@ def _present(
 ) -> tuple[list[_Named], list[_Named]]:
     """Return the solvers to measure, and those not installed.
 
-    Raise InputError if there is no solver, or if one is missing although the user `named` it.
+    Raise InputError if there is no solver, or if one that the user `named` is not installed.
     """
     missing = [each for each in others if not each.is_installed]
     if missing and named:
@@ -125,7 +125,7 @@ def _absent() -> str:
 
 
 def _count(options: argparse.Namespace) -> int:
-    """Return the value of --draws, or 0; set the seed, by default the present year and week."""
+    """Return --draws, or 0; set the seed, by default the present year and week."""
     if options.draws is None:
         if options.seed is not None:
             raise InputError("--seed has no meaning without --draws, --ensemble or --terms")
@@ -140,9 +140,9 @@ def _count(options: argparse.Namespace) -> int:
 def chosen(
     contenders: Sequence[SceneContender], text: str | None, what: str, attitude: bool = False
 ) -> list[SceneContender]:
-    """Return the solvers for single scenes that the option `text` selects, by default all.
+    """Return the solvers that `text`, the value of option `what`, selects, by default all.
 
-    Raise InputError if `attitude` is true and a solver named in `text` can't compute attitudes.
+    Raise InputError if `attitude` is true and one named in `text` can't compute attitudes.
     """
     found = named(contenders, text, what)
     lacking = [each.name for each in found if not each.attitude]

@@ -1,4 +1,4 @@
-"""The verb `claims`: judge whether our programs reproduce the statements of the thesis."""
+"""The verb `claims`: judge whether the programs reproduce the statements of the thesis."""
 
 import argparse
 
@@ -36,10 +36,10 @@ EXAMPLE = "claims --explain abstract-superior"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print verdicts on the claims of the thesis, or the effect of values that the thesis omits.
+    """Print verdicts on the claims of the thesis.
 
-    --assignments, --evidence and --atlas show for which of these values, such as the initial omega,
-    the claims hold.
+    With --assignments, --evidence or --atlas, print for which values that the thesis omits, such as
+    the initial omega, the claims hold.
     """
     if options.assignments:
         shared.refuse(options, "--assignments", ("explain", "evidence", "word"))

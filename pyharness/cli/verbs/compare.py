@@ -1,4 +1,4 @@
-"""The verb `compare`: compare original and corrected programs with the reference solution."""
+"""The verb `compare`: compare programs or methods with the reference solution."""
 
 import argparse
 from collections.abc import Sequence
@@ -47,10 +47,10 @@ EXAMPLE = "compare --case 3 --listing original --plot case-3.png"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Compare original and corrected programs with the reference solution of a scene.
+    """Compare original and corrected programs, or methods, with the reference solution.
 
-    Return 1 if a result is unexpected (`Comparison.unexpected`) or, with --strict, if amplified
-    rounding errors may exceed the tolerance.
+    Return 1 if a result is unexpected (`Comparison.unexpected`) or, with --strict, incomplete, or
+    if amplified rounding errors may exceed the tolerance.
     """
     if options.method is not None:
         return _methods(options)

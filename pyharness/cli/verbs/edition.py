@@ -1,4 +1,4 @@
-"""The verb `edition`: write the edition as a static web site, or as a package of plain data."""
+"""The verb `edition`: write the edition as a static web site, or as plain data."""
 
 import argparse
 

@@ -66,10 +66,7 @@ EXAMPLE = "run --case 5 --method auto --times 1,2,3"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print one trajectory.
-
-    With --strict, return 1 unless the ending is "complete".
-    """
+    """Print one trajectory; with --strict, return 1 unless its ending is "complete"."""
     if options.scene is not None and options.program is None and options.method is None:
         options.method = "auto"
     by_method = options.method is not None
@@ -115,7 +112,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _check_program_format(options: argparse.Namespace, scene: Scene, form: str) -> None:
-    """Raise InputError if the result can't be "printer" or "tape5", formats of programs only."""
     if options.program is None:
         raise InputError(
             f"--format {form} has no meaning with --method; allowed: {', '.join(shared.FORMATS)}"

@@ -1,7 +1,4 @@
-"""The verb `sweep`: solve a grid of scenes, and store the results in a folder.
-
-If a run was interrupted, the next one continues it.
-"""
+"""The verb `sweep`: solve a grid of scenes, and store the results in a folder."""
 
 import argparse
 from functools import partial
@@ -15,8 +12,7 @@ from pyharness.sweep.run import Estimate, swept
 from pyharness.sweep.store import check_zarr
 from pyharness.sweep.sweep_file import read_sweep
 
-# The name of the function that judges a claim for many initial conditions, by the claim's
-# identifier.
+# The functions that judge a claim for many initial conditions, by the claim's identifier.
 CLAIMS = over_starts.FUNCTIONS
 _MOST_WORKERS = 1024
 OPTIONS = {

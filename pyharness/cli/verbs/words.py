@@ -1,6 +1,6 @@
 """The verb `words`: run the programs in other floating-point formats.
 
-With --vectors, check our emulation of the CDC's arithmetic against given operations and results.
+With --vectors, check our emulation of CDC arithmetic against given operations and results.
 """
 
 import argparse

@@ -106,8 +106,7 @@ class _Task:
     def error(self, omega: Array) -> float:
         """Return the largest error of a body: of omega or, if requested, of the attitude (rad).
 
-        The error of omega is relative to the body's largest component at the start or the end. A
-        component that is not finite makes the result infinite.
+        The error of omega is relative to the body's largest component at the start or the end.
         """
         n = min(len(omega), len(self.ends))
         ends, starts = self.ends[:n], self.sample.omega0[:n]

@@ -260,10 +260,7 @@ def _first_calls(
     load: Workload, contender: SceneContender, make: Maker, truth: Reference,
     refused: list[Refusal], clock: Clock,
 ) -> tuple[list[tuple[Ready, Row]], float]:  # fmt: skip
-    """Return a contender's tried calls on a workload, and the time (s) to prepare them.
-
-    Settings that can't be run are appended to `refused`.
-    """
+    """Return a contender's tried calls on a workload, and the time (s) to prepare them."""
     entries: list[tuple[Ready, Row]] = []
     errors: list[float | None] = []
     spent = preparing = last = before = 0.0

@@ -1,4 +1,4 @@
-"""The reports of `bench`: tables, notes, command and machine.
+"""The reports of `bench`.
 
 A ratio is the run time of the baseline solver divided by that of another solver, at equal error.
 """

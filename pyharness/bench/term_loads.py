@@ -71,7 +71,7 @@ class TermScene:
 class TermBodies(EnsembleLoad):
     """Bodies with different initial omegas that share a torque, which depends on the state."""
 
-    body: Scene  # with the shared body, torque and initial attitude
+    body: Scene  # body, torque and initial attitude of all
 
     @property
     def scene(self) -> Scene:

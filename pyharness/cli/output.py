@@ -36,8 +36,8 @@ def check_folder(path: str, names: Iterable[str], option: str) -> None:
 def _why_not_made(folder: Path) -> str:
     """Return ": " and the reason why a folder can't be made, or "" if it can.
 
-    The folder is made and removed: permissions do not show that a name is too long, or that a file
-    system accepts no folder.
+    The folder is made and removed, because permissions do not show, for example, that a name is too
+    long.
     """
     if not folder.parent.is_dir():
         return ": there is no such folder"

@@ -54,9 +54,9 @@ def engine(
 ) -> Iterator[Engine]:
     """Start the executor ``here``, ``processes`` or ``dask``, and yield it as an Engine.
 
-    `workers` is by default the number of processors. Without the `address` of a scheduler, ``dask``
-    starts a cluster on this machine. Raise InputError if no scheduler with a worker answers;
-    `computed` raises it if workers die repeatedly.
+    `workers` is by default the number of processors. Without the `address` of a scheduler, as in
+    ``tcp://host:8786``, ``dask`` starts a cluster on this machine. Raise InputError if no scheduler
+    with a worker answers; `computed` raises it if workers die repeatedly.
     """
     if executor == "here":
         yield Engine(1, _solve_here, is_here=True)
@@ -230,9 +230,9 @@ def _connected(dask: Any, address: str) -> Any:
 
 
 async def _has_workers(dask: Any, address: str, answered: list[bool]) -> None:
-    """Wait until the Dask scheduler has workers; append True to `answered` until then.
+    """Wait until the Dask scheduler has workers; the caller limits the time.
 
-    The caller limits the time.
+    Each answer without workers appends True to `answered`.
     """
     # A Dask client would wait half a minute for a server that accepts the connection but does not
     # answer; the scheduler is therefore called directly.

@@ -99,7 +99,7 @@ def _flips(batch: Batch, given: Mapping[str, Any]) -> Found:
     places = np.where(component != 0.0, np.arange(component.shape[1]), 0)
     signs = np.sign(np.take_along_axis(component, np.maximum.accumulate(places, axis=1), axis=1))
     changes = signs[:, 1:] * signs[:, :-1] < 0.0
-    # A program has rows until it ends; what a method could not solve has no count.
+    # A program has rows until it ends; a scene that a method could not solve has no count.
     is_known = is_finite[:, 1] if batch.is_program else is_finite.all(axis=1)
     return np.where(is_known, changes.sum(axis=1), -1)
 
@@ -125,22 +125,17 @@ def _angles(ours: Array, theirs: Array) -> Array:
 
 
 def _axis_tilt(batch: Batch, given: Mapping[str, Any]) -> Found:
-    """Return the largest angle (rad) between an axis and its initial direction, shape (n,)."""
     return np.asarray(_tilts(batch, given).max(axis=1))
 
 
 def _tilted_time(batch: Batch, given: Mapping[str, Any]) -> Found:
-    """Return the time (s) for which an axis is tilted by more than `above` (rad), shape (n,).
-
-    Each sample counts for the time since the previous sample.
-    """
+    # Each sample counts for the time since the previous sample.
     angles = _tilts(batch, given)
     share = (angles > given["above"]).mean(axis=1)
     return np.where(np.isfinite(angles).all(axis=1), share * np.abs(batch.t_end), np.nan)
 
 
 def _axis_flips(batch: Batch, given: Mapping[str, Any]) -> Found:
-    """Return how often the tilt of an axis passes 90 degrees from sample to sample, shape (n,)."""
     along, across = _tilt_squares(batch, given)
     is_over = np.concatenate([np.zeros((len(along), 1), bool), across > along], axis=1)
     count = (is_over[:, 1:] != is_over[:, :-1]).sum(axis=1)
@@ -148,10 +143,7 @@ def _axis_flips(batch: Batch, given: Mapping[str, Any]) -> Found:
 
 
 def _pointing_error(batch: Batch, given: Mapping[str, Any]) -> Found:
-    """Return the final angle (rad) between an axis and a direction in space, shape (n,).
-
-    The direction is `towards` or, if that is empty, the initial direction of the axis.
-    """
+    # Without `towards`, the direction in space is the initial direction of the axis.
     if not given["towards"]:
         return _axis_tilt(batch, {**given, "samples": 1})
     target = np.array(given["towards"])
@@ -290,7 +282,7 @@ REDUCTIONS = {
 
 
 def needs_attitudes(asked: Iterable[ReductionSpec]) -> bool:
-    """Return whether any of these reductions needs attitudes."""
+    """Return whether a requested reduction needs attitudes."""
     return any("attitude" in REDUCTIONS[each.reduction].needs for each in asked)
 
 

@@ -1,4 +1,4 @@
-"""Report of the verb `sweep`: the axes, statistics of the stored quantities, and a picture."""
+"""The report of the verb `sweep`, and its picture."""
 
 import itertools
 from collections import Counter

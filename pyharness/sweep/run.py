@@ -229,12 +229,11 @@ def swept(
 ) -> Iterator[tuple[Store, Outcome]]:
     """Compute the chunks of a sweep that its store lacks; yield the open store and the outcome.
 
-    `path` is the store's folder, made if missing, and locked until the context ends. `executor` is
-    "here", "processes" or "dask"; "dask" starts a cluster on this machine unless `address` names a
-    scheduler, as in ``tcp://host:8786``. `before` receives the forecast before the computation.
-    `progress` is True for a progress bar, or a function called after each chunk with the number of
-    computed chunks, the number to compute, and "chunks". With `repair`, damaged chunks and metadata
-    are made again.
+    `path` is the store's folder, made if missing, and locked until the context ends. `executor`,
+    `workers` and `address` are as in `executors.engine`. `before` receives the forecast before the
+    computation. `progress` is True for a progress bar, or a function called after each chunk with
+    the number of computed chunks, the number to compute, and "chunks". With `repair`, damaged
+    chunks and metadata are made again.
 
     Raise InputError if the store belongs to another sweep or is damaged, if no cluster answers, or
     if disk or memory is too small. Chunks computed before an error remain in the store.

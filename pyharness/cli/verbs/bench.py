@@ -1,4 +1,4 @@
-"""The verb `bench`: measure run time against error of our and third-party solvers."""
+"""The verb `bench`."""
 
 import argparse
 import shlex
@@ -59,7 +59,7 @@ EXAMPLE = "bench --case 5 --peers none"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Measure run times and errors of our and third-party solvers."""
+    """Measure run time against error of our and third-party solvers."""
     if options.ensemble:
         return _ensemble(options)
     if options.terms:

@@ -1,4 +1,4 @@
-"""The verb `compare`: compare programs or methods with the reference solution."""
+"""The verb `compare`."""
 
 import argparse
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""The verb `defects`: show defects, readings and conjectures, with evidence and effects."""
+"""The verb `defects`."""
 
 import argparse
 
@@ -22,7 +22,7 @@ EXAMPLE = "defects stage-base"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the defects, readings and conjectures, or one with its effect in each case."""
+    """Print the defects, readings and conjectures, or one with its evidence and its effects."""
     listed = entries(options.kind)
     if options.name is None:
         shared.check_outputs(options)

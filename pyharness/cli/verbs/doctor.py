@@ -1,4 +1,4 @@
-"""The verb `doctor`: report build, machine, packages and environment, for bug reports."""
+"""The verb `doctor`."""
 
 import argparse
 
@@ -12,7 +12,7 @@ EXAMPLE = "doctor"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print build, machine and versions.
+    """Print build, machine, packages and environment, for bug reports.
 
     Return 3 if the Fortran extension is not built, 1 if a compiler option or a library changes its
     arithmetic.

@@ -1,4 +1,4 @@
-"""The verb `edition`: write the edition as a static web site, or as plain data."""
+"""The verb `edition`."""
 
 import argparse
 
@@ -21,7 +21,7 @@ EXAMPLE = "edition --out pages"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the web site or the data package, and print a list of files."""
+    """Write the edition as a static web site or as plain data, and print a list of files."""
     from pyharness.cli.output import check_tree, write_tree
     from pyharness.edition.report import MARK, check_libraries, edition_report, package_report
 

@@ -1,4 +1,4 @@
-"""The verb `family`: derive and measure the orders of the weighted residual methods."""
+"""The verb `family`."""
 
 import argparse
 from typing import Any

@@ -1,4 +1,4 @@
-"""The verb `limits`: show the limits of the original programs as the step size goes to 0."""
+"""The verb `limits`."""
 
 import argparse
 
@@ -18,7 +18,10 @@ EXAMPLE = "limits --case 5 --program runge-kutta"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print each program's distance from its limit and from the true solution."""
+    """Print each original program's distance from its limit and from the true solution.
+
+    The limit is its result as the step size goes to 0.
+    """
     scene = shared.chosen_scene(options)
     programs = shared.chosen_programs(options)
     halvings = shared.whole_up_to(12, options.halvings, "--halvings", 6)

@@ -1,4 +1,4 @@
-"""The verb `prove`: enclose the true solution of a scene, and check certificates."""
+"""The verb `prove`."""
 
 import argparse
 import json

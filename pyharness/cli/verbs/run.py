@@ -1,4 +1,4 @@
-"""The verb `run`: compute one trajectory by a program of the thesis or another method."""
+"""The verb `run`."""
 
 import argparse
 import sys
@@ -66,7 +66,10 @@ EXAMPLE = "run --case 5 --method auto --times 1,2,3"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print one trajectory; with --strict, return 1 unless its ending is "complete"."""
+    """Print one trajectory by a program of the thesis or another method.
+
+    With --strict, return 1 unless its ending is "complete".
+    """
     if options.scene is not None and options.program is None and options.method is None:
         options.method = "auto"
     by_method = options.method is not None

@@ -1,4 +1,4 @@
-"""The verb `scene`: write a sample scene file, check one, or print the schema of scene files."""
+"""The verb `scene`."""
 
 import argparse
 import os
@@ -30,7 +30,7 @@ EXAMPLE = "scene new --out brick.toml"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write, check or describe scene files; raise InputError for an invalid file or option."""
+    """Write a sample scene file, check one, or print the schema of scene files."""
     action = options.action
     if action is None:
         raise InputError(f"give an action; allowed: {', '.join(_ACTIONS)}")

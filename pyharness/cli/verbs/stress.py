@@ -1,4 +1,4 @@
-"""The verb `stress`: test the numerical stability of every method against bounds from theory."""
+"""The verb `stress`."""
 
 import argparse
 import shlex
@@ -25,7 +25,7 @@ EXAMPLE = "stress --only separatrix --plot separatrix.png"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the requested trials; return 1 if a check fails."""
+    """Test every method against bounds from theory, by trials; return 1 if a check fails."""
     trials = None if options.scene is None else _of_scene(options)
     only = shared.chosen_names(options.only, "trial", tuple(trials or TRIALS))
     if options.plot is not None and len(_chosen(only)) != 1:

@@ -1,4 +1,4 @@
-"""The verb `verify`: check programs and methods against each other and the true solution."""
+"""The verb `verify`."""
 
 import argparse
 from pathlib import Path
@@ -76,7 +76,10 @@ EXAMPLE = "verify --only cells,methods"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run checks of programs and methods, or what an option requests; return 1 if a check fails."""
+    """Check programs and methods against each other and the true solution; return 1 if one fails.
+
+    --external, --port, --integrator and --listing-output request other checks.
+    """
     if options.listing_output is not None:
         return _listing_output(options)
     if options.integrator is not None:

@@ -1,7 +1,4 @@
-"""The verb `words`: run the programs in other floating-point formats.
-
-With --vectors, check our emulation of CDC arithmetic against given operations and results.
-"""
+"""The verb `words`."""
 
 import argparse
 
@@ -30,7 +27,11 @@ EXAMPLE = "words --case 2 --program runge-kutta"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the programs' errors; with --vectors, check test vectors, and return 1 if one fails."""
+    """Print the programs' errors in other floating-point formats.
+
+    With --vectors, check our emulation of CDC arithmetic against given operations and results, and
+    return 1 if one fails.
+    """
     if options.vectors is not None:
         shared.refuse(options, "--vectors", ("case", "program", "lengths", "all", "plot"))
         return _vectors(options)

@@ -75,7 +75,7 @@ class Rate:
 
 @dataclass(frozen=True)
 class Rates:
-    """All measured speeds, and the reasons why others are missing."""
+    """All measured speeds, and reasons why others are missing."""
 
     seed: str
     bodies: int

@@ -1,4 +1,4 @@
-"""The verb `cards`: show each card, its scanned text, our Fortran and Python, and notes."""
+"""The verb `cards`."""
 
 import argparse
 from hashlib import sha256
@@ -46,7 +46,7 @@ EXAMPLE = "cards runge-kutta:860"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print cards, or the comparison that an option requests.
+    """Print cards with their scan, our Fortran and Python, and notes, or a requested comparison.
 
     Return 1 if --scan or --collate finds a difference that no note explains, or --origins a mistake
     in the table of disagreements.

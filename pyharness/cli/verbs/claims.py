@@ -1,4 +1,4 @@
-"""The verb `claims`: judge whether the programs reproduce the statements of the thesis."""
+"""The verb `claims`."""
 
 import argparse
 
@@ -36,7 +36,7 @@ EXAMPLE = "claims --explain abstract-superior"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print verdicts on the claims of the thesis.
+    """Print verdicts on whether the programs reproduce the claims of the thesis.
 
     With --assignments, --evidence or --atlas, print for which values that the thesis omits, such as
     the initial omega, the claims hold.

@@ -1,7 +1,7 @@
 """The method `averaged`: weak torques over very many revolutions, by two-scale averaging.
 
 A weak torque changes the periodic torque-free motion slowly. One macro-step computes this change
-over very many revolutions. It uses the stroboscopic solution, the state once in each revolution.
+over very many revolutions from the stroboscopic solution, the state once in each revolution.
 
 Stroboscopic averaging: Calvo, Chartier, Murua and Sanz-Serna 2011, Numerical stroboscopic averaging
 for ODEs and DAEs, Applied Numerical Mathematics 61. Two scales: Chartier, Crouseilles, Lemou and
@@ -37,8 +37,8 @@ _MOST_STEPS = 3000  # work limit in macro-steps, some ten seconds
 # The last macro-step is longer than the rest of the motion by this fraction and this number of
 # revolutions, because the time at its end is only estimated.
 _BEYOND, _TURNS_BEYOND = 0.02, 3
-# Factors on the length of a macro-step: after a failure; after a success at the first attempt; and
-# after a success at a later attempt.
+# Factors on the length of a macro-step: after a failure, after a success at the first attempt, and
+# after a later success.
 _SHORTER, _LONGER, _HARDLY_LONGER = 0.5, 4.0, 1.2
 _RELATIVE = 1.3  # ratio of the first macro-step to the angle in which the motion changes
 _APPROACH = 2.0  # the length is divided by this if the motion approaches the separatrix
@@ -102,10 +102,11 @@ def averaged(
     In the result, `steps` counts macro-steps, and `error` is the difference from a solution with
     more nodes and a higher order of averaging. A recorded torque must be a sum of terms, each a
     polynomial in omega and time multiplied by sines and cosines of time; a macro-step might miss
-    changes of any other torque. Raise InputError if the torque has another form, is opaque, depends
-    on the attitude, is not weak, or may be in resonance; if the torque-free omega is near the
-    separatrix, or does not circle a principal axis, as for a sphere; and if the work limit is
-    exceeded.
+    changes of any other torque.
+
+    Raise InputError if the torque has another form, is opaque, depends on the attitude, is not
+    weak, or may be in resonance; if the torque-free omega is near the separatrix, or does not
+    circle a principal axis, as for a sphere; or if the work limit is exceeded.
     """
     # The next macro-step refuses a point that is not finite.
     with np.errstate(all="ignore"):

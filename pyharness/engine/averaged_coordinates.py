@@ -30,8 +30,8 @@ from pyharness.model.torque_law import TorqueLaw
 
 _MOST_DEGREE = 8.0
 
-# A function of time (s) and the components of omega (rad/s) that returns the components of the
-# torque over the moments (rad/s2).
+# A function of time (s) and omega (rad/s) that returns the components of the torque over the
+# moments (rad/s2).
 Torque = Callable[[Array, list[Array]], list[Array] | Array]
 
 
@@ -178,8 +178,8 @@ class _Slot(NamedTuple):
 def fastest_of(torque: TorqueLaw | StateTorque) -> float:
     """Return the highest frequency of the waves (sines and cosines of time) of a torque (rad/s).
 
-    A recorded torque must be a sum of polynomials of degree 8 at most, multiplied by waves. Else
-    raise InputError: a macro-step may miss a pulse, or an effect in a narrow range of omega.
+    Raise InputError unless a recorded torque is a sum of polynomials of degree 8 at most,
+    multiplied by waves: a macro-step may miss a pulse, or an effect in a narrow range of omega.
     """
     if isinstance(torque, TorqueLaw):
         return max((abs(f) for a, f in torque.sines + torque.cosines if any(a)), default=0.0)

@@ -174,7 +174,7 @@ class MacroStep:
             mean = mean + correction
             change, last = float((np.abs(correction).max(axis=1) / sizes).max()), change
             stalls = sweep >= _LEAST_SWEEPS and not change < 0.5 * last
-            # The first sweep has no oscillation yet, and may change nothing for this reason.
+            # The first sweep may change nothing, because it has no oscillation yet.
             if (sweep > 1 and change <= _CONVERGED) or stalls:
                 break
         self._check(mean)

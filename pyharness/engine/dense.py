@@ -50,7 +50,7 @@ _SHORT = 0.25  # a change in a shorter part of an interval might be hidden betwe
 
 @dataclass(frozen=True, eq=False)
 class _Open:
-    """An interval (s) without a polynomial yet; it may be part of a divided longer interval."""
+    """An interval (s) without a polynomial yet, perhaps part of a divided longer interval."""
 
     low: float
     high: float

@@ -1,7 +1,7 @@
 """Polynomials through the values of an event's function, and the errors (noise) of these values.
 
 In a zero interval, a function is 0 to within its error. The interval counts as a root if the
-function becomes 0 there by a kink or a jump, but not if it decays to 0.
+function reaches 0 by a kink or a jump, not by decay.
 """
 
 import math
@@ -34,10 +34,10 @@ _SUDDEN, _BEFORE = 1e3, 0.01
 _MOST_PIECES = 100_000  # intervals that are divided at the same time
 _SHIFT = 2.0**-26  # relative change of an argument for a numerical derivative
 ROUNDING = 2.0**-50  # relative rounding error of the arguments of a function
-# A double root is known at best to the error of omega, relative to omega.
+# Largest relative error of the state that noise includes, as `Solution.state_error` explains.
 _COARSEST = 1e-10
 _SOME = slice(5, None, 11)  # three nodes at which noise is computed
-# From the values at the nodes of the solution's polynomials to those at POINTS.
+# Matrix from values at the nodes of the solution's polynomials to values at POINTS.
 _REFINED = Pieces(np.array([-1.0, 1.0]), np.eye(dense_output.NODES)[None])(POINTS)
 
 
@@ -46,7 +46,7 @@ class Solution:
     """The solution of a scene whose events are searched.
 
     `pieces` are the polynomials of the dense output `sol`, or approximate a closed form that `sol`
-    evaluates directly. `tolerance` is that of omega, 0 for a fixed step.
+    evaluates directly. `tolerance` applies to omega; 0 means a fixed step.
     """
 
     pieces: Pieces
@@ -65,7 +65,7 @@ class Solution:
 
     @cached_property
     def at_ends(self) -> tuple[Array, Array]:
-        """The first and last time and time 0 (s), and the states at these times."""
+        """The first and last time and time 0 (s), and the states there."""
         edges, (_, states) = self.pieces.edges, self.at_nodes
         times = np.array(sorted({edges[0], 0.0, edges[-1]}))
         # Time 0 is an edge.
@@ -218,7 +218,7 @@ class ZeroIntervals:
     """The zero intervals of a function, from `low` to `high` (s), ascending.
 
     Near an interval, values below `noise` can't be distinguished from 0. `before` and `after` are
-    the signs of the function on its two sides: 0 if it decays to 0 there, and at an end of the
+    the signs of the function on the two sides: 0 if it decays to 0 there, or at an end of the
     solution.
     """
 
@@ -253,8 +253,8 @@ class ZeroIntervals:
         before = np.append(-math.inf, self.high)[following]
         after = np.append(self.low, math.inf)[following]
         found: Index = roots.time <= before
-        # The time of a sign change of a function that is not smooth has an error of up to 256
-        # spacings of floats.
+        # Sign changes of a function that is not smooth have errors of up to 256 spacings of
+        # floats.
         longest = np.diff(solution.pieces.edges).max()
         apart = np.minimum(roots.time - before, after - roots.time)
         found |= apart <= 256.0 * np.spacing(np.maximum(np.abs(roots.time), longest))
@@ -298,7 +298,7 @@ def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroInte
     earlier, later = _beside(solution, low, -1), _beside(solution, high, 1)
     both = np.concatenate([earlier, later])
     values = solution.values(g, both).reshape(2, -1)
-    # The noise of the interval itself may be that of a jump at its end.
+    # The noise within the interval may come from a jump at its end.
     beside = solution.noise(g, both).reshape(2, -1)
     before, after = np.where(np.abs(values) > _SUDDEN * beside, np.sign(values), 0.0)
     return ZeroIntervals(low, high, np.maximum(noise, beside.max(axis=0)), before, after)

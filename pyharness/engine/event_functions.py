@@ -54,7 +54,7 @@ class Event:
 class EventFunction:
     """A checked event.
 
-    The event with the number `limit`, from 1, ends the integration; infinity means that none does.
+    The event number `limit`, from 1, ends the integration; infinity means that none does.
     `is_vectorized` is true if the function accepts arrays, None if that is not yet known.
     """
 

@@ -112,7 +112,7 @@ class Roots(_Columns):
 
     @classmethod
     def bare(cls, time: Array, change: Index, noise: Any = 0.0, lasting: Any = 0.0) -> "Roots":
-        """Return roots without derivatives, which are 0."""
+        """Return roots with zeros as derivatives."""
         zeros = np.zeros(len(time))
         return cls(
             time, zeros.astype(int) + change, zeros, zeros, zeros + noise, zeros, zeros + lasting
@@ -147,9 +147,9 @@ def isolated(fits: Fits) -> Roots:
     """Return all roots of polynomials, and their extrema that may be 0, ascending in time."""
     near = np.maximum(fits.noise, FIT_ERROR * fits.sizes)
     smallest = np.maximum(fits.noise / 16.0, 1e-15 * fits.sizes)
-    # Points from -1 to 1, sign changes and numbers of polynomials.
+    # Points from -1 to 1, sign changes and indices of polynomials.
     found: list[tuple[Array, Index, Index]] = []
-    # Parts with one root: polynomial, ends, sign change, and how to map a point of it.
+    # Parts with one root: coefficients, ends, sign change, middle, half width, index.
     brackets: list[tuple[Any, ...]] = []
     number = np.arange(len(fits.low))  # of the original polynomial
     low, high = np.full(len(number), -1.0), np.ones(len(number))

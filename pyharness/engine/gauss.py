@@ -42,9 +42,9 @@ def gauss(
     The step is halved until the estimated relative error of omega meets the tolerance, or the last
     two solutions differ only by rounding errors. The estimate is 2 d / (r**p - 1), with the safety
     factor 2. Here d is the largest difference of the two solutions, divided by the largest
-    component of omega. The ratio r is the smallest ratio of their numbers of steps between
-    requested times, at most 2. The exponent p is the order, 2 `stages`, but at most 8, because
-    long steps do not show a higher order.
+    component of omega, and r, at most 2, the smallest ratio of their numbers of steps between
+    requested times. The exponent p is the order, 2 `stages`, but at most 8, because long steps do
+    not show a higher order.
     """
     given, most = normalized(scene), effort * _MOST_EVALUATIONS / (1.0 + 0.5 * waves(scene))
     if times[-1] == 0.0:

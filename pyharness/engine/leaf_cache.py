@@ -89,7 +89,7 @@ def leaves_of_many(packed: Array, leaves: str) -> str:
     return leaves.replace("built", "interpreter", 1)
 
 
-@cache  # a kernel may use what has been loaded for as long as the process lives
+@cache  # kernels may use a loaded library as long as the process lives
 def loaded(tape: Structure, place: str) -> int:
     """Return the address of a tape's leaves, a structure of tape.h; raise LeavesError."""
     try:

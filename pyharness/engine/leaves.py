@@ -72,7 +72,7 @@ def source(tape: Structure, suffix: str = "") -> str:
 
 
 def names(tape: Structure, suffix: str = "") -> list[str]:
-    """Return the names of these functions in the order of tape.h; 0 for one that is missing."""
+    """Return the names of the functions of `source` as ordered in tape.h; 0 for a missing one."""
     values = f"set_values{suffix}" if first_values(tape) else "0"
     return [f"expand{suffix}", f"set_jacobian{suffix}", values, f"set_noise{suffix}"]
 
@@ -219,7 +219,7 @@ def _roundings(tape: Structure) -> tuple[list[str], list[str]]:
 
     This is the running error analysis of fortran/modern/tape_noise.h.
     """
-    # Inputs have none.
+    # Inputs have no errors.
     known: set[int] = set()
     lines = []
 
@@ -278,9 +278,9 @@ def noises(tape: Structure, number: str, written: Callable[[str], str]) -> Itera
 
 
 def derivatives(tape: Structure, count: int) -> tuple[list[str], list[dict[int, str]]]:
-    """Return definitions of values and slopes, and by unknown the derivatives of each rate.
+    """Return definitions of values and slopes, and the derivatives of each rate by unknown.
 
-    The values are those at the part u of a step, by `count` terms of the series.
+    The values are at the part u of a step, from `count` terms of the series.
     """
     # By slot: the names of its derivatives, by unknown.
     by = {slot: {slot: "one"} for slot in unknowns_of(tape)}

@@ -9,10 +9,7 @@ _HUGE = 1e100  # largest matrix element, which keeps products finite
 
 
 def propagators(scene: Scene, times: Array, omega: Array) -> Array:
-    """Return the state-transition matrices of omega from each of n close times to the last.
-
-    The shape is (n, 3, 3).
-    """
+    """Return the state-transition matrices of omega from n close times to the last, (n, 3, 3)."""
     return transitions(times, jacobians(scene, 0.5 * (omega[1:] + omega[:-1])))
 
 

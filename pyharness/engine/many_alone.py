@@ -142,7 +142,7 @@ def solve_one_by_one(
     found.omega[:] = result.omega
     if found.attitude is not None:
         found.attitude[:] = result.attitude
-        # At time 0 it is normalised in the same way as by the vector kernel.
+        # At time 0 attitudes are normalised as by the vector kernel.
         at_start = (spread(times, n) == 0.0) & (found.status == Statuses.COMPLETE)
         found.attitude[at_start] = unit_quaternions(spread(counted["attitude"], n)[at_start])
     return found if found.leaves == leaves else replace(found, leaves=leaves)
@@ -156,7 +156,7 @@ def _lanes(
 
     `settings` are the tolerance and the factor on the work limit. Both results are None if one
     kernel call can't solve all bodies. The parameters of an invalid body are NaN, so that the
-    kernel refuses this body.
+    kernel refuses it.
     """
     names = [name for name in rows if name.startswith(PARAMETER)]
     kind = next((name for name in ("moments", "coefficients") if name in rows), None)

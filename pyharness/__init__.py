@@ -1,8 +1,8 @@
 """Rigid-body rotation: a fast engine, checks, and three FORTRAN programs of a thesis.
 
-The engine integrates the motion, and estimates the error of each result. The programs of the thesis
-(1982) run as printed or as corrected. The checks also test ports (translations) of the programs,
-and other integrators.
+The engine integrates the motion and estimates the error of each result. The thesis programs (1982)
+run as printed or as corrected. The checks also test ports (translations) of these programs, and
+other integrators.
 """
 
 # The public names by module; type checkers read `__init__.pyi`. A module is imported at its first
@@ -33,7 +33,7 @@ _SUBMODULES = {
     "engine.taylor_ivp": ("Taylor",),
     "engine.solve": ("solve",),
 }
-# Public modules, also imported at their first use.
+# Public modules, imported likewise.
 _MODULES = ("events", "torques")
 __all__ = sorted(name for names in _SUBMODULES.values() for name in names)
 

@@ -34,8 +34,8 @@ NODES = 20  # Chebyshev points in a macro-step
 _TURN = 2.0 * math.pi
 _FEWEST = 100  # revolutions in a macro-step
 _MOST_STEPS = 3000  # work limit in macro-steps, some ten seconds
-# The last macro-step is longer than the rest of the motion by this fraction and this number of
-# revolutions, because the time at its end is only estimated.
+# The last macro-step exceeds the rest of the motion by this fraction and number of revolutions,
+# because the time at its end is only estimated.
 _BEYOND, _TURNS_BEYOND = 0.02, 3
 # Factors on the length of a macro-step: after a failure, after a success at the first attempt, and
 # after a later success.
@@ -48,8 +48,8 @@ _DIGITS = 56.0
 _FEWEST_ANGLES, _MOST_ANGLES = 16, 512
 # Highest frequency of a torque wave, relative to the frequency of the motion.
 _FASTEST = 0.02
-# Largest relative error of a macro-step: this fraction of the tolerance, but at least _FLOOR, to
-# which rounding errors limit it.
+# Largest relative error of a macro-step: this fraction of the tolerance, but at least _FLOOR, due
+# to rounding.
 _SHARE, _FLOOR = 0.05, 1e-15
 _ROWS_AT_ONCE = 1000
 _LARGEST_PHASE = 1e15  # rad
@@ -99,10 +99,10 @@ def averaged(
 ) -> Trajectory:
     """Return the trajectory of a scene with a weak torque at `times` (s), by averaging.
 
-    In the result, `steps` counts macro-steps, and `error` is the difference from a solution with
+    `steps` of the result counts macro-steps, and `error` is the difference from a solution with
     more nodes and a higher order of averaging. A recorded torque must be a sum of terms, each a
     polynomial in omega and time multiplied by sines and cosines of time; a macro-step might miss
-    changes of any other torque.
+    changes of another torque.
 
     Raise InputError if the torque has another form, is opaque, depends on the attitude, is not
     weak, or may be in resonance; if the torque-free omega is near the separatrix, or does not
@@ -245,7 +245,7 @@ class _Run:
                 if needed > angles:
                     angles = needed
                     continue
-                # The relative error of the slow components, and the error of the phase (rad).
+                # Relative error of the slow components, and error of the phase (rad).
                 slow = float((np.abs(step.error[:3]).max(axis=1) / step.scale[:3]).max())
                 late = float(np.abs(step.error[3]).max() * self.pace)
                 allowed = _SHARE * self.tolerance

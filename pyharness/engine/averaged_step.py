@@ -1,7 +1,7 @@
 """One macro-step of the method `averaged`: the two-scale solution over very many revolutions.
 
-The unknowns v, the p1, p2, p3 of `averaged_coordinates` and the time, depend on the fast angle psi,
-with period 2 pi, and on the slow variable s = psi/length, from 0 to 1, where `length` (rad) is the
+The unknowns v are p1, p2, p3 of `averaged_coordinates`, and the time. They depend on the fast angle
+psi, with period 2 pi, and on the slow variable s = psi/length, from 0 to 1; `length` (rad) is the
 angle of the step. The equation dv/dpsi = F(v, psi) becomes
 
     dv/dpsi + (1/length) dv/ds = F(v, psi).
@@ -103,10 +103,7 @@ def between_nodes(count: int, at: Array) -> Array:
 
 
 def between_angles(count: int, at: Array) -> Array:
-    """Return the trigonometric interpolation matrix from `count` equidistant angles to `at` (rad).
-
-    `count` is even.
-    """
+    """Return the trigonometric interpolation matrix from `count` (even) angles to `at` (rad)."""
     half = 0.5 * (at[:, None] - fast_nodes(count).angles)
     sine = np.sin(half)
     hit = np.abs(sine) < 1e-17

@@ -28,8 +28,8 @@ from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Trajectory
 
-# Ratios of the tolerance at the nodes to the requested tolerance. They are below 1 because a
-# polynomial may have larger errors between its nodes. The second applies if the first can't be met.
+# Ratios of the tolerance at the nodes to the requested tolerance, below 1 because a polynomial
+# may have larger errors between its nodes. The second applies if the first can't be met.
 _NODE_TOLERANCE = 0.25
 _LARGEST_NODE_TOLERANCE = 0.75
 # Largest ratio of a polynomial's last coefficients, relative to the state, to the tolerance.

@@ -1,4 +1,4 @@
-"""Compiled leaves for many bodies, one in each lane of a register, as in fortran/many/tape_lanes.c.
+"""Leaves (see leaves.py) for many bodies, one a register lane, as in fortran/many/tape_lanes.c.
 
 The parts of four sums of products that are known before term k are computed together, which saves
 loads.
@@ -22,7 +22,7 @@ from pyharness.engine.leaves import (
 )
 from pyharness.model.codes import Storage
 
-_UNKNOWNS = (3, 7)  # without and with attitude: the bodies that have lanes
+_UNKNOWNS = (3, 7)  # numbers that have lanes: without and with attitude
 _TOGETHER = 4  # sums
 _N_INPUTS = 8  # time, omega and attitude; parameters follow
 _MOST_INLINED = 60  # sums; many more would take a minute to compile
@@ -139,7 +139,7 @@ def _first_result(tape: Structure) -> int:
 
 
 def _has_parameters(tape: Structure) -> bool:
-    """Return whether bodies differ in further inputs of the tape, which only lanes have."""
+    """Return whether the tape has parameters in which bodies differ; only lanes allow them."""
     return tape.n_unknowns in _UNKNOWNS and _first_result(tape) > _N_INPUTS + 1
 
 
@@ -218,5 +218,5 @@ def _set_noise(tape: Structure) -> Iterator[str]:
 
 
 def _of_registers(text: str) -> str:
-    """Return a definition of a register, which may be the sum of numbers alone."""
+    """Return a definition for registers, with `zero` added in case it has only numbers."""
     return _in_lanes(text).replace("= ", "= zero + ", 1)

@@ -1,4 +1,4 @@
-"""Names of the slots of a tape in C code."""
+"""Names, in C code, of the slots (inputs, results) of a tape (recorded operations)."""
 
 import re
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ Listed = tuple[int, int, int, int]  # kind, operands x and y, and slot o of an o
 
 
 class Structure(NamedTuple):
-    """The parts of a tape on which its leaves depend."""
+    """The parts of a tape on which its compiled code depends."""
 
     n_unknowns: int
     operations: tuple[Listed, ...]

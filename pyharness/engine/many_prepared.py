@@ -29,8 +29,8 @@ from pyharness.model.trajectory import Array
 if TYPE_CHECKING:
     from pyharness.engine.solver import Solver
 
-# The methods that the kernel for many bodies has.
 NO_PARAMETERS = np.empty((0, 0))
+# The methods that the kernel for many bodies has.
 _SIDE_BY_SIDE = (Methods.CLOSED_FORM, Methods.CLOSED_FORM_OR_TAYLOR, Methods.TAYLOR)
 
 
@@ -103,8 +103,8 @@ def solve_each(
 ) -> None:  # fmt: skip
     """Solve the bodies in `piece` side by side, or else by single calls.
 
-    A single call solves each body whose error can't be measured side by side. It solves every body
-    if the torque is neither recorded nor about the axes of space, or if the inertia matrix is full.
+    Single calls solve bodies whose error can't be measured side by side, and all bodies if the
+    torque is neither recorded nor about the axes of space, or if the inertia matrix is full.
     """
     left = list(range(piece.start, piece.stop))
     if solver.packed[Places.METHOD] == Methods.TAPE and solver.scene.inertia is None:
@@ -145,7 +145,7 @@ def solve_lanes(
     """Solve bodies side by side, and return the indices of those that remain unsolved.
 
     `packed` has their equations as a tape (recorded operations) with `parameters`, (n, k) or (1,
-    k). `turns` are the initial quaternions, if any. The results are written to `found`.
+    k). `turns` are the initial quaternions, if any. `found` gets the results.
     """
     n = piece.stop - piece.start
     sets = parameters if len(parameters) < 2 else parameters[piece]

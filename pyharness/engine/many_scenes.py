@@ -131,8 +131,8 @@ _kept: dict[tuple[Any, ...], tuple[Scene, Any]] = {}
 
 def keep_with(scene: Scene, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
     """Return `make()`, cached for this scene and `key`."""
-    # By identity, because equal scenes may differ in the signs of zeros. An entry keeps its scene
-    # alive, so that no other object gets its identity.
+    # By identity, because equal scenes may differ in the signs of zeros. An entry keeps its
+    # scene alive, so that no other object gets this identity.
     full = id(scene), *key
     found = _kept.get(full)
     if found is None:
@@ -145,7 +145,7 @@ def keep_with(scene: Scene, key: tuple[Any, ...], make: Callable[[], Any]) -> An
 def rows_of_scene(scene: Scene) -> dict[str, Any]:
     """Return the cached `checked_rows` of a scene with its `merged` torque; callers only read them.
 
-    For few bodies the conversion would take longer than the solution.
+    Converting again for few bodies would take longer than solving them.
     """
 
     def convert() -> dict[str, Any]:

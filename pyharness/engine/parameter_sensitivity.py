@@ -43,8 +43,7 @@ _METHODS = ("auto", "taylor", "closed-form")
 _MOST_COLUMNS = 200
 _THREE = (0.0, 0.0, 0.0)  # stands for omega and attitude, which have three columns
 # The parameters for which one period of a body without torque is extrapolated. A change of the
-# torque changes each period by another amount; a change of another parameter changes all periods
-# alike.
+# torque changes each period by another amount, other changes all periods alike.
 _CONSTANT = "torque.constant"
 _PERIODIC = {OMEGA, "moments", "coefficients", "inertia", _CONSTANT}
 
@@ -223,7 +222,7 @@ def _extrapolate(name: str, moved: Callable[[float], Scene], size: float, states
         try:
             with warnings.catch_warnings(action="ignore", category=ImpossibleBodyWarning):
                 after, before = states(moved(h)), states(moved(-h))
-        except InputError:  # such as a motion that ends where it slides; a smaller change may not
+        except InputError:  # as if the motion slides; a smaller change may succeed
             row = []
             continue
         largest = max(largest, np.abs(after).max())

@@ -36,9 +36,9 @@ class VariedEquations(NamedTuple):
     """The equations of motion of a scene, and how they depend on parameters.
 
     The outputs of `tape` are the partial derivatives of the n rates, then the rates. Each of the m
-    values of parameters has a column; `columns` has a parameter's columns by its name. Element
-    (i, j) of `forcings`, shape (n, m), is the number, from 1, of the output that is the derivative
-    of rate i with respect to value j; it is 0 if this derivative is 0.
+    parameter values has a column; `columns` has the columns by parameter name. Element (i, j) of
+    `forcings`, shape (n, m), is the number, from 1, of the output d(rate i)/d(value j), or 0 if
+    this derivative is 0.
     """
 
     tape: Tape

@@ -111,8 +111,8 @@ def extremum(axis: int, *, terminal: bool | int = False, direction: int = 0) -> 
         As in `crosses`.
     direction : {-1, 0, 1}
         1 for changes of the derivative to positive, -1 to negative, in the direction of
-        integration; 0 for both. Forward in time, 1 selects minima, and -1 maxima; backward, 1
-        selects maxima, and -1 minima.
+        integration; 0 for both. Forward in time, 1 selects minima and -1 maxima; backward, the
+        reverse.
 
     Returns
     -------

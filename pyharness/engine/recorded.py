@@ -46,7 +46,7 @@ LONGEST_TRIAL = 1e3
 
 
 def inputs_of(times: Array, state: Array) -> list[Array]:
-    """Return the eight inputs of a tape, each (n,); states are (n, 7), or (n, 3) if no attitude."""
+    """Return the eight inputs of a tape, each (n,); states are (n, 7), without attitude (n, 3)."""
     columns = [times, *state.T]
     return columns + [np.zeros(len(times))] * (N_INPUTS - len(columns))
 

@@ -96,9 +96,9 @@ def integrate(
 def rescaling_factor(scene: Scene, time: float) -> float:
     """Return the factor, a power of 2, that brings omega near 1 rad/s.
 
-    This omega is the initial omega, or the omega that the torque may cause until `time` (s) if that
-    is larger. The latter is a bound; for a torque that depends on the state, an estimate. The
-    factor is 1 if no rescaling is needed or possible, as for an opaque torque.
+    This omega is the larger of the initial omega and a bound on the omega that the torque causes
+    until `time` (s); for a torque that depends on the state, an estimate. The factor is 1 if no
+    rescaling is needed or possible, as for an opaque torque.
     """
     if is_ordinary(scene.omega):
         return 1.0

@@ -18,7 +18,7 @@ from pyharness.model.trajectory import Array
 def rotated(scene: Scene, turn: Callable[[Triple], Triple], body: bool) -> Scene:
     """Return the scene with the function `turn` applied to omega and to all vectors of the torque.
 
-    If `body` is true, `turn` is applied to the moments too. The attitude, and a torque about the
+    If `body` is true, `turn` also applies to the moments. The attitude, and a torque about the
     axes of space, are kept. If the torque depends on the state, `turn` must be a rotation. Raise
     InputError if the inertia changes with time.
     """

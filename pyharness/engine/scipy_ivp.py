@@ -1,8 +1,8 @@
 """The methods of `scipy.integrate.solve_ivp`; SciPy is imported when one of them is first used.
 
 SciPy controls the local error of a step. Our tolerance limits the error at the requested times,
-which grows in proportion to the phase. A preliminary integration with few digits therefore supplies
-largest |omega|, error amplification and phase, from which the local tolerance follows.
+which grows in proportion to the phase. The local tolerance therefore follows
+from largest |omega|, error amplification and phase of a preliminary integration with few digits.
 """
 
 import math
@@ -209,7 +209,7 @@ class _Run(Run):
         largest = max(largest, float(sizes.max()))
         radians, phases = self.rate * length * float(np.mean(sizes)), 0.0
         for push, frequency in _pushes(self.scene):
-            # A phase counts at most as the ratio of the omega that the wave can add to `largest`.
+            # The phase of a wave is limited to the omega that it can add, over `largest`.
             phases += min(frequency * length, push * length / largest if largest > 0.0 else 0.0)
         turned = 0.0
         if self.scene.attitude is not None:

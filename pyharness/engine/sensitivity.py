@@ -33,7 +33,7 @@ _LITTLE_WORK = 5e-3
 
 
 def is_sensitive(growth: float | None, tolerance: float, noise: float = 0.0) -> bool:
-    """Return whether 2**-53 times `growth` times (1 + `noise`) exceeds 0.3 times the tolerance.
+    """Return whether amplified rounding errors exceed 0.3 times the tolerance.
 
     `growth` is the error amplification, `noise` the result of `torque_noise`.
     """
@@ -45,10 +45,10 @@ def torque_noise(
 ) -> float:
     """Return the rounding error of torque terms that nearly cancel, divided by that of omega.
 
-    Let each term alone cause an omega until `t_end` (s), with rounding in each of `steps` steps.
-    The result is the ratio of these omegas, added up, to `scale` (rad/s), by default the initial
-    |omega| or the omega that the whole torque causes. It is 0 if no terms nearly cancel, or if the
-    torque depends on the state.
+    The result is the sum of the omegas that the terms cause alone until `t_end` (s), with rounding
+    in each of `steps` steps, over `scale` (rad/s). By default, `scale` is the larger of the initial
+    |omega| and the omega that the whole torque causes. The result is 0 if no terms nearly cancel,
+    or if the torque depends on the state.
     """
     if isinstance(scene.torque, StateTorque) or not (scene.law.sines or scene.law.cosines):
         return 0.0

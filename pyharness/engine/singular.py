@@ -38,7 +38,7 @@ def undefined_operation(
     """Return a text: the operation undefined at the end of an integration, and a replacement.
 
     `begin`, `before` and `end` are the inputs of the tape at the beginning of the integration, at
-    the beginning of the last step, and at the end. The result is None if instead omega or a
+    the beginning of its last step, and at its end. The result is None if instead omega or a
     quotient becomes infinite.
     """
     first, last = (max(abs(inputs[slot]) for slot in OMEGA) for inputs in (begin, end))

@@ -1,6 +1,6 @@
 """The function `solve`, which computes the trajectory of a scene by any method.
 
-It integrates from time 0 in both directions. It rescales time, so that products of two components
+It integrates from time 0 in both directions, and rescales time so that products of two components
 of omega neither overflow nor underflow.
 """
 
@@ -90,7 +90,7 @@ def solve(
     dense_output : bool
         Whether to return `sol`, the solution as a function of time between 0 and `times`, to within
         the tolerance. Closed forms, Taylor series, and `dop853` and `lsoda` under an opaque torque
-        need no further integrations for it; other methods do. Methods with a fixed step return a
+        need no further integrations for it. Methods with a fixed step return a
         cubic polynomial on each step.
     events : callable, Event, or list of these
         Functions of (t, omega) or (t, omega, attitude), or events of `pyharness.events`. Their

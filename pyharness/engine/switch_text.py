@@ -16,7 +16,7 @@ _TOUCHED = (
     "whether it changes"
 )
 _SIMPLE = re.compile(r"\w+(\([^()]*\))?")  # a name, or a function of something simple
-# `solve` replaces it by the formula of the switch, because the tape of a method has other axes.
+# `solve` replaces this text by the switch's formula, because a method's tape has other axes.
 _NUMBER = re.compile(r"\[switch (\d+)\]")
 
 

@@ -38,8 +38,8 @@ _CHANGING = {each.place: each for each in (ChangingMoments, ChangingInertia)}
 def load(path: str | os.PathLike[str]) -> Trajectory:
     """Return the trajectory that `Trajectory.save` wrote to a file.
 
-    All numbers are bit-for-bit the same, and so are the results of calls of the trajectory's
-    methods. A torque that scene files can't describe becomes a recorded torque.
+    All numbers, and the results of the trajectory's methods, are bit-for-bit the same. A torque
+    that scene files can't describe becomes a recorded torque.
 
     Parameters
     ----------

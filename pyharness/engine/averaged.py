@@ -1,7 +1,7 @@
 """The method `averaged`: weak torques over very many revolutions, by two-scale averaging.
 
-A weak torque changes the periodic torque-free motion slowly. One macro-step computes this change
-over very many revolutions from the stroboscopic solution, the state once in each revolution.
+A weak torque changes the periodic torque-free motion slowly. A macro-step computes this change over
+very many revolutions from the stroboscopic solution, the state once in each.
 
 Stroboscopic averaging: Calvo, Chartier, Murua and Sanz-Serna 2011, Numerical stroboscopic averaging
 for ODEs and DAEs, Applied Numerical Mathematics 61. Two scales: Chartier, Crouseilles, Lemou and

@@ -40,8 +40,8 @@ def gauss(
     """Return the trajectory by Gauss collocation with 1 to 8 `stages`.
 
     The step is halved until the estimated relative error of omega meets the tolerance, or the last
-    two solutions differ only by rounding errors. The estimate is 2 d / (r**p - 1), with the safety
-    factor 2. Here d is the largest difference of the two solutions, divided by the largest
+    two solutions differ only by rounding errors. The estimate, with the safety factor
+    2, is 2 d / (r**p - 1). Here d is the largest difference of the two solutions over the largest
     component of omega, and r, at most 2, the smallest ratio of their numbers of steps between
     requested times. The exponent p is the order, 2 `stages`, but at most 8, because long steps do
     not show a higher order.
@@ -59,7 +59,7 @@ def gauss(
     lengths = np.abs(np.diff(np.array(times, dtype=float), prepend=0.0))
     lengths = lengths[lengths > 0.0]
     shortest = float(lengths.min())
-    # At first at most half a radian of phase: the shortest interval over an integer.
+    # The first step has at most half a radian of phase, and divides the shortest interval.
     step = max(1e-300, shortest / max(1.0, math.ceil(min(1e18, 2.0 * rate * shortest))))
     spent, reached = 0, 0.0
     more = 1.0  # estimated steps of the final solution, over those of the next

@@ -101,7 +101,7 @@ def solve_each(
     solver: "Solver[Any]", starts: Array, times: Array, turns: Array | None, found: Ensemble,
     piece: slice, given_up: NDArray[np.int32],
 ) -> None:  # fmt: skip
-    """Solve the bodies in `piece` side by side, or else by single calls.
+    """Solve the bodies in `piece` side by side or by single calls.
 
     Single calls solve bodies whose error can't be measured side by side, and all bodies if the
     torque is neither recorded nor about the axes of space, or if the inertia matrix is full.

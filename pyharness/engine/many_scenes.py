@@ -52,8 +52,8 @@ def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Array, Ar
     """Return the arrays of bodies with inertia matrices about principal axes, and these axes.
 
     The arrays have A, B, C, because rounded moments would be less accurate. They are NaN for a
-    matrix that is not symmetric and positive definite. The axes are returned as columns of
-    matrices, (n, 3, 3), and, if there are attitudes, also as quaternions, (n, 4).
+    matrix that is not symmetric and positive definite. The axes are columns of matrices,
+    (n, 3, 3), and, if there are attitudes, also quaternions, (n, 4).
     """
     rows = checked_rows({name: given[name] for name in given if name not in BODIES})
     own = {"inertia": rows_of("inertia", given["inertia"], 3, 3)}

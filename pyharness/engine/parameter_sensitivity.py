@@ -222,7 +222,7 @@ def _extrapolate(name: str, moved: Callable[[float], Scene], size: float, states
         try:
             with warnings.catch_warnings(action="ignore", category=ImpossibleBodyWarning):
                 after, before = states(moved(h)), states(moved(-h))
-        except InputError:  # as if the motion slides; a smaller change may succeed
+        except InputError:  # as when the motion slides; a smaller change may succeed
             row = []
             continue
         largest = max(largest, np.abs(after).max())

@@ -46,9 +46,8 @@ def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
 def remainders(scene: Scene) -> Triple:
     """Return the exact coefficients A, B, C minus their values in binary64.
 
-    Without these remainders, a closed form has an error of 1e-10 rad after a phase of 1e6 rad. The
-    remainders are 0 for a body given by coefficients, and under a torque, where no kernel uses
-    them.
+    Without these remainders, a closed form has an error of 1e-10 rad after a phase of 1e6 rad. They
+    are 0 for a body given by coefficients, and under a torque, where no kernel uses them.
     """
     found, moments = scene.euler_coefficients, scene.exact_moments
     if moments is None or not scene.torque.is_zero or not all(map(math.isfinite, found)):

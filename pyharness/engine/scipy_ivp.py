@@ -1,8 +1,8 @@
 """The methods of `scipy.integrate.solve_ivp`; SciPy is imported when one of them is first used.
 
 SciPy controls the local error of a step. Our tolerance limits the error at the requested times,
-which grows in proportion to the phase. The local tolerance therefore follows
-from largest |omega|, error amplification and phase of a preliminary integration with few digits.
+which grows in proportion to the phase. The local tolerance therefore follows from largest |omega|,
+error amplification and phase of a preliminary integration with few digits.
 """
 
 import math
@@ -44,8 +44,7 @@ _A_FEW = 1.05
 FINEST = {name: _A_FEW * FINEST_STEP * total for name, total in _SUM.items()}
 
 _COARSE = 1e-3
-# The preliminary integration is repeated if the expected omega exceeds its largest omega by this
-# factor.
+# The preliminary integration is repeated if the expected omega exceeds its largest by this factor.
 _FAR = 4.0
 _MOST_GUESSES = 200
 _NODES_PER_RADIAN = 4.0

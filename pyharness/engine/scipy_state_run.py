@@ -22,8 +22,8 @@ from pyharness.model.trajectory import Array
 # integrations pass a short pulse or sample a wave in the same way.
 _FEWEST_STEPS, _MORE_STEPS = 32, 7
 _COARSE = 1e-3
-# The preliminary integration of a body at rest is repeated if omega is less than the expectation
-# over this factor.
+# The preliminary integration of a body at rest is repeated if omega times this factor is less than
+# expected.
 _FAR = 4.0
 _MOST_GUESSES = 200
 # Largest number of successive steps that do not change the time; without it LSODA might not return.
@@ -31,8 +31,7 @@ _MOST_STUCK = 50
 # Omega counts as unbounded if it has grown by this factor when the phase is too large.
 _UNBOUNDED = 1e3
 _ORDINARY = 1e100  # rad/s; products of smaller omegas are finite
-# A jump of the rates is searched up to this fraction of the time span ahead, by this number of
-# halvings.
+# A jump of the rates is searched in this fraction of the time span ahead, by so many halvings.
 _AHEAD, _HALVINGS = 1e-3, 50
 # Microseconds of a right-hand side without torque, including SciPy; of an operation of a tape; and
 # of an opaque function.

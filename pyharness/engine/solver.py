@@ -125,8 +125,8 @@ class Solver(BoundKernel[Result]):
         packed = packed_scene(chosen.scene, code, tolerance, effort, address)
         packed_with_gil = None
         if chosen.closed_form and packed.size < Places.WAVES + 4 * _FEW_WAVES:
-            # This kernel has no fallback, which may take long; if it refuses, the other kernel is
-            # called without the GIL.
+            # With the GIL, no fallback is called, because it may take long; if this kernel refuses,
+            # the other is called without the GIL.
             packed_with_gil = packed.copy()
             is_sphere = chosen.closed_form == "sphere" and not with_attitude
             packed_with_gil[Places.METHOD] = CODES["sphere" if is_sphere else "closed-form"]

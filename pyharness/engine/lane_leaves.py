@@ -22,7 +22,7 @@ from pyharness.engine.leaves import (
 )
 from pyharness.model.codes import Storage
 
-_UNKNOWNS = (3, 7)  # numbers that have lanes: without and with attitude
+_UNKNOWNS = (3, 7)  # numbers of unknowns that have lanes: without and with attitude
 _TOGETHER = 4  # sums
 _N_INPUTS = 8  # time, omega and attitude; parameters follow
 _MOST_INLINED = 60  # sums; many more would take a minute to compile
@@ -209,7 +209,6 @@ def _set_values(tape: Structure) -> Iterator[str]:
 
 
 def _set_noise(tape: Structure) -> Iterator[str]:
-    """Yield the function that bounds the rounding errors of the rates."""
     yield "void set_lane_noise(const reg *restrict a, const double *restrict c,"
     yield "                    const double *restrict d, reg *restrict noise)\n{"
     yield "  const reg zero = {0.0};"

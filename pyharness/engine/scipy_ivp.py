@@ -24,7 +24,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import ROUNDING, Trajectory
 
-# Largest ratio of the error at the end to the local error. _SUM is for a motion of a few radians.
+# Largest ratio of the error at the end to the local error: _SUM in a motion of a few radians;
 # _SUM_A_RADIAN, times the error amplification, is added for each further radian. Both were measured
 # on random scenes that the checks do not use, and increased by half.
 _SUM = {"DOP853": 30.0, "RK45": 90.0, "Radau": 30.0, "LSODA": 90.0}

@@ -84,7 +84,7 @@ class StateRun(Run):
     def _guarded(self, slopes: RightHandSide) -> RightHandSide:
         """Return a right-hand side that evaluates tables only inside the current span.
 
-        The right-hand side raises InputError if an opaque function fails.
+        It raises InputError if an opaque function fails.
         """
 
         def between(time: float, state: Sequence[float]) -> list[float]:

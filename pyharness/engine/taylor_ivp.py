@@ -27,7 +27,7 @@ _LEAST_RTOL = 100.0 * np.finfo(float).eps
 # The least allowed error that counts, whose reciprocal is finite.
 _LEAST_SCALE = 2.0**-1000
 # `solve_ivp` misses pairs of roots in a step, and in the first step roots of an event function that
-# is 0 at the start. Therefore the state changes in the first step at most by the fraction
+# is 0 at the start. Therefore the first step changes the state at most by the fraction
 # _FIRST_CHANGE, and steps grow at most by the factor _MOST_GROWTH, as in SciPy's methods.
 _FIRST_CHANGE = 0.01
 _MOST_GROWTH = 10.0
@@ -37,10 +37,9 @@ _FIRST_PARTS = 1e-12, 1e-2  # least and largest first step, over the step that t
 class Taylor(OdeSolver):  # type: ignore[misc]
     """Integrate an ordinary differential equation y' = fun(t, y) by its Taylor series.
 
-    Use it as a method of `scipy.integrate.solve_ivp`: ``solve_ivp(fun, t_span, y0,
-    method=Taylor)``. `fun` is called twice, with symbols that record its arithmetic. Compiled code
-    computes the series, whose order, 8 to 28, depends on the tolerances. The dense output is the
-    series.
+    Pass it to `scipy.integrate.solve_ivp` by ``method=Taylor``. `fun` is called twice, with symbols
+    that record its arithmetic. Compiled code computes the series, whose order, 8 to 28, depends on
+    the tolerances. The dense output is the series.
 
     Parameters
     ----------

@@ -42,9 +42,9 @@ def gauss(
     The step is halved until the estimated relative error of omega meets the tolerance, or the last
     two solutions differ only by rounding errors. The estimate, with the safety factor
     2, is 2 d / (r**p - 1). Here d is the largest difference of the two solutions over the largest
-    component of omega, and r, at most 2, the smallest ratio of their numbers of steps between
-    requested times. The exponent p is the order, 2 `stages`, but at most 8, because long steps do
-    not show a higher order.
+    component of omega. The ratio r, at most 2, is the smallest ratio of their numbers of steps
+    between requested times. The exponent p is the order, 2 `stages`, but at most 8, because
+    long steps do not show a higher order.
     """
     given, most = normalized(scene), effort * _MOST_EVALUATIONS / (1.0 + 0.5 * waves(scene))
     if times[-1] == 0.0:
@@ -129,8 +129,8 @@ def _blows_up(finer: _Solution, coarser: _Solution, start: float) -> bool:
     """Return whether two solutions end because omega grows without bound.
 
     Both then end before the last time, nearly together. Let m and n (rad/s) be the largest
-    components of omega at the end of the finer and the coarser solution, and s the larger of
-    `start` and all components at requested times. Either m and n both exceed 1e300 rad/s, or m >
+    components of omega at the end of the finer and the coarser solution. Let s be the larger
+    of `start` and all components at requested times. Either m and n both exceed 1e300 rad/s, or m >
     1.5 n > 1000 s.
     """
     if COMPLETE in (finer.status, coarser.status):

@@ -79,8 +79,8 @@ def solve_one_by_one(
 ) -> Ensemble:  # fmt: skip
     """Return the final states of bodies by prepared solvers; invalid bodies are REFUSED.
 
-    Raise InputError if the torque needs an attitude and there is none, if the method can't solve
-    the scene, or if a torque in space acts on bodies given by coefficients.
+    Raise InputError if the torque needs an attitude and there is none, the method can't solve the
+    scene, or a torque in space acts on bodies given by coefficients.
     """
     by_coefficients = arrays["coefficients"] is not None or scene.coefficients is not None
     if by_coefficients and not isinstance(scene.torque, StateTorque):

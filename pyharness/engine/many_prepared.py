@@ -103,8 +103,8 @@ def solve_each(
 ) -> None:  # fmt: skip
     """Solve the bodies in `piece` side by side or by single calls.
 
-    Single calls solve bodies whose error can't be measured side by side, and all bodies if the
-    torque is neither recorded nor about the axes of space, or if the inertia matrix is full.
+    Single calls solve bodies whose error can't be measured side by side. They solve all bodies if
+    the torque is neither recorded nor about the axes of space, or if the inertia matrix is full.
     """
     left = list(range(piece.start, piece.stop))
     if solver.packed[Places.METHOD] == Methods.TAPE and solver.scene.inertia is None:

@@ -187,8 +187,8 @@ def _by_periods(
 ) -> tuple[dict[str, slice], Array]:
     """Return columns by parameter, and the derivatives of a periodic omega, (n, 3, m)."""
     # A perturbation of the initial omega changes the period, and thus grows by the same multiple of
-    # the slope of omega in every period. Therefore the state-transition matrix is M = I + N for
-    # one period, where N has rank 1 and N N = 0, and M^k = I + k N for k periods (Floquet). The
+    # the slope of omega in every period. Therefore the state-transition matrix of one period is M =
+    # I + N, where N has rank 1 and N N = 0. For k periods it is M^k = I + k N (Floquet). The
     # part F that the parameters cause in one period adds up to k F + k (k - 1)/2 N F. For moments,
     # which change the period once, N F is 0.
     whole = np.floor(times / period)

@@ -47,8 +47,8 @@ def solve_state(
     work limit, as a number of right-hand sides of a body without torque. If the torque is opaque
     and `with_steps` is true, `sol` of the result has the steps, by SciPy's interpolants.
 
-    The ending is ``overflow`` if omega grows without bound or the torque is singular, ``unchecked``
-    if the Taylor series of a recorded torque, which checks the result, does not reach the end.
+    The ending is ``overflow`` if omega grows without bound or the torque is singular. It is
+    ``unchecked`` if the Taylor series that checks a recorded torque does not reach the end.
     Raise InputError if an opaque function fails, the attitude is missing, the tolerance can't be
     met, or the work limit is exceeded.
     """

@@ -19,7 +19,7 @@ from pyharness.model.symbols import HAS_MEMORY
 from pyharness.model.trajectory import Array
 
 # The longest step is the time span over a number that grows with each integration, so that no two
-# integrations pass a short pulse or sample a wave in the same way.
+# integrations pass a short pulse or sample a wave alike.
 _FEWEST_STEPS, _MORE_STEPS = 32, 7
 _COARSE = 1e-3
 # The preliminary integration of a body at rest is repeated if omega times this factor is less than

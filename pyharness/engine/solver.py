@@ -212,8 +212,8 @@ class Solver(BoundKernel[Result]):
     def status(self) -> str:
         """Return how the last call ended; ``complete`` before the first call.
 
-        It is ``gave up`` if the work limit was exceeded or the phase has no correct digit left,
-        ``refused`` if the method does not apply, and ``sensitive`` if amplified rounding errors
+        ``gave up`` means that the work limit was exceeded or the phase has no correct digit left;
+        ``refused``, that the method does not apply; ``sensitive``, that amplified rounding errors
         exceed the tolerance.
         """
         return self._judge()[0]

@@ -23,7 +23,7 @@ _MOST_ROWS = 16  # rows at which a larger amplification is computed
 
 
 def period_of(scene: Scene) -> float:
-    """Return the period of omega (s); 0 if none, under a torque, or if the inertia changes."""
+    """Return the period of omega (s); 0 if none, under a torque or a changing inertia."""
     if scene.changing is not None or not scene.torque.is_zero:
         return 0.0
     bare = principal(scene)[0]

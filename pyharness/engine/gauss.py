@@ -44,7 +44,7 @@ def gauss(
     2, is 2 d / (r**p - 1). Here d is the largest difference of the two solutions over the largest
     component of omega. The ratio r, at most 2, is the smallest ratio of their numbers of steps
     between requested times. The exponent p is the order, 2 `stages`, but at most 8, because
-    long steps do not show a higher order.
+    long steps show no higher order.
     """
     given, most = normalized(scene), effort * _MOST_EVALUATIONS / (1.0 + 0.5 * waves(scene))
     if times[-1] == 0.0:

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from pyharness.engine.recorded import Listing
 
 TIME, FIRST_UNKNOWN = 1, 2  # slots, from 1
-_MOST_OPERATIONS = 499  # whose products fit on the stack of a thread
+_MOST_OPERATIONS = 499  # whose products fit on a thread's stack
 
 Listed = tuple[int, int, int, int]  # kind, operands x and y, and slot o of an operation
 
@@ -35,7 +35,7 @@ def structure(tape: "Listing") -> Structure | None:
 
 
 def key(tape: Structure) -> int:
-    """Return an integer of 63 bits that identifies a structure."""
+    """Return a 63-bit integer that identifies a structure."""
     return int.from_bytes(sha256(repr(tuple(tape)).encode()).digest()[:8]) >> 1
 
 
@@ -57,7 +57,7 @@ def place(slot: int, k: str) -> str:
 
 
 def with_slots(text: str, operation: Listed) -> str:
-    """Return C with slots in the place of letters."""
+    """Return C with slots in place of letters."""
     slots = letters(operation)
 
     def name(match: re.Match[str]) -> str:
@@ -69,7 +69,7 @@ def with_slots(text: str, operation: Listed) -> str:
 
 
 def combined(tape: Structure, number: int, name: str, *, is_value: bool) -> str:
-    """Return a linear combination of C variables, such as "t4" for slot 4 and the `name` "t"."""
+    """Return a linear combination of C variables, such as "t4" for slot 4 and `name` "t"."""
     parts = [f"d[{number - 1}]"] * is_value
     parts += [f"c[{i}]*{name}{slot}" for i, slot in numbered_terms(tape, number)]
     return " + ".join(parts) or "0.0"

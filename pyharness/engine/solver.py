@@ -75,7 +75,7 @@ class Solver(BoundKernel[Result]):
 
     Threads may share a solver. The kernel releases the interpreter's lock (GIL), unless the
     solution takes less time than releasing it. Solvers can be copied and pickled, without the
-    status of the last call.
+    last call's status.
 
     Attributes
     ----------

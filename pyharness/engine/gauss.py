@@ -40,10 +40,10 @@ def gauss(
     """Return the trajectory by Gauss collocation with 1 to 8 `stages`.
 
     The step is halved until the estimated relative error of omega meets the tolerance, or the last
-    two solutions differ only by rounding errors. The estimate, with the safety factor
-    2, is 2 d / (r**p - 1). Here d is the largest difference of the two solutions over the largest
-    component of omega. The ratio r, at most 2, is the smallest ratio of their numbers of steps
-    between requested times. The exponent p is the order, 2 `stages`, but at most 8, because
+    two solutions differ only by rounding errors. The estimate, with the safety
+    factor 2, is 2 d / (r**p - 1). Here d is the largest difference of the two solutions over the
+    largest component of omega. The ratio r, at most 2, is the smallest ratio of their numbers of
+    steps between requested times. The exponent p is the order, 2 `stages`, but at most 8, because
     long steps show no higher order.
     """
     given, most = normalized(scene), effort * _MOST_EVALUATIONS / (1.0 + 0.5 * waves(scene))

@@ -90,8 +90,8 @@ def solve(
     dense_output : bool
         Whether to return `sol`, the solution as a function of time between 0 and `times`, to within
         the tolerance. Closed forms, Taylor series, and `dop853` and `lsoda` under an opaque torque
-        need no further integrations for it. Methods with a fixed step return a cubic polynomial on
-        each step.
+        need no further integrations for it; other methods do. Methods with a fixed step return a
+        cubic polynomial on each step.
     events : callable, Event, or list of these
         Functions of (t, omega) or (t, omega, attitude), or events of `pyharness.events`. Their
         roots between 0 and `times` become `t_events`, and the states there `y_events`. A function

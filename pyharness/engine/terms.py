@@ -166,7 +166,7 @@ def attitude_control(
     quaternion and its negative have the same torque, so that the body does not rotate the long way
     round (unwinding). Let a be the angle of the error. If k is a number, the first term is -k
     sin(a) about the axis of the error, with the potential k (1 - cos(a)). The equilibrium at a =
-    180 degrees is unstable.
+    180 degrees is then unstable.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """The method `averaged`: weak torques over very many revolutions, by two-scale averaging.
 
 A weak torque changes the periodic torque-free motion slowly. A macro-step computes this change over
-very many revolutions from the stroboscopic solution, the state once in each.
+very many revolutions from the stroboscopic solution, the state once per revolution.
 
 Stroboscopic averaging: Calvo, Chartier, Murua and Sanz-Serna 2011, Numerical stroboscopic averaging
 for ODEs and DAEs, Applied Numerical Mathematics 61. Two scales: Chartier, Crouseilles, Lemou and
@@ -69,7 +69,7 @@ def estimates(
 ) -> tuple[float, float]:
     """Return the largest error of omega (rad/s), and the largest error amplification.
 
-    Both are computed at the end of the last macro-step and of up to four earlier ones.
+    They are taken at the ends of the last macro-step and of up to four earlier ones.
     """
     a, b, c = coefficients
     error, growth, count = 0.0, 1.0, len(done)
@@ -100,9 +100,9 @@ def averaged(
     """Return the trajectory of a scene with a weak torque at `times` (s), by averaging.
 
     `steps` of the result counts macro-steps, and `error` is the difference from a solution with
-    more nodes and a higher order of averaging. A recorded torque must be a sum of terms, each a
-    polynomial in omega and time multiplied by sines and cosines of time; a macro-step might miss
-    changes of another torque.
+    more nodes and a higher order of averaging. A recorded torque must be a sum of polynomials in
+    omega and time, multiplied by sines and cosines of time; a macro-step might miss changes of
+    another torque.
 
     Raise InputError if the torque has another form, is opaque, depends on the attitude, is not
     weak, or may be in resonance; if the torque-free omega is near the separatrix, or does not

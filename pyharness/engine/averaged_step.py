@@ -229,7 +229,7 @@ class MacroStep:
         return found
 
     def _measured(self) -> Array:
-        """Return the error of V at the nodes, measured by two sweeps with more nodes and angles."""
+        """Return the measured error of V at the nodes."""
         count, angles = self._sizes
         nodes, turns, back = _finer(count, angles)
         slow, fast = slow_nodes(count + _MORE_NODES), fast_nodes(angles + _MORE_ANGLES)

@@ -26,7 +26,7 @@ _WIDER = 16.0  # factor on the half width of an interval, until the sign changes
 
 
 def event_roots(g: EventFunction, solution: Solution) -> Roots:
-    """Return all roots of an event's function, with sign changes in the order of time."""
+    """Return all roots of an event's function."""
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         fits, rough = fitted(g, solution)
         kept = may_vanish(fits)

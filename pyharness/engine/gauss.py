@@ -40,11 +40,11 @@ def gauss(
     """Return the trajectory by Gauss collocation with 1 to 8 `stages`.
 
     The step is halved until the estimated relative error of omega meets the tolerance, or the last
-    two solutions differ only by rounding errors. The estimate, with the safety
-    factor 2, is 2 d / (r**p - 1). Here d is the largest difference of the two solutions over the
-    largest component of omega. The ratio r, at most 2, is the smallest ratio of their numbers of
-    steps between requested times. The exponent p is the order, 2 `stages`, but at most 8, because
-    long steps show no higher order.
+    two solutions differ only by rounding errors. The estimate is 2 d / (r**p - 1), with the safety
+    factor 2. Here d is the largest difference of the two solutions over the largest component of
+    omega. The ratio r, at most 2, is the smallest ratio of their numbers of steps between requested
+    times. The exponent p is the order, 2 `stages`, but at most 8, because long steps show no higher
+    order.
     """
     given, most = normalized(scene), effort * _MOST_EVALUATIONS / (1.0 + 0.5 * waves(scene))
     if times[-1] == 0.0:
@@ -144,7 +144,7 @@ def _blows_up(finer: _Solution, coarser: _Solution, start: float) -> bool:
 
 
 def _step_counts(lengths: Array, step: float) -> Array:
-    """Return the number of steps in each interval; a step is at most 1e-6 longer than `step`."""
+    """Return the number of steps in each interval; a step exceeds `step` by at most 1e-6 of it."""
     with np.errstate(over="ignore", divide="ignore"):
         return np.maximum(1.0, np.floor(np.minimum(lengths / step, 1e18) + (1.0 - 1e-6)))
 

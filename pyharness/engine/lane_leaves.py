@@ -1,7 +1,6 @@
-"""Leaves (see leaves.py) for many bodies, one a register lane, as in fortran/many/tape_lanes.c.
+"""Leaves (leaves.py) for many bodies, one per lane of a register; see fortran/many/tape_lanes.c.
 
-The parts of four sums of products that are known before term k are computed together, which saves
-loads.
+To save loads, the parts of four sums of products known before term k are computed together.
 """
 
 import re
@@ -180,7 +179,6 @@ def _expand(tape: Structure) -> Iterator[str]:
 
 
 def _set_jacobian(tape: Structure) -> Iterator[str]:
-    """Yield the function that computes the Jacobian of the rates amid the step."""
     lines, rows = derivatives(tape, _TERMS_AMID)
     lines = [_in_lanes(each) for each in lines]
     known = {TIME, *unknowns_of(tape)}
@@ -199,7 +197,6 @@ def _set_jacobian(tape: Structure) -> Iterator[str]:
 
 
 def _set_values(tape: Structure) -> Iterator[str]:
-    """Yield the function that computes term 0 of all slots, if there is one."""
     if lines := first_values(tape):
         yield "void set_lane_values(reg *restrict a, const double *restrict c,"
         yield "                     const double *restrict d)\n{"

@@ -159,7 +159,6 @@ def _kept(unknowns: range, k: str) -> Iterator[str]:
 
 
 def _set_jacobian(tape: Structure) -> Iterator[str]:
-    """Yield the function that computes the Jacobian of the rates at the nodes."""
     yield "void set_jacobian(const double *restrict a, const double *restrict c,"
     yield "                  const double *restrict d, const double *restrict parts, int nodes,"
     yield "                  double h, double *restrict jacobian)\n{"
@@ -190,7 +189,6 @@ def first_values(tape: Structure) -> list[str]:
 
 
 def _set_values(tape: Structure) -> Iterator[str]:
-    """Yield the function that computes term 0 of all slots, if there is one."""
     if lines := first_values(tape):
         yield "void set_values(double *restrict a, const double *restrict c,"
         yield "                const double *restrict d, double *restrict rates)\n{"
@@ -258,7 +256,6 @@ def _roundings(tape: Structure) -> tuple[list[str], list[str]]:
 
 
 def _set_noise(tape: Structure) -> Iterator[str]:
-    """Yield the function that bounds the rounding errors of the rates."""
     yield "void set_noise(const double *restrict a, const double *restrict c,"
     yield "               const double *restrict d, double *restrict noise)\n{"
     yield from noises(tape, "double", str)

@@ -83,15 +83,13 @@ def solve_many(
     Parameters
     ----------
     scene : Scene, or sequence of Scene
-        One scene, whose values apply where no array is given; or a sequence of all scenes, which
-        allows no arrays.
+        One scene, whose values apply where no array is given; or all scenes, without arrays.
     t_end : float, or array of shape (n,)
         Final times, s; positive, negative or 0.
     times : float or iterable of float, shape (m,)
         Strictly monotonic times (s) of the results for all bodies, instead of `t_end`. The arrays
-        of the result have a further axis, of length m, after the axis of the bodies. The states at
-        a time are bit for bit those of a call with this time as `t_end`, unless the scene has
-        states of its own.
+        of the result then have a second axis, of length m. The states are bit for bit as from calls
+        with each time as `t_end`, unless the scene has states of its own.
     omega : array, shape (n, 3) or (3,)
         Initial angular velocities, rad/s. A single row, here and below, applies to all bodies.
     attitude : array, shape (n, 4) or (4,), or scipy.spatial.transform.Rotation
@@ -113,20 +111,19 @@ def solve_many(
         name. Bodies that differ only in these values, moments or coefficients, and initial states
         are solved side by side.
     states : dict of arrays, shape (n,), or of float
-        Values at time 0 of the scene's own states (the unknowns that `Scene.states` adds), by name;
-        the default is the scene's values. Bodies with own states are solved one by one; `events`,
+        Initial values of the scene's own states (unknowns that `Scene.states` adds), by name; the
+        default is the scene's values. Bodies with own states are solved one by one; `events`,
         `sensitivities` and `out` are then not allowed.
     method : str
         A name in `pyharness.engine.solver.PREPARED`. `auto` uses a closed form if there is one,
         else the Taylor series.
     tolerance : float
-        Largest allowed error. The error of a component of omega is relative to the largest |omega|
-        from time 0 to the end; the error of the attitude is an angle (rad). The default depends on
-        the method.
+        Largest allowed error of a component of omega, relative to the largest |omega| from time 0
+        to the end, and of the attitude, an angle (rad). The default depends on the method.
     step : float, optional
         Step size of Gauss collocation and fixed-step methods, s. The default is the scene's.
     effort : float
-        Factor on the work limit of a body. Beyond the limit its status is `gave up`.
+        Factor on the work limit of a body; beyond it the status is `gave up`.
     estimates : bool
         Whether to return estimated errors and error amplifications.
     compiled : bool
@@ -137,7 +134,7 @@ def solve_many(
         `auto`, `taylor` or `closed-form`.
     sensitivities : iterable of str
         Names of parameters, as in `solve`, with respect to which the final states are
-        differentiated. The allowed methods are those for `events`.
+        differentiated; the methods are as for `events`.
     threads : int
         Number of threads. The kernel releases the GIL.
     out : Ensemble, or array of shape (n, 3), optional
@@ -300,7 +297,7 @@ def _solve(
 
 
 def _kind_of(scene: Scene, row: int) -> int:
-    """Return a number that is the same for all scenes of one kernel call."""
+    """Return a number that is equal for all scenes of one kernel call."""
     checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True)
     return row if is_solved_alone(scene, {}) else _PLAIN if scene.inertia is None else _TILTED
 

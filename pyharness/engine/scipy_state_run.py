@@ -22,8 +22,8 @@ from pyharness.model.trajectory import Array
 # integrations pass a short pulse or sample a wave alike.
 _FEWEST_STEPS, _MORE_STEPS = 32, 7
 _COARSE = 1e-3
-# The preliminary integration of a body at rest is repeated if omega times this factor is less than
-# expected.
+# The preliminary integration of a body at rest is repeated if its largest omega times this factor
+# is less than expected.
 _FAR = 4.0
 _MOST_GUESSES = 200
 # Largest number of successive steps that do not change the time; without it LSODA might not return.
@@ -82,10 +82,7 @@ class StateRun(Run):
         self.spans = [Span(time, math.inf) for time in bounds_of(scene, end)]
 
     def _guarded(self, slopes: RightHandSide) -> RightHandSide:
-        """Return a right-hand side that evaluates tables only inside the current span.
-
-        It raises InputError if an opaque function fails.
-        """
+        """Confine tables to the current span; turn failures of opaque functions into InputError."""
 
         def between(time: float, state: Sequence[float]) -> list[float]:
             low, high = self._between
@@ -161,7 +158,7 @@ class StateRun(Run):
             )
 
     def after_step(self, time: float, state: Sequence[float]) -> None:
-        """Record the step; raise NoNumberError if 50 steps in succession do not change the time."""
+        """Record the step; raise NoNumberError after over 50 successive steps at the same time."""
         self._stuck = self._stuck + 1 if time == self._reached else 0
         if self._stuck > _MOST_STUCK:
             raise NoNumberError
@@ -241,7 +238,7 @@ class StateRun(Run):
         return np.empty((0, len(self.start)))
 
     def steps(self, scene: Scene) -> DenseOutput | None:
-        """Return the steps of the last integration, or None if there are none, or too many."""
+        """Return the steps of the last integration; None if there are none, or above 20 000."""
         edges, values = [0.0], []
         for sol in self._solutions:
             for (first, last), step in zip(

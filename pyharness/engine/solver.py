@@ -60,22 +60,20 @@ _FEW_WAVES = 16  # fewer waves take less time than releasing the GIL
 class Solver(BoundKernel[Result]):
     """A solver of a scene, prepared for one method by `prepare`.
 
-    Call it as ``solver(omega, t_end)`` or ``solver(omega, t_end, out=out)``, with three numbers for
-    the initial omega (rad/s), and the final time (s), positive, negative or 0. A call returns omega
-    (rad/s) at `t_end` as a new array of shape (3,), or in `out`, a contiguous array of three
-    floats, which may be the array `omega`.
+    ``solver(omega, t_end, out=None)`` takes three numbers, the initial omega (rad/s), and the final
+    time (s), of any sign. It returns omega (rad/s) at `t_end` as a new array of shape (3,), or in
+    `out`, a contiguous array of three floats, which may be the array `omega`.
 
-    A solver prepared with ``attitude=True`` is called as ``solver(omega, t_end, attitude)``, with
-    the initial quaternion from body to space, scalar first; by default it is the scene's, or
-    (1, 0, 0, 0). It returns omega and the quaternion at `t_end`, shape (4,), as new arrays.
+    Prepared with ``attitude=True``, ``solver(omega, t_end, attitude=None)`` takes the initial
+    quaternion from body to space, scalar first; the default is the scene's, or (1, 0, 0, 0). It
+    returns omega and the quaternion at `t_end`, shape (4,), as new arrays.
 
     Invalid arguments raise an InputError and leave `out` unchanged. Calls are fastest with arrays
     of floats and a unit quaternion. If the kernel could not finish, or an argument is not finite,
     the result is NaN and `status` has the reason.
 
     Threads may share a solver. The kernel releases the interpreter's lock (GIL), unless the
-    solution takes less time than releasing it. Solvers can be copied and pickled, without the
-    last call's status.
+    solution takes less time. Solvers can be copied and pickled, without the last call's status.
 
     Attributes
     ----------
@@ -296,24 +294,23 @@ def prepare(
         A name in `pyharness.engine.solver.PREPARED`; `auto` selects the fastest.
     tolerance : float
         Largest allowed error of a component of omega, relative to the largest |omega| from time 0
-        to the end; the default is that of `solve`. It does not affect the errors of methods with a
-        fixed step and of Gauss collocation. If the motion amplifies perturbations by a factor K, no
-        method has a relative error below some 1e-15 K.
+        to the end; the default is as in `solve`. It does not affect methods with a fixed step and
+        Gauss collocation. If the motion amplifies perturbations by a factor K, no method has a
+        relative error below some 1e-15 K.
     effort : float
         Factor on the work limit of a call (about ten seconds); beyond it the status is `gave up`.
     attitude : bool
         Whether calls return the attitude too, as in `solve`.
     compiled : bool
         Whether a C compiler translates a recorded torque, mostly within a second, unless the user's
-        cache has the result; without a compiler it is interpreted. `Solver.leaves` says which.
+        cache has the result; without a compiler it is interpreted (see `Solver.leaves`).
 
     Returns
     -------
     Solver
-        A callable. ``solver(omega, t_end)`` returns omega (rad/s), shape (3,), at `t_end` (s).
-        With `attitude` it also returns a quaternion from body to space, scalar first, shape (4,).
-        Under a torque that depends on the state, an initial omega above 2**300 or below 2**-300
-        rad/s is `refused`; `solve` accepts it.
+        A callable: ``solver(omega, t_end)`` returns omega (rad/s), shape (3,), at `t_end` (s); with
+        `attitude`, also the quaternion, shape (4,). Under a torque that depends on the state, an
+        initial omega above 2**300 or below 2**-300 rad/s is `refused`; `solve` accepts it.
 
     Raises
     ------

@@ -29,18 +29,17 @@ _DEFAULT = 1e-9
 class Stepper:
     """A motion that is computed step by step by Taylor series.
 
-    Use it if something happens between the steps: a controller changes its torque, a mass is
-    released, an impact changes omega. Otherwise `pyharness.solve` is faster, and estimates the
-    error of its result.
+    Use it if something happens between steps: a controller changes its torque, or an impact changes
+    omega. Otherwise `pyharness.solve` is faster, and estimates the error of its result.
 
     Parameters
     ----------
     scene : Scene
         The body, its torque and its state at time 0. The torque must not be opaque.
     tolerance : float, optional
-        The largest error of a step. The error of a component of omega is relative to the largest
-        |omega| so far, and of an own state to its largest absolute value so far. The error of the
-        attitude is an angle (rad). Default is 1e-9.
+        The largest error of a step: for a component of omega, relative to the largest |omega| so
+        far; for an own state, to its largest absolute value so far; for the attitude, an angle
+        (rad). Default is 1e-9.
     attitude : bool, optional
         Whether the attitude is computed, as in `pyharness.solve`.
 
@@ -53,12 +52,12 @@ class Stepper:
     attitude : ndarray, shape (4,), or None
         The quaternion from body to space, scalar first. It may be set.
     states : dict of str to float
-        The scene's own states, the unknowns that `Scene.states` adds. A dict of some or all may be
+        The scene's own states (unknowns that `Scene.states` adds). A dict of some or all may be
         set.
     held_torque : ndarray, shape (3,)
         A torque about the body axes, added to the scene's torque, in N m; for a body given by
-        coefficients, torque over moment in rad/s2. It is 0 at first, and remains until it is set
-        again, even if another scene is set.
+        coefficients, torque over moment in rad/s2. It is 0 at first, and remains until set again,
+        even with another scene.
     scene : Scene
         The scene. If another scene is set, time, omega, attitude and states are kept.
     steps : int

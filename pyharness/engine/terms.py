@@ -59,11 +59,11 @@ def damping(matrix: MatrixLike) -> StateTorque:
 
 
 def drag(coefficients: Iterable[MatrixLike], per_axis: bool = False) -> StateTorque:
-    """Return a torque of drag that is an odd polynomial of omega.
+    """Return a drag torque that is an odd polynomial of omega.
 
     It is the sum over n = 0, 1, 2, ... of -C_n |omega|^(2n) omega. With `per_axis` it is the sum of
     -C_n v_n, where v_n has the components omega_i^(2n+1). Quadratic drag, -k |omega| omega, is not
-    smooth at 0; for motions away from 0, write it as a Python function with ``numpy.sqrt``.
+    smooth at 0; away from 0, use a Python function with ``numpy.sqrt``.
 
     Parameters
     ----------
@@ -116,14 +116,14 @@ def drag(coefficients: Iterable[MatrixLike], per_axis: bool = False) -> StateTor
 def rate_control(gain: MatrixLike, target: Numbers = (0.0, 0.0, 0.0)) -> StateTorque:
     """Return the torque -K (omega - target), which controls the angular velocity.
 
-    Acting alone, with a positive definite K, it drives any omega to the target 0. A target along a
+    Alone, with a positive definite K and the target 0, it drives any omega to 0. A target along a
     principal axis attracts nearby omegas if K is large enough: for K = k and the middle axis, k >
     |target| sqrt((I3 - I2) (I2 - I1)), with the moments I1 < I2 < I3.
 
     Parameters
     ----------
     gain : number, three numbers, or three rows of three numbers
-        The matrix K (N m s), in the form that `damping` accepts.
+        The matrix K (N m s), written as in `damping`.
     target : three numbers
         The desired angular velocity about the body axes (rad/s).
 
@@ -171,11 +171,11 @@ def attitude_control(
     Parameters
     ----------
     stiffness : number, three numbers, or three rows of three numbers
-        The matrix k (N m), in the form that `damping` accepts.
+        The matrix k (N m), written as in `damping`.
     gain : number, three numbers, or three rows of three numbers
         The matrix K (N m s) of the damping.
     target : four numbers
-        The desired quaternion from body to space, scalar first. It is normalised.
+        The desired quaternion from body to space, scalar first; it is normalised.
 
     Returns
     -------
@@ -223,7 +223,8 @@ def wheels(
 
     If h is the absolute angular momentum of the wheels about their axes, the inertia of the body
     must exclude the moments of the wheels about these axes. If h is relative to the body, the
-    inertia must include them, and u is h' alone: the torque of the motors is u + moments omega'.
+    inertia must include them, and u is h' alone: the motors' torque is u plus these moments times
+    omega'.
 
     Parameters
     ----------

@@ -47,7 +47,7 @@ class Coordinates(NamedTuple):
 
     @classmethod
     def from_omega(cls, coefficients: Triple, omega: Triple) -> Self | None:
-        """Return the coordinates for an omega (rad/s); None for a sphere, or on a separatrix."""
+        """Return the coordinates for an omega (rad/s); None for a sphere, or on the separatrix."""
         found: list[tuple[float, Self]] = []
         for a in range(3):
             b, c = (a + 1) % 3, (a + 2) % 3

@@ -24,7 +24,7 @@ def solution_of(
 ) -> DenseOutput:
     """Return the solution as a function of time, from time 0 to the last row of `found`.
 
-    ``rows(times, tolerance)`` computes the states at times in this range by the same method.
+    ``rows(times, tolerance)`` computes states in this range by the same method.
     """
     is_closed = not found.evaluations and method != "reference"
     return dense.dense_output(scene, found, rows, tolerance, METHODS[method].finest, is_closed)

@@ -89,9 +89,9 @@ def dense_output(
 ) -> DenseOutput:
     """Return the solution as a function of time from time 0 to the last row of `found`.
 
-    ``rows(times, tolerance)`` computes the states at times in this range; `finest` is the smallest
-    tolerance of the method. The tolerance 1 means fixed steps. A closed form (`is_closed`) is
-    evaluated directly. Raise InputError if over 200 000 polynomials are needed.
+    ``rows(times, tolerance)`` computes states in this range; `finest` is the method's smallest
+    tolerance. The tolerance 1 means fixed steps. A closed form (`is_closed`) is evaluated directly.
+    Raise InputError if over 200 000 polynomials are needed.
     """
     ends = sorted({0.0, *found.time[[0, -1]].tolist()}) if len(found.time) else [0.0]
     states: Callable[[Array], Array]

@@ -79,11 +79,11 @@ class Solution:
         return g(times, states, rates)
 
     def exact_values(self, g: EventFunction, times: Array) -> Array:
-        """Return the values of an event's function for the states of `sol` instead of `pieces`."""
+        """Return the values for the states of `sol` instead of `pieces`."""
         return self.values(g, times, self.sol.normalized(self.sol.states(times)))
 
     def noise(self, g: EventFunction, times: Array) -> Array:
-        """Return the errors of a function's values due to errors of time, state and rates."""
+        """Return the errors of the values due to errors of time, state and rates."""
         return self.values_and_noise(g, times)[1]
 
     def values_and_noise(
@@ -116,7 +116,7 @@ class Solution:
     def state_error(self) -> float:
         """The error of the state, relative to its size.
 
-        It is at most 1e-10, because a larger error would hide pairs of close roots.
+        At most 1e-10, because a larger error would hide pairs of close roots.
         """
         return max(ROUNDING, min(self.tolerance, _COARSEST))
 
@@ -229,7 +229,7 @@ class ZeroIntervals:
     after: Array
 
     def roots(self, counts_touches: bool) -> Roots:
-        """Return a root for each interval, at the end that the integration from 0 reaches first.
+        """Return each interval's root, at the end that the integration from 0 reaches first.
 
         Without `counts_touches`, intervals with equal signs on both sides have no root.
         """

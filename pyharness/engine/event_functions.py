@@ -36,8 +36,8 @@ _MORE_ARGUMENTS = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS
 class Event:
     """An event of `pyharness.events`.
 
-    `function` takes time, omega, attitude, and the derivative of omega. Own states, the unknowns
-    that `Scene.states` adds, follow the attitude in its array. `terminal` and `direction` are as in
+    `function` takes time, omega, attitude, and the derivative of omega. Own states (unknowns that
+    `Scene.states` adds) follow the attitude in its array. `terminal` and `direction` are as in
     `pyharness.events.crosses`. With `counts_touches`, roots without a sign change are events.
     """
 

@@ -13,7 +13,7 @@ from pyharness.model.values import Number, Numbers, finite, three
 
 
 def gravity_gradient(inertia: Numbers | Iterable[Numbers] | Changing, rate: Number) -> StateTorque:
-    """Return the torque of the gravity gradient, 3 n^2 r x I r, in a circular orbit.
+    """Return the gravity-gradient torque, 3 n^2 r x I r, in a circular orbit.
 
     I is the inertia matrix, and n the rate of the orbit. The unit vector r from the centre of
     attraction is (cos n t, sin n t, 0) along the axes of space. The torque is 0 if a principal axis
@@ -170,8 +170,8 @@ def magnetic_damping(gain: Number, field: TorqueLaw | Numbers) -> StateTorque:
 def in_space(torque: TorqueLaw | Numbers) -> StateTorque:
     """Return the torque R^T N, where N has components about the axes of space.
 
-    The matrix R rotates from body to space. Use this term in a sum of torques; as the only torque
-    of a scene, the TorqueLaw suffices.
+    R rotates from body to space. Use this term in a sum; as the only torque of a scene, the
+    TorqueLaw suffices.
 
     Parameters
     ----------

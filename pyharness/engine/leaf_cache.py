@@ -85,7 +85,7 @@ def leaves_of_many(packed: Array, leaves: str) -> str:
     """Return the text of `Ensemble.leaves` from a packed scene and the text of `Solver.leaves`."""
     if leaves == "compiled" and not extension().compiled_lanes(number_of_leaves(packed)):
         return "interpreter: the compiler does not use the registers of this processor"
-    # What was built with the package is for single bodies.
+    # Code built with the package is for single bodies.
     return leaves.replace("built", "interpreter", 1)
 
 

@@ -1,7 +1,7 @@
 """Compiled leaves: C code for values, series, Jacobian and rounding errors of recorded operations.
 
-They replace the interpreter, fortran/modern/tape_terms.c. Numerical coefficients are read from
-memory, so that tapes that differ only in them share their leaves.
+They replace the interpreter, fortran/modern/tape_terms.c. Coefficients are read from memory, so
+that tapes that differ only in them share leaves.
 """
 
 import re
@@ -62,7 +62,7 @@ static void put(double *to, int nodes, double h, abreast a, abreast b, abreast c
 def source(tape: Structure, suffix: str = "") -> str:
     """Return the C source of the functions of tape.h for a single body.
 
-    With a suffix to their names they are static.
+    With a suffix, added to their names, they are static.
     """
     parts = chain(_expand(tape), _set_jacobian(tape), _set_values(tape), _set_noise(tape))
     text = "\n".join([HEADER, *parts]) + "\n"
@@ -199,10 +199,8 @@ def _set_values(tape: Structure) -> Iterator[str]:
 
 
 def kept_values(lines: list[str], rates: list[str], number: str) -> Iterator[str]:
-    """Yield the statements that compute term 0 of results, of a C type, and store it.
-
-    They define all that `rates` read.
-    """
+    """Yield the statements, of a C type, that store term 0 of results and define all `rates`
+    read."""
     results = [int(each[1 : each.index(" ")]) for each in lines]
     for slot in slots_read([each.partition("=")[2] for each in lines] + rates):
         if slot not in results:

@@ -1,6 +1,6 @@
 """Solution of bodies one by one: events, sensitivities, and scenes that the vector kernel refuses.
 
-It refuses a torque that depends on the state or is about the axes of space, and a changing inertia.
+It refuses torques that depend on the state or are about the axes of space, and a changing inertia.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence

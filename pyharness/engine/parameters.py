@@ -121,8 +121,8 @@ def tape_of_bodies(
 ) -> Tape:  # fmt: skip
     """Return one tape of the equations of motion for bodies that differ in parameters.
 
-    Further inputs of the tape are A, B, C and the reciprocal moments, unless `body` has them for
-    all bodies; and the torque's parameters `names`.
+    Further inputs are A, B, C and the reciprocal moments, unless `body` has them for all bodies;
+    and the torque's parameters `names`.
     """
     n_body = 0 if body else 6
     recorder = Recorder(n_inputs=N_INPUTS + n_body + len(names))
@@ -164,7 +164,7 @@ def _equations(
     values: tuple[tuple[str, tuple[float, ...]], ...],
     attitude: bool,
 ) -> VariedEquations:
-    """Return the equations; `values` are pairs of names and values, in the order of columns."""
+    """Return the equations; `values` are names and values, in the order of columns."""
     # The initial omega and attitude have three columns each, but no values here.
     n = 7 if attitude else 3
     flat = [each for _, listed in values for each in listed]

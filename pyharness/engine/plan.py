@@ -84,7 +84,7 @@ def plan(
 def chosen_method(
     scene: Scene, form: str | None, tolerance: float, rows: bool
 ) -> tuple[str, str | None]:
-    """Return the method for a scene, and its fallback; `form` is the kind of its closed form."""
+    """Return a scene's method and its fallback; `form` is the kind of closed form."""
     # A perturbation of a rotation about the middle axis may be so small that its square, which
     # the closed form needs, underflows. The Taylor series can propagate it.
     if form:

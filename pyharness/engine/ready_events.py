@@ -22,7 +22,7 @@ def crosses(
     value : float
         The value (rad/s).
     terminal : bool or int
-        Whether the first event ends the integration. With a number n, the n-th event ends it.
+        Whether the first event ends the integration; with a number n, the n-th does.
     direction : {-1, 0, 1}
         1 for increasing, -1 for decreasing components, in the direction of integration; 0 for both.
         With 0, an extremum that equals the value is also an event.
@@ -143,12 +143,12 @@ def extremum(axis: int, *, terminal: bool | int = False, direction: int = 0) -> 
 
 
 def rest(value: Number, *, terminal: bool | int = False, direction: int = -1) -> Event:
-    """Return the event that the magnitude of omega falls to a value (by default), or rises to it.
+    """Return the event that the magnitude of omega falls to a value, or rises to it.
 
     Parameters
     ----------
     value : float
-        The value (rad/s). It is above 0, because a damped body never reaches 0.
+        The value (rad/s), above 0, because a damped body never reaches 0.
     terminal : bool or int
         As in `crosses`.
     direction : {-1, 0, 1}
@@ -245,7 +245,7 @@ def tilt(
 
 
 def _component(unit: list[float], k: int, attitude: Any) -> Any:
-    """Return the component along body axis k of a vector `unit` about the axes of space."""
+    """Return the component along body axis k of a vector given about the axes of space."""
     scalar, vector = attitude[0], attitude[1:]
     i, j = (k + 1) % 3, (k + 2) % 3
     # Column k of the rotation matrix of a unit quaternion.

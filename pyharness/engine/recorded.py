@@ -40,8 +40,8 @@ _KINDS = {
     "floor": (Operations.FLOOR, 1),
     "select": (Operations.SELECT, 1),
 }
-# The first trial step, in the user's unit of time. Its length hardly matters, because a series
-# gives a step of any length up to 16 times this.
+# The first trial step, in the user's unit of time. It hardly matters, because a series gives a step
+# of any length up to 16 times this.
 LONGEST_TRIAL = 1e3
 
 
@@ -69,8 +69,8 @@ def system_of(scene: Scene, attitude: bool | None = None) -> Tape:
 
     The outputs are the time derivatives of omega (equations 16-18 of the thesis), of the quaternion
     (q' = q (0, omega)/2), and of own states (unknowns that `Scene.states` adds). The quaternion is
-    missing if `attitude` is false; by default, if the scene has no attitude. The inputs are the
-    time and the unknowns in this order. Raise InputError for an opaque torque.
+    missing if `attitude` is false; by default, if the scene has none. The inputs are the time and
+    these unknowns. Raise InputError for an opaque torque.
     """
     torque = scene.torque
     if not isinstance(torque, StateTorque) or torque.tape is None:
@@ -113,7 +113,7 @@ def is_recorded(scene: Scene) -> bool:
 
 
 def slopes_of(scene: Scene) -> Callable[[float, Sequence[float]], list[float]]:
-    """Return the right-hand side f(t, state) for a torque that depends on the state.
+    """Return the right-hand side f(t, state) under a torque that depends on the state.
 
     The state is omega (rad/s), with or without the quaternion. The values of f are NaN where the
     torque is singular.
@@ -158,8 +158,7 @@ _LEAVES = 7
 def listing(tape: Tape, n_unknowns: int | None = None) -> Listing:
     """Return a tape as lists; its last `n_unknowns` outputs (default: all) are derivatives.
 
-    Sine and cosine of one angle become one operation, because the recurrence of one needs the
-    other.
+    Sine and cosine of an angle become one operation, because each recurrence needs the other.
     """
     places = {slot: slot + 1 for slot in range(tape.n_inputs)}
     n_slots = tape.n_inputs
@@ -238,7 +237,7 @@ def kernel_tape(tape: Tape, n_unknowns: int | None = None) -> Array:
 
 
 def number_of_leaves(packed: Array) -> int:
-    """Return the address or number of the leaves of a packed scene that is a tape."""
+    """Return the address or number of the leaves of a packed tape."""
     at = Places.WAVES + _LEAVES
     return int(packed[at : at + 1].view(np.int64)[0])
 
@@ -260,8 +259,7 @@ def packed_scene(
 ) -> Array:
     """Return a scene and its method's settings as one array, in the order of `Places`.
 
-    `leaves` is the address of the code compiled for a tape; 0 if this code was built with the
-    package, or there is none.
+    `leaves` is the address of the code compiled for a tape; 0 if built with the package, or none.
     """
     if code == Methods.TAPE:
         tape = system_of(with_constant_body(scene))

@@ -152,7 +152,7 @@ def _picture(title: str, trajectory: Trajectory, numbers: Table) -> Picture:
 
 
 def mark_end(axes: "Axes", trajectory: Trajectory, row: int) -> None:
-    """Draw a cross at a component's last omega, or at the edge of the diagram if that is beyond."""
+    """Draw a cross at a component's last omega, or at the edge of the diagram if beyond."""
     bottom, top = axes.get_ylim()
     axes.plot(trajectory.time[-1:], np.clip(trajectory.omega[-1:, row], bottom, top), **_END)
     axes.set_ylim(bottom, top)

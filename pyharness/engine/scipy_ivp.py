@@ -1,8 +1,8 @@
 """The methods of `scipy.integrate.solve_ivp`; SciPy is imported when one of them is first used.
 
 SciPy controls the local error of a step. Our tolerance limits the error at the requested times,
-which grows in proportion to the phase. The local tolerance therefore follows from largest |omega|,
-error amplification and phase of a preliminary integration with few digits.
+which grows in proportion to the phase. The local tolerance therefore follows from the largest
+|omega|, error amplification and phase of a preliminary integration with few digits.
 """
 
 import math
@@ -156,7 +156,7 @@ def state_of(scene: Scene) -> tuple[float, ...]:
 
 
 def with_attitude(slopes: RightHandSide) -> RightHandSide:
-    """Return the right-hand side of omega with the attitude added."""
+    """Add the attitude to a right-hand side of omega."""
 
     def both(time: float, state: Sequence[float]) -> list[float]:
         x, y, z, *q = state

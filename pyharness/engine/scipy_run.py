@@ -134,7 +134,7 @@ class Run:
                 ) from None
 
     def phase_error(self, time: float) -> TimedError:
-        """Return the exception for a phase above the limit at `time` (in units of `self.unit`)."""
+        """Return the exception for a phase above the limit at `time` (in `self.unit`)."""
         return TimedError(
             f"{self.label} stopped at t = {{time}} s: beyond {LARGEST_PHASE:.0e} radians the phase "
             "has hardly a correct digit; use a shorter time",

@@ -1,7 +1,7 @@
 """SciPy's methods for torques that depend on the state, recorded or opaque.
 
-The error amplification of such a torque is unknown. Therefore the local tolerance is reduced until
-the difference of two integrations shows that the second meets the tolerance.
+The error amplification is unknown. Therefore the local tolerance is reduced until the difference of
+two integrations shows that the second meets the tolerance.
 """
 
 from collections.abc import Sequence

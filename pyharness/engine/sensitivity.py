@@ -60,7 +60,7 @@ def torque_noise(
 
 
 def growth_of_rounding(scene: Scene, growth: float | None) -> float | None:
-    """Return the factor by which a closed form with this error amplification amplifies rounding."""
+    """Return a closed form's amplification of rounding errors; `growth` is the motion's."""
     if growth is None or growth >= _NEGLIGIBLE_TO or isinstance(scene, PrincipalScene):
         return growth
     return 1.0

@@ -37,9 +37,8 @@ def undefined_operation(
 ) -> str | None:
     """Return a text: the operation undefined at the end of an integration, and a replacement.
 
-    `begin`, `before` and `end` are the inputs of the tape at the beginning of the integration, at
-    the beginning of its last step, and at its end. The result is None if instead omega or a
-    quotient becomes infinite.
+    `begin`, `before` and `end` are the tape's inputs at the beginning of the integration, of its
+    last step, and at its end. The result is None if instead omega or a quotient becomes infinite.
     """
     first, last = (max(abs(inputs[slot]) for slot in OMEGA) for inputs in (begin, end))
     if last > _UNBOUNDED * (first or 1.0):

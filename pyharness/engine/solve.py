@@ -79,19 +79,18 @@ def solve(
         else the Taylor series; for a torque made by ``opaque``, `dop853`.
     tolerance : float
         Largest allowed error of a component of omega at `times`, relative to the largest |omega|
-        since time 0. The default depends on the method; for `auto` it is 1e-9. Methods with a fixed
-        step take no tolerance.
+        since time 0, and of the attitude, an angle (rad). The default depends on the method; for
+        `auto` it is 1e-9. Methods with a fixed step take no tolerance.
     effort : float
         Factor on the work limit; 1 means some ten seconds.
     attitude : bool, optional
-        Whether to compute the attitude, from the scene's initial attitude or, if it has none, from
-        (1, 0, 0, 0). By default it is computed if the scene has an attitude or its torque needs
-        one. The tolerance also limits the error of the attitude, as an angle (rad).
+        Whether to compute the attitude, from the scene's initial attitude, else from (1, 0, 0, 0).
+        By default it is computed if the scene has an attitude or its torque needs one.
     dense_output : bool
         Whether to return `sol`, the solution as a function of time between 0 and `times`, to within
         the tolerance. Closed forms, Taylor series, and `dop853` and `lsoda` under an opaque torque
-        need no further integrations for it; other methods do. Methods with a fixed step return a
-        cubic polynomial on each step.
+        need no further integrations for it; others do. Methods with a fixed step return a cubic
+        polynomial on each step.
     events : callable, Event, or list of these
         Functions of (t, omega) or (t, omega, attitude), or events of `pyharness.events`. Their
         roots between 0 and `times` become `t_events`, and the states there `y_events`. A function
@@ -226,7 +225,7 @@ def _more_rows(
 
 
 def _states_of_changed(times: Array, effort: float, attitude: bool, scene: Scene) -> Array:
-    """Return the states at n times (s), shape (n, m), of a scene with a changed parameter."""
+    """Return the states of a changed scene at n times (s), shape (n, m)."""
     found = solve(scene, times, "taylor", _OF_DIFFERENCES, effort=effort, attitude=attitude)
     if len(found.time) < len(times):
         raise InputError(
@@ -237,7 +236,7 @@ def _states_of_changed(times: Array, effort: float, attitude: bool, scene: Scene
 
 
 def finest(method: str, scene: Scene, time: float) -> float:
-    """Return the smallest tolerance that a method of the registry can meet from 0 to `time` (s).
+    """Return the smallest tolerance that a method can meet from 0 to `time` (s).
 
     For SciPy's methods, whose local errors are at least some 2e-14, the tolerance grows with the
     phase and the error amplification.

@@ -1,6 +1,6 @@
 """Torque terms given by tables over time, and pulses, with components about the body axes.
 
-A Taylor series begins a step where a table changes, and is as accurate as for a smooth torque.
+Taylor series begin a step where a table changes, and are as accurate as for a smooth torque.
 """
 
 import math
@@ -143,7 +143,7 @@ def _ascending(where: str, times: Any) -> Array:
 
 
 def _as_array(values: Any) -> Any:
-    """Return a DataFrame or Series as an array; iteration would give names of columns."""
+    """Return a DataFrame or Series as an array; iterating it would yield column names."""
     return values.to_numpy() if hasattr(values, "to_numpy") else values
 
 

@@ -58,8 +58,7 @@ class Taylor(OdeSolver):  # type: ignore[misc]
         shorter steps separate them.
     rtol, atol : float or array_like, shape (n,), optional
         The local error of component k of y is below ``atol[k] + rtol[k] * abs(y[k])``. If `atol` is
-        0, the error of a component that is 0 is relative to the largest component. Defaults are
-        1e-3 and 1e-6.
+        0, the error of a zero component is relative to the largest. Defaults are 1e-3 and 1e-6.
     vectorized : bool, optional
         Ignored.
     first_step : float, optional

@@ -34,10 +34,7 @@ def period_of(scene: Scene) -> float:
 def _largest_estimate(
     scene: Scene, times: Sequence[float], noise: float
 ) -> tuple[float | None, float | None]:
-    """Return error and amplification at the last time.
-
-    If the amplification is 1000 or more, return the maxima over 16 rows.
-    """
+    """Return the last error and amplification; if this is 1000 or more, maxima over 16 rows."""
     error, growth = closed_form_estimate(scene, scene.omega, times[-1], noise)
     if error is None or growth is None or growth < _CALM:
         return error, growth

@@ -116,7 +116,7 @@ class Solution:
     def state_error(self) -> float:
         """The error of the state, relative to its size.
 
-        At most 1e-10, because a larger error would hide pairs of close roots.
+        It is at most 1e-10, because a larger error would hide pairs of close roots.
         """
         return max(ROUNDING, min(self.tolerance, _COARSEST))
 

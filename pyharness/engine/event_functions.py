@@ -38,7 +38,7 @@ class Event:
 
     `function` takes time, omega, attitude, and the derivative of omega. Own states (unknowns that
     `Scene.states` adds) follow the attitude in its array. `terminal` and `direction` are as in
-    `pyharness.events.crosses`. With `counts_touches`, roots without a sign change are events.
+    `pyharness.events.crosses`. With `counts_touches`, roots without sign change are events.
     """
 
     name: str

@@ -181,7 +181,7 @@ def _with_extrema(
 
 
 def _chosen(roots: Roots, group: Index, change: int, ends: tuple[float, ...]) -> int:
-    """Return the index of the root that replaces a group: one at an end, or else in the middle."""
+    """Return the index of the root that replaces a group: one at an end, else in the middle."""
     at_end = group[np.isin(roots.time[group], ends)]
     if at_end.size:
         return int(at_end[0])
@@ -253,7 +253,7 @@ def found_events(
 ) -> FoundEvents:
     """Return the events of several functions, without those beyond a terminal event.
 
-    If the motion has a `period` (s), the events beyond the polynomials repeat those within.
+    With a `period` (s) of the motion, the events beyond the polynomials repeat those within.
     """
     roots = [event_roots(g, solution) for g in functions]
     sides: dict[int, list[Array]] = {}

@@ -1,7 +1,7 @@
 """Compilation of leaves (C code for the Taylor series of a recorded torque), and their folder.
 
 A file is loaded only if it and the folder belong to the user, nobody else may write them, and its
-name ends in the hash of its content.
+name ends in its content's hash.
 """
 
 import ctypes

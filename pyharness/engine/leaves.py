@@ -199,8 +199,7 @@ def _set_values(tape: Structure) -> Iterator[str]:
 
 
 def kept_values(lines: list[str], rates: list[str], number: str) -> Iterator[str]:
-    """Yield the statements, of a C type, that store term 0 of results and define all `rates`
-    read."""
+    """Yield statements that store term 0 of results, of a C type, and define what `rates` read."""
     results = [int(each[1 : each.index(" ")]) for each in lines]
     for slot in slots_read([each.partition("=")[2] for each in lines] + rates):
         if slot not in results:
@@ -211,7 +210,7 @@ def kept_values(lines: list[str], rates: list[str], number: str) -> Iterator[str
 
 
 def _roundings(tape: Structure) -> tuple[list[str], list[str]]:
-    """Return definitions of the rounding errors of results, and those of the rates, in units.
+    """Return definitions of the errors of results, and errors of rates, in rounding errors of 1.
 
     This is the running error analysis of fortran/modern/tape_noise.h.
     """

@@ -37,7 +37,7 @@ _SIDE_BY_SIDE = (Methods.CLOSED_FORM, Methods.CLOSED_FORM_OR_TAYLOR, Methods.TAY
 def many_starts(
     solver: "Solver[Any]", omega: Any, t_end: Any, *, threads: int = 1, out: Array | None = None
 ) -> tuple[Array, NDArray[np.int8]]:
-    """Return final omegas (rad/s), (n, 3), and statuses, or raise InputError for wrong shapes."""
+    """Return final omegas (rad/s), (n, 3), and statuses; raise InputError for wrong shapes."""
     starts, times = rows_of("omega", omega, 3), rows_of("t_end", t_end)
     n = len(starts)
     check_rows("t_end", times, n)

@@ -206,7 +206,7 @@ def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
 def checked_copies(arrays: dict[str, Any], *, as_given: bool = False) -> dict[str, Array]:
     """Return copies of the arrays, with one row for each body or for all.
 
-    Quaternions are normalised, except `as_given`.
+    Quaternions are normalised unless `as_given`.
     """
     rows = checked_rows({**arrays, "omega": None, "attitude": None})
     for name in ("omega", "attitude"):

@@ -1,8 +1,8 @@
 """Rescaled time: conversion of scenes and trajectories to another unit of time.
 
 Products of two components of omega underflow below 1e-154 rad/s and overflow above 1e154 rad/s.
-Methods that form them receive the scene in a unit of time in which omega is near 1. The ratio of
-the units is a power of two, so that no number is rounded.
+Methods that form them receive the scene in a unit of time in which omega is near 1: a power of two,
+so that no number is rounded.
 """
 
 import math
@@ -171,8 +171,7 @@ def scaled_tape(tape: Tape, exponent: int) -> Tape | None:
     """Return the tape (recorded operations) of a torque in the unit of time 2**exponent s.
 
     Each slot (input or result) has its own power of two as factor, so that none overflows or
-    underflows. The factor of the outputs is 2**(2 * exponent). Return None if a number would be
-    rounded.
+    underflows; the outputs have 2**(2 * exponent). Return None if a number would be rounded.
     """
     # Slot n becomes slot `places[n]`, times 2**`exponents[n]`.
     operations: list[Operation] = []

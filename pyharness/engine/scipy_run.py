@@ -94,8 +94,8 @@ class Run:
         """Return SciPy's result by its method `name`.
 
         The result has dense output if `with_steps` is true or `times` are None. Its times are in
-        units of `self.unit` seconds; the arguments are in s. Raise NoNumberError if Radau's
-        linear algebra refuses a number, or the time is NaN.
+        units of `self.unit` seconds; the arguments are in s. Raise NoNumberError if Radau's linear
+        algebra refuses a number, or time is NaN.
         """
         from scipy.integrate import solve_ivp
 

@@ -1,4 +1,4 @@
-"""Checks of the arguments of the torque terms, and the form of terms in scene files.
+"""Checks of the arguments of torque terms, and the form of terms in scene files.
 
 Each InputError begins with `where`.
 """

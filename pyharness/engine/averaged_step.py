@@ -284,7 +284,7 @@ class MacroStep:
         return angle
 
     def at(self, angle: Array) -> tuple[Array, Array, Array]:
-        """Return the points at angles psi (rad), (4, n), and the cosines and sines of psi."""
+        """Return the points at n angles psi (rad), (4, n), and the cosines and sines of psi."""
         nodes = between_nodes(self._sizes[0], angle / self.length)
         turns = between_angles(self._sizes[1], np.mod(angle, 2.0 * np.pi))
         point = self.stroboscopic @ nodes.T + ((nodes @ self._waves) * turns).sum(axis=-1)

@@ -103,7 +103,7 @@ class EventFunction:
         return found
 
     def _is_confirmed(self, found: Array, times: Array, states: Array, rates: Array | None) -> bool:
-        """Return whether `found` agrees with calls for single times, at nine times at most."""
+        """Return whether `found` agrees with calls for at most nine single times."""
         some = sorted({k * (len(times) - 1) // (_CHECKED - 1) for k in range(_CHECKED)})
         each = self._of_each(times[some], states[some], None if rates is None else rates[some])
         scale = _AGREEMENT * max(map(abs, each))

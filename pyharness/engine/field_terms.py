@@ -23,7 +23,7 @@ def gravity_gradient(inertia: Numbers | Iterable[Numbers] | Changing, rate: Numb
     Parameters
     ----------
     inertia : three numbers, three rows of three numbers, or an inertia that changes
-        The moments or the inertia matrix (kg m2), about the axes of the scene.
+        The moments or inertia matrix (kg m2), about the scene's axes.
     rate : float
         The rate n of the orbit (rad/s).
 

@@ -154,7 +154,7 @@ def fixed_step(
 ) -> Trajectory:
     """Return the trajectory by ``improved-euler``, ``taylor-3`` or ``rk4``, without error control.
 
-    A step that would pass a requested time is shortened to end there.
+    A step that would pass a requested time ends there.
     """
     number, work = getattr(Methods, name.upper().replace("-", "_")), np.array([effort, 0.0])
     rows, n_rows, status, steps, evaluations = extension().fixed_step_solution(

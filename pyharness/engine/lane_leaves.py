@@ -143,7 +143,7 @@ def _has_parameters(tape: Structure) -> bool:
 
 
 def _inputs(tape: Structure, texts: list[str], letter: str) -> list[int]:
-    """Return the slots of inputs that are read under a letter: time, unknowns and parameters."""
+    """Return the slots of inputs (time, unknowns, parameters) that are read under a letter."""
     read = {int(each) for each in re.findall(rf"\b{letter}(\d+)", " ".join(texts))}
     return sorted(slot for slot in read if slot < _first_result(tape))
 

@@ -37,7 +37,7 @@ def _is_of_omega(g: EventFunction) -> bool:
 
 
 def repeated(times: Array, period: float, end: float, where: str) -> tuple[Array, int]:
-    """Return the times (s) of events until `end`, and how many of them are not repetitions.
+    """Return the times (s) of events until `end`, and how many are not repetitions.
 
     `times` (s) are the events of the first PERIODS periods. Raise InputError, which begins with
     `where`, for more than 5 000 000 events.

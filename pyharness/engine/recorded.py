@@ -52,7 +52,7 @@ def inputs_of(times: Array, state: Array) -> list[Array]:
 
 
 def outputs_at(tape: Tape, times: Array, state: Array) -> Array:
-    """Return the m outputs of a tape at n states, shape (n, m); not finite where it is singular."""
+    """Return the m outputs of a tape at n states, shape (n, m); not finite where singular."""
     with np.errstate(all="ignore"):
         found: Sequence[Any] = evaluate(tape, inputs_of(times, state), ARRAYS)
     # A constant output is a number, without a shape.
@@ -115,8 +115,8 @@ def is_recorded(scene: Scene) -> bool:
 def slopes_of(scene: Scene) -> Callable[[float, Sequence[float]], list[float]]:
     """Return the right-hand side f(t, state) under a torque that depends on the state.
 
-    The state is omega (rad/s), with or without the quaternion. The values of f are NaN where the
-    torque is singular.
+    The state is omega (rad/s), with or without the quaternion. The result is NaN where the torque
+    is singular.
     """
     torque = scene.torque
     assert isinstance(torque, StateTorque)

@@ -81,7 +81,7 @@ def solve_state(
 
 
 def finest_of_state(name: str, scene: Scene, time: float, most: float) -> float:
-    """Return an estimate of the smallest tolerance that can be met until `time` (s).
+    """Estimate the smallest tolerance that can be met until `time` (s).
 
     It is 0 if the integration does not reach `time`.
     """

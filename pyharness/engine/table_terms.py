@@ -167,7 +167,7 @@ def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbe
         The durations (s), above 0. A pulse may begin when another ends, not before. The impulse is
         torque times duration, even if the end of the pulse is rounded.
     torque : three numbers, or iterable of three numbers, shape (n, 3)
-        The torque about the body axes (N m) of all pulses, or one for each pulse.
+        The torque about the body axes (N m), one for all pulses or one each.
 
     Returns
     -------

@@ -68,7 +68,7 @@ def drag(coefficients: Iterable[MatrixLike], per_axis: bool = False) -> StateTor
     Parameters
     ----------
     coefficients : iterable of numbers, three numbers, or three rows of three numbers
-        1 to 50 coefficients C_0, C_1, ..., in N m (s/rad)^(2n+1), in the forms of `damping`.
+        1 to 50 coefficients C_0, C_1, ..., in N m (s/rad)^(2n+1), each as in `damping`.
     per_axis : bool
         Whether to take powers of the components, not of |omega|.
 

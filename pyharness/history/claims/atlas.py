@@ -1,7 +1,7 @@
 """The atlas of claims: which claims of the thesis hold for which initial omega (start).
 
 The starts cover the sphere of directions at several magnitudes of omega. A claim scores 1 point if
-it is reproduced, 1/2 if it is reproduced in part. The codes of verdicts are those of `over_starts`.
+it is reproduced, 1/2 if in part. The codes of verdicts are those of `over_starts`.
 """
 
 import math
@@ -44,7 +44,7 @@ _OMEGA = tuple(Column(f"omega{k}", digits(".3g"), unit="rad/s") for k in (1, 2, 
 
 @dataclass(frozen=True, eq=False)
 class Atlas:
-    """The verdict codes of each claim over a grid of initial omegas, readings and step numbers.
+    """The verdict codes of each claim over a grid of starts, readings and numbers of steps.
 
     The axes of `codes` are reading, number of steps, magnitude of omega(0) (rad/s), height (omega3
     over the magnitude) and longitude (rad).
@@ -58,11 +58,11 @@ class Atlas:
     longitudes: Array
 
     def score(self, reading: int = 0, steps: int = 0) -> Array:
-        """Return each initial omega's sum of points over the claims; the arguments are indices."""
+        """Return the points of each start, summed over the claims; the arguments are indices."""
         return sum_of_points([codes[reading, steps] for codes in self.codes.values()])
 
     def none_fails(self, reading: int = 0, steps: int = 0) -> NDArray[np.bool_]:
-        """Return for each initial omega whether no claim fails; the arguments are indices."""
+        """Return for each start whether no claim fails; the arguments are indices."""
         held = [codes[reading, steps] != FAILS for codes in self.codes.values()]
         return np.asarray(np.all(held, axis=0))
 
@@ -90,7 +90,7 @@ def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Array]) -> Atlas:
 
 
 def sum_of_points(codes: Sequence[Codes]) -> Array:
-    """Return, for each initial omega, the sum of the points of the verdicts on several claims."""
+    """Return the points of each start, summed over several claims."""
     return np.asarray(sum(_POINTS[each] for each in codes))
 
 
@@ -101,14 +101,14 @@ def shares(codes: Codes) -> tuple[float, float, float]:
 
 
 def bits(codes: Codes) -> float:
-    """Return the entropy (bits) of the verdict on a claim over the initial omegas."""
+    """Return the entropy (bits) of the verdict on a claim over the starts."""
     parts = np.array([(codes == code).mean() for code in _CODES])
     parts = parts[parts > 0.0]
     return float(-(parts * np.log2(parts)).sum()) + 0.0
 
 
 def about(names: Sequence[str]) -> dict[int, list[str]]:
-    """Return, by case, the claims in `names` that concern this case alone."""
+    """Return, by case, the claims in `names` that concern it alone."""
     found: dict[int, list[str]] = {}
     for name in names:
         case = claim(name)["parameters"].get("case")
@@ -118,7 +118,7 @@ def about(names: Sequence[str]) -> dict[int, list[str]]:
 
 
 def shown_starts(names: Sequence[str]) -> dict[Triple, dict[str, int]]:
-    """Return, for each start in the thesis, the verdict codes of the original programs by claim."""
+    """Return the original programs' verdict codes, by claim, for each of `starts`."""
     given = starts()
     bench = Starts(Laboratory(True, Assumptions()), np.array(given))
     found = {name: judged(claim(name), bench, len(given)) for name in names}

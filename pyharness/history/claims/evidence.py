@@ -3,7 +3,7 @@
 A combination fixes omega(0), the readings, the conjectures and the number of steps. Its omega(0) is
 one value for all cases in which the thesis gives none, or the value that we adopt for each case.
 The score is the number of testable claims about the original programs that are reproduced; a claim
-reproduced in part counts one half, and no claim has more weight than another.
+reproduced in part counts one half.
 """
 
 from collections import Counter
@@ -58,7 +58,7 @@ class Combination:
 
     @property
     def score(self) -> float:
-        """Return the score, the sum of the points of all verdicts."""
+        """Return the sum of the points of all verdicts."""
         return sum(POINTS.get(each, 0.0) for each in self.verdicts.values())
 
     @property
@@ -67,7 +67,7 @@ class Combination:
         return sum(each in POINTS for each in self.verdicts.values())
 
     def choices(self) -> dict[str, str]:
-        """Return the value of each choice as text, by the name of the choice."""
+        """Return the value of each choice as text, by name."""
         given = self.assumptions
         active = given.readings | (given.conjectures or frozenset())
         found = {"omega(0)": ",".join(f"{x:g}" for x in given.start or ()) or "adopted"}
@@ -116,7 +116,7 @@ def undecided(found: list[Combination]) -> dict[str, list[str]]:
 def _relevant(entry: dict[str, Any], chosen: Assumptions) -> Assumptions:
     """Return `chosen` with the defaults for assumptions on which the claim does not depend.
 
-    Combinations that agree after this change share one test of the claim.
+    Combinations that then agree share one test of the claim.
     """
     hangs_on = entry["assumptions"]
     readings = frozenset(name for name in chosen.readings if f"reading {name}" in hangs_on)

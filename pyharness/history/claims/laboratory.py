@@ -42,8 +42,8 @@ class Laboratory:
     """The three programs, original or corrected, run on the cases under assumptions.
 
     The step size of a run is divided by `parts`; `runs` and `error` have results only at the
-    undivided steps. `may_stop` switches the stop test of the Runge-Kutta program. `fixed` has the
-    defects that are corrected in the original programs. Errors are against the reference solution.
+    undivided steps. `may_stop` switches the stop test of the Runge-Kutta program. The defects in
+    `fixed` are corrected in the original programs. Errors are against the reference solution.
 
     The collocation model has n points at the times k DT/(n+1) in the step, k = 1 ... n. In the
     original programs DT grows by the step size in every step, so that the points move out of the
@@ -86,7 +86,7 @@ class Laboratory:
         return _truth(self.scene(case))
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
-        """Return the run of a program on a case, with results at the undivided steps."""
+        """Return the run of a program on a case, at the undivided steps."""
         run = self.run(program, case, may_stop, parts)
         reached = run.omega[parts - 1 :: parts]
         omega = np.full((self.assumptions.steps, 3), np.nan)
@@ -108,7 +108,8 @@ class Laboratory:
         return _model(self.scene(case), terms, accumulates, self.assumptions.word)
 
     def required_constant(self, case: int) -> float:
-        """Return the least Lipschitz constant (1/s) with which no run is stopped, or infinity."""
+        """Return the least Lipschitz constant (1/s) that does not stop a case's run, or infinity.
+        """
         scene, listing = self.scene(case), self.listing("runge-kutta")
         constant = 0.0
         for _ in range(6 * scene.steps):
@@ -192,9 +193,9 @@ def by_literals(
 ) -> Array:
     """Return omega of an original collocation program with changed step literals.
 
-    The step size is divided by `parts` in the literals `changed`, elements of `LITERALS`. All
-    scenes, under constant torque, are integrated at once by `integrate_models`. The result (rad/s)
-    is at the steps of the unchanged program, shape (scenes, steps, 3), and NaN after an overflow.
+    The step size is divided by `parts` in the literals `changed`, elements of `LITERALS`. The
+    torque must be constant. The result (rad/s) is at the steps of the unchanged program, shape
+    (scenes, steps, 3), and NaN after an overflow.
     """
     h, steps = scenes[0].step_size, scenes[0].steps
     dt, end, growth = (h / parts if name in changed else h for name in LITERALS)
@@ -213,8 +214,8 @@ def integrate_models(
     """Return omega (rad/s) of the collocation model for n bodies at once, shape (n, steps, 3).
 
     `omega` (rad/s) has the shape (n, 3); the last axis of `coefficients` is A, B and C. The
-    constant `torque` is already divided by the moments (rad/s2). The points divide the interval (0,
-    dt) evenly; `dt` (s) grows by `growth` (s) in every step of length `end` (s). The results equal
+    constant `torque` is divided by the moments (rad/s2). The points divide the interval (0, dt)
+    evenly; `dt` (s) grows by `growth` (s) in every step of length `end` (s). The results equal
     those of the programs except for rounding, and are NaN after an overflow.
     """
     a, b, c = coefficients.T

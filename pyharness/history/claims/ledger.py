@@ -55,7 +55,7 @@ class Assignment:
 
 
 def claims() -> list[dict[str, Any]]:
-    """Return all claims of the thesis on which we have a verdict."""
+    """Return all claims in `data/claims.toml`."""
     return list(facts("claims")["claim"])
 
 
@@ -69,7 +69,7 @@ def claim(identity: str) -> dict[str, Any]:
 
 @cache
 def judgement(identity: str, word: str = BINARY64) -> Judgement:
-    """Return the verdicts on a claim, with the adopted assumptions and with each one changed."""
+    """Return the verdicts on a claim, with `word` as the floating-point arithmetic."""
     entry = claim(identity)
 
     def outcomes(entry: dict[str, Any], assumptions: Assumptions) -> list[Judged]:
@@ -95,7 +95,7 @@ def judgements() -> list[Judgement]:
 
 
 def outcome(entry: dict[str, Any], laboratory: Laboratory) -> Judged:
-    """Return the verdict of the test of a claim, the entry `entry` of `data/claims.toml`."""
+    """Return the verdict on a claim, an entry of `data/claims.toml`."""
     name, parameters = entry["test"], entry.get("parameters", {})
     for module in (verdicts, methods, theory):
         if name in vars(module):
@@ -123,10 +123,10 @@ def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:
 
 
 def assignments() -> list[Assignment]:
-    """Return one assignment for each start and each case in which the thesis gives no omega(0).
+    """Return an assignment for each start and each case for which the thesis gives no omega(0).
 
-    Claims about a case do not depend on the start of another case. If each case has a start with
-    which its claims hold, all claims can therefore hold at once.
+    Claims about a case do not depend on the start of another. If each case has a start with which
+    its claims hold, all claims can therefore hold at once.
     """
     found = []
     for case in open_starts():
@@ -195,7 +195,7 @@ def claims_report(judgements: Sequence[Judgement]) -> Report:
 
 
 def kinds_table(judgements: Sequence[Judgement]) -> Table:
-    """Return a table of the numbers of claims by kind and verdict, as "original / corrected"."""
+    """Return the numbers of claims by kind and verdict, as "original / corrected"."""
     columns = [*words("kind"), Column("claims"), *map(Column, _VERDICTS)]
     rows = []
     for kind in KINDS:
@@ -265,7 +265,7 @@ def _record(judgements: Sequence[Judgement]) -> dict[str, Any]:
 
 
 def _supplied(judgements: Sequence[Judgement]) -> list[dict[str, Any]]:
-    """Return for JSON the assumptions on which the claims may depend; units affect all claims."""
+    """Return the assumptions on which the claims may depend; units affect all claims."""
     told = [each.claim for each in judgements]
     named = {name.rpartition(" ")[2] for each in told for name in each["assumptions"]}
     others = {name.partition(":")[0] for each in told for name in each.get("otherwise", {})}
@@ -284,7 +284,7 @@ def _hangs_on(judgement: Judgement) -> list[str]:
 
 
 def written(x: float) -> str:
-    """Return a number as text: whole ones below a million exactly, others to three figures."""
+    """Return a number as text: whole ones below a million exactly, others to three digits."""
     if not math.isfinite(x):
         return short(x)
     return f"{x:.0f}" if x == int(x) and abs(x) < 1e6 else f"{x:.3g}"

@@ -30,8 +30,7 @@ _OTHERS = WEIGHTINGS[1:]
 def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Judged:
     """Judge the claim that collocation is superior to Runge-Kutta.
 
-    Errors are compared over the steps that all programs ran. The verdict depends on `cases` alone;
-    those in `shown` only add numbers.
+    Errors are compared over the steps that all programs ran. The cases in `shown` only add numbers.
     """
     numbers, wins = {}, 0
     for case in (*cases, *shown):
@@ -50,9 +49,9 @@ def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
     """Judge the claim that eq. 19 of the thesis, the Lipschitz condition, ends unbounded runs.
 
     A quotient is the change of a derivative between two stages, divided by the change of its
-    variable. Lipschitz quotients of the differential equations are at most the largest norm of the
-    Jacobian. The stop test therefore applies eq. 19 only if its quotients do not exceed this norm,
-    which is computed along the reference solution and the run.
+    variable. Quotients of the differential equations are at most the largest norm of the Jacobian.
+    The stop test therefore applies eq. 19 only if its quotients do not exceed this norm, which is
+    computed along the reference solution and the run.
     """
     numbers: dict[str, float] = {}
     for case in cases:
@@ -180,7 +179,7 @@ def execution_time(
     """Judge the claim that collocation takes about twice the time of Runge-Kutta.
 
     The operations of a step, on the cards and in our LEQT1F, are weighted by `unit_times`. They are
-    counted in two ways: as written, and with repeated terms counted once.
+    counted as written, and with repeated terms counted once.
     """
     listings = {program: lab.listing(program) for program in PROGRAMS}
     counts = {name: operations_per_step(each) for name, each in listings.items()}
@@ -257,8 +256,7 @@ def computer_error(
 
     Rounding error (rad/s) is measured in two ways. The first is the error in Case 1 with decreasing
     steps, because every method solves this case exactly except for rounding. The second is the
-    difference between runs of the methods of section IV.2 in binary64 and in the arithmetics
-    `words`.
+    difference between runs of the methods of section IV.2 in binary64 and in `words`.
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})

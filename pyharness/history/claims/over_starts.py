@@ -34,7 +34,7 @@ _EFFORT = 1e9  # so large that there is no limit; a sweep reports its expected t
 
 
 class Starts:
-    """Runs for `rules` from n initial omegas, used in the cases whose omega(0) the thesis omits.
+    """Runs for `rules` from n initial omegas.
 
     The reference solution is a Taylor series with the relative tolerance 1e-12. Arrays have the
     shape (n, steps, 3), or (steps, 3) if the thesis gives omega(0).

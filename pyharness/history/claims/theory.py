@@ -48,8 +48,8 @@ def by_sources(lab: Laboratory, holds: bool) -> Judged:
 def hamilton_ordinary(lab: Laboratory, cases: list[int], limit: float) -> Judged:
     """Judge the claim that Hamilton's equations of a rigid body are partial differential equations.
 
-    The test solves six ordinary equations, in Euler angles and their momenta. The claim is false if
-    the error of omega is at most `limit`.
+    The claim is false if six ordinary equations, in Euler angles and their momenta, reproduce omega
+    within `limit`.
     """
     from scipy.integrate import solve_ivp
 
@@ -103,8 +103,8 @@ def _hamilton(moments: Triple, state: Array) -> Array:
 def bounded_not_lipschitz(lab: Laboratory, decades: float, above: float) -> Judged:
     """Judge the claim that a bounded function satisfies a Lipschitz condition.
 
-    The counterexample is the square root; its quotients between x and 2 x are computed for x from
-    .01 down to 10**-decades.
+    The claim is false if a quotient of the square root between x and 2 x exceeds `above`, for x
+    from .01 down to 10**-decades.
     """
     points = 10.0 ** -np.arange(2.0, decades + 1.0, 2.0)
     quotients = (np.sqrt(2.0 * points) - np.sqrt(points)) / points
@@ -207,10 +207,9 @@ def crandall_example(lab: Laboratory, best: list[str], rate: float) -> Judged:
 
 
 def _weighted(t: Array, weight: Array, factors: Weights, rate: float, by: Weights) -> Array:
-    """Return the linear equations for c1 and c2 of Crandall's example, a row for each weight.
+    """Return the equations for c1 and c2 of Crandall's example, a row for each weight function.
 
-    A row has the weighted integrals over (0, 1) of the `factors` of c1 and c2 in the residual, and
-    of `rate`, each by quadrature on both halves of the interval.
+    A row has the weighted integrals over (0, 1) of the `factors` of c1 and c2, and of `rate`.
     """
     halves = [(t / 2.0, weight / 2.0), ((t + 1.0) / 2.0, weight / 2.0)]
     rows = []
@@ -226,8 +225,8 @@ def _weighted(t: Array, weight: Array, factors: Weights, rate: float, by: Weight
 def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judged:
     """Judge the claim that the rates Q of eq. 32 of the thesis determine stability.
 
-    A relative perturbation of a steady rotation by 1e-8 should change as exp(Q t): grow at the rate
-    Re Q (1/s) if Re Q is above 0, else remain below ten times its initial size for ten periods.
+    A relative perturbation of a steady rotation by 1e-8 should grow at the rate Re Q (1/s) or, if
+    Re Q is 0, remain within ten times its initial size for ten periods.
     """
     numbers, told = {}, True
     for case in cases:
@@ -298,7 +297,7 @@ def step_on_cards(lab: Laboratory, step: float) -> Judged:
 
 
 def points_inside(lab: Laboratory, cases: list[int]) -> Judged:
-    """Judge the claim that the collocation points are within the time interval of the step."""
+    """Judge the claim that the collocation points are within the step."""
     (case,) = cases
     numbers, shares = {}, []
     for program, last in (("two-term", 2.0 / 3.0), ("four-term", 0.8)):

@@ -2,8 +2,8 @@
 
 Each function is the `test` of one or more claims in `data/claims.toml`; further tests are in
 `methods`, `theory` and `rules`. The claim's `rule` describes the decision, and its `parameters` are
-the keyword arguments. `lab` runs the programs, original or corrected, with a value for each choice
-that the thesis leaves open; `case` is a number of Table 1.
+the keyword arguments. `lab` runs the programs, original or corrected; `case` is a number of Table
+1.
 
 An error is the largest deviation of any omega component from the reference solution, over the steps
 that the program ran. The amplitude is half the largest range (largest minus smallest value) of a
@@ -160,7 +160,7 @@ def growing(lab: Laboratory, case: int) -> Judged:
 def search(lab: Laboratory, case: int) -> Judged:
     """Return "not testable" for the claim that Runge-Kutta was searched for an error.
 
-    The number is the original program's error divided by the corrected program's error.
+    The number is the original program's error divided by the corrected program's.
     """
     run = lab.run("runge-kutta", case)
     best = Laboratory(False, lab.assumptions).run("runge-kutta", case)
@@ -185,8 +185,8 @@ def more_reliable(lab: Laboratory, case: int) -> Judged:
 def too_fast(lab: Laboratory, case: int, same: float, worse: float) -> Judged:
     """Judge the claim that the two-term error is due to a motion too fast for two terms.
 
-    The corrected programs run from all initial omegas in `starts`, because the thesis does not give
-    the initial omega of every case.
+    The corrected programs run from all initial omegas in `starts`, because the thesis gives none
+    for some cases.
     """
     numbers = {}
     for start in starts():

@@ -40,7 +40,7 @@ class Effect:
     """The outcome of one listing (a program with a choice of defects) on one scene.
 
     `omega` (rad/s) and `velocity` (m/s) are the largest errors over the completed `steps`. `common`
-    has the same two errors over only the steps that all compared listings completed.
+    has both errors over the steps that all compared listings completed.
     """
 
     listing: Listing
@@ -106,8 +106,8 @@ def case_truth(case: int) -> Reference:
 def effects_of(name: str) -> Iterator[CaseEffects]:
     """Yield the effect of an apparatus entry in each of its programs and every case.
 
-    For a reading or a conjecture, `original` is the original listing with it, `corrected_alone` the
-    original listing without it. `kept_alone` and `corrected` are the corrected listing likewise.
+    For a reading or a conjecture, `original` and `corrected_alone` are the original listing with
+    and without it, `kept_alone` and `corrected` the corrected listing.
     """
     known = entry(name)
     for program in known["programs"]:
@@ -124,9 +124,9 @@ def lattice(
 ) -> list[Effect]:
     """Return a program's outcomes with every subset of its defects, the largest error first.
 
-    Subsets are also formed with the `readings` and, under a varying torque, with the conjectures.
-    Errors are compared over the steps that all runs completed. A reading has no effect if a defect
-    in the same statement is corrected.
+    The `readings` and, under a varying torque, the conjectures are varied too. Outcomes are sorted
+    by the errors over the steps that all runs completed. A reading has no effect if a defect in the
+    same statement is corrected.
     """
     check_steps(scene, program, "fortran", effort)
     truth = reference(scene, scene.times(), velocity=True, effort=effort)
@@ -153,7 +153,7 @@ def _size(found: Effect) -> list[float]:
 
 
 def apparatus_report(entries: Sequence[dict[str, Any]], are_all_shown: bool = True) -> Report:
-    """Return the report of the critical apparatus, with a line for each entry.
+    """Return the report of the critical apparatus, a line for each entry.
 
     Unless `are_all_shown`, the text has only the defects that change numbers.
     """
@@ -210,7 +210,6 @@ def entry_report(
 
 
 def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
-    """Return a legend and, for each program, a table of errors by case and listing."""
     columns = ("original", "this alone corrected", "this alone kept", "all corrected")
     if is_reading:
         columns = ("original, with it", "original", "corrected, with it", "corrected")

@@ -44,7 +44,6 @@ def cards_report(
 
 
 def _contents(cards: Sequence[Card]) -> list[Section]:
-    """Return a table of contents; its headings are the programs' comment cards."""
     parts: list[str] = []
     ranges: dict[tuple[str, str], list[int]] = {}
     for program in PROGRAMS:

@@ -4,7 +4,6 @@ One step of length h solves omega' = f(t, omega), equations 16-18, with a polyno
 omega(0) + c1 t + ... + cn t**n. The first estimate assumes constant f. Each correction evaluates f
 along the previous estimate, and chooses c1, ..., cn so that the integrals of W (omega' - f) over
 the step vanish for n weight functions W (eq. 26). The thesis makes one correction.
-`checks.theory.tableau` computes the coefficients of a method.
 """
 
 import math
@@ -332,7 +331,7 @@ def _slopes(errors: Array) -> list[float]:
 
 
 def family_report(scene: Scene, found: Sequence[OrderFinding]) -> Report:
-    """Return the report of orders and errors in a scene, by numbers of terms and corrections."""
+    """Return the report of orders and errors, by numbers of terms and corrections."""
     names = ("predicted", "measured", "settled", "error")
     members = [each.member for each in found]
     measures = [{name: getattr(each, name) for name in names} for each in found]
@@ -350,7 +349,6 @@ def family_report(scene: Scene, found: Sequence[OrderFinding]) -> Report:
 
 
 def _finding(found: Sequence[OrderFinding]) -> list[str]:
-    """Return a sentence on the order with one correction, if several methods make one."""
     alike = (each.measured for each in found if each.member.corrections == 1)
     orders = Counter(round(order) for order in alike if order is not None)
     if orders.total() < 2:

@@ -1,6 +1,6 @@
 """Figures 6 to 12 of the thesis, redrawn: omega of the programs against the reference.
 
-One set of figures shows the original programs, another set the corrected programs.
+One set of figures shows the original programs, another the corrected programs.
 """
 
 import textwrap
@@ -100,7 +100,7 @@ class Curve:
 
     @property
     def label(self) -> str:
-        """Return the name of the program and any early end, as text for a legend."""
+        """Return the program's name and any early end, for the legend."""
         return self.listing.program + (f" ({self.ending})" if self.ending else "")
 
 
@@ -121,7 +121,7 @@ class FigureFinding:
 
 
 def plans() -> list[FigurePlan]:
-    """Return the plans of all figures, first those of the original programs."""
+    """Return the plans of all figures, original programs first."""
     found = []
     for each, entry in product(SETS, facts("figures")["figure"]):
         number, part, programs = entry["number"], entry.get("part", ""), tuple(entry[each])
@@ -132,7 +132,7 @@ def plans() -> list[FigurePlan]:
 
 
 def findings() -> Iterator[FigureFinding]:
-    """Yield the data of the figures in the order of `plans`, without drawing."""
+    """Yield the data of each figure, in the order of `plans`."""
     for plan in plans():
         scene = case_scene(plan.case)
         truth = case_truth(plan.case)
@@ -221,8 +221,8 @@ def figure_picture(finding: FigureFinding) -> Picture:
 def together_picture(first: FigureFinding, second: FigureFinding) -> Picture:
     """Return omega1 of an original and of a corrected figure in one picture.
 
-    The limit in `first` continues a run that ended early. Of the curves in `second`, which
-    coincide, only the last is drawn.
+    The limit in `first` continues a run that ended early. The curves in `second` coincide; only the
+    last is drawn.
     """
     from matplotlib.figure import Figure
 
@@ -244,7 +244,7 @@ def together_picture(first: FigureFinding, second: FigureFinding) -> Picture:
 def points_picture() -> Picture:
     """Return a picture of the collocation points of each printed program in the first steps.
 
-    Each row is a step; times (s) are counted from its beginning, and the grey band is the step.
+    Each row is a step; times (s) are from its beginning, and the grey band is the step.
     """
     from matplotlib.figure import Figure
 
@@ -274,7 +274,6 @@ def points_picture() -> Picture:
 def _draw_panel(
     axes: "Axes", finding: FigureFinding, row: int, curves: Iterable[tuple[Curve, dict[str, Any]]]
 ) -> None:
-    """Draw one omega component of the reference, any limit, and `curves` with their styles."""
     time, start = _from_zero(finding.reference.time), np.array(finding.scene.omega)
     for (label, omega), style in zip(finding.known, (_REFERENCE, _LIMIT), strict=False):
         axes.plot(time, _from_zero(omega, start)[:, row], label=label, **style)

@@ -1,7 +1,7 @@
 """Identifiers of the edition: Software Heritage identifiers (SWHIDs), and a digest of its text.
 
-A SWHID (ISO/IEC 18670) contains git's SHA-1 hash of a file or folder. Anyone can recompute it from
-the content. The archive Software Heritage finds its copies by SWHID.
+A SWHID (ISO/IEC 18670) contains git's SHA-1 hash of a file or folder, which anyone can recompute.
+The archive Software Heritage finds its copies by SWHID.
 """
 
 import json

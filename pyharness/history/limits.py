@@ -1,8 +1,8 @@
 """The limits of the original programs as the step size goes to zero.
 
 An original program may converge to the solution of Euler's equations, to another function of time,
-or to no function (docs/article/article.md). Each limit is computed independently of the programs,
-and compared with their runs as the step size is halved. `effort` multiplies the work limit.
+or to no function (docs/article/article.md). Each limit is computed independently of the program,
+and compared with its runs as the step size is halved. `effort` multiplies the work limit.
 """
 
 import math
@@ -64,8 +64,7 @@ class Limit:
     """The limit of an original program as the step size goes to zero, and the convergence.
 
     `order` is measured with the last two step sizes. It is None if a run with one of them overflows
-    or has only rounding errors, if there is no limit, or if the limit is unbounded at `blow_up`
-    (s).
+    or has only rounding errors, or if there is no limit or it is unbounded at `blow_up` (s).
     """
 
     program: str
@@ -145,9 +144,9 @@ def _extrapolated(scene: Scene) -> Rate:
 
     The original program adds the step size h to DT in every step. In step n the collocation points
     are therefore t/3 and 2t/3 after the beginning of the step, with t = n h. Let F be the
-    right-hand side of Euler's equations at omega = w, F' its Jacobian, and Q its quadratic part.
-    The slope along the first estimate is g(s) = F(w + s F) = F + s F' F + s^2 Q(F). The line
-    through g(t/3) and g(2t/3) has at s = 0 the value 2 g(t/3) - g(2t/3) = F - (2/9) t^2 Q(F).
+    right-hand side of Euler's equations at w, F' its Jacobian, and Q its quadratic part. The slope
+    along the first estimate is g(s) = F(w + s F) = F + s F' F + s^2 Q(F). The line through g(t/3)
+    and g(2t/3) has at s = 0 the value 2 g(t/3) - g(2t/3) = F - (2/9) t^2 Q(F).
     """
     right_hand_side = scene.right_hand_side()
     a, b, c = scene.euler_coefficients
@@ -165,7 +164,7 @@ def _slow_slopes(scene: Scene) -> Rate:
 
     Let p be the omega in U(1), at which the program evaluates the first slopes of a step. Each step
     of size h adds (h/2) F(p) to p, and h F(p) to the printed omega, where F is the right-hand side
-    of Euler's equations. The state of the limit's equations is p, then the printed omega.
+    of Euler's equations. The state is p, then the printed omega.
     """
     right_hand_side = scene.right_hand_side()
 
@@ -217,7 +216,7 @@ def _solved(
 
 
 def invisible(scene: Scene) -> dict[str, tuple[str, ...]]:
-    """Return, by program, the defects whose correction alone changes omega at most by rounding."""
+    """Return, by program, the defects whose correction alone changes omega only by rounding."""
     found = {}
     for program in PROGRAMS:
         before = run_program(scene, Listing.original(program))

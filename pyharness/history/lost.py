@@ -4,9 +4,9 @@ The thesis does not print its programs for the subdomain, Galerkin and least-squ
 According to IV.2 they gave no meaningful results in Cases 1 and 2, where the solution is known.
 Each entry of `data/lost.toml` is a conjecture: a mistake that such a program may have had.
 
-The methods are computed as in IV.2. The trial function has two terms, and products are written out
-as polynomials. A first estimate assumes a constant right-hand side; one correction follows. A
-method fails if its error exceeds a tenth of the largest omega.
+The methods are as in IV.2. The trial function has two terms, and products are written out as
+polynomials. A first estimate assumes a constant right-hand side; one correction follows. A method
+fails if its error exceeds a tenth of the largest omega.
 """
 
 from collections.abc import Sequence
@@ -124,7 +124,7 @@ def integrate(scene: Scene, weighting: str, mistake: str = "none") -> Array:
 
 
 def _rates(estimate: Array, coefficients: tuple[float, ...]) -> Array:
-    """Return A omega2 omega3, B omega1 omega3, C omega1 omega2: columns of coefficients in t."""
+    """Return the products in Euler's equations as columns of coefficients in t."""
     columns = [
         polynomial.polymul(estimate[:, j], estimate[:, k]) * a
         for a, j, k in zip(coefficients, (1, 0, 0), (2, 2, 1), strict=True)

@@ -62,7 +62,7 @@ def unexplained_defects() -> dict[str, str]:
 
 
 def mistakes() -> list[str]:
-    """Return a sentence for each mistake in the table `data/disagreements.toml`."""
+    """Return a sentence for each mistake in `data/disagreements.toml`."""
     found = disagreements()
     return [*_of_each(found), *_of_defects(found), *_of_steps(found)]
 

@@ -1,8 +1,8 @@
 """Compare a page that a machine printed with the pages that our programs print.
 
 The module, which needs only Python's standard library, is also the script `machine/judge.py` in the
-data package: ``python judge.py FILE`` compares the page in FILE. The exit status is 0 if one of our
-pages is equal, 1 if all differ, and 2 if FILE has no page of this form.
+data package: ``python judge.py FILE``. The exit status is 0 if one of our pages is equal, 1 if all
+differ, and 2 if FILE is unreadable or has no page of this form.
 """
 
 import csv

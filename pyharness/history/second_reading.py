@@ -98,7 +98,7 @@ def recaptures() -> Table:
     """Return the table of estimates, with characters and with whole cards as units.
 
     Characters are not independent units, because a machine repeats its misreading of a letter;
-    cards are independent.
+    cards are.
     """
     places: tuple[set[tuple[str, int]], ...] = (set(), set())
     for each in read_cards():

@@ -82,7 +82,6 @@ def _add(
 
 
 def _header() -> xml.Element:
-    """Return the header: a template filled with values and lists from the data."""
     edition, scan, version = facts("edition"), facts("cards/scan"), pyharness.__version__
     released = edition["released"].get(version, "") or "no date"
     values = {

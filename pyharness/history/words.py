@@ -1,7 +1,7 @@
 """The effect of word length: runs in emulated arithmetics of p bits, against binary64.
 
-An arithmetic is defined by its number p of significand bits and its rounding rule. A run's printed
-page is compared with the page in binary64, and its omega with the reference solution.
+An arithmetic has p significand bits and a rounding rule. A run's printed page is compared with the
+page in binary64, and its omega with the reference solution.
 """
 
 from collections.abc import Iterator, Sequence
@@ -279,7 +279,6 @@ def _errors(cells: Sequence[WordCell]) -> Table:
 
 
 def _picture(cells: Sequence[WordCell], data: Table) -> Picture:
-    """Return a picture of the largest error of omega (rad/s) over p; dashed lines show p = 113."""
     from matplotlib.figure import Figure
 
     programs = list(dict.fromkeys(cell.double.program for cell in cells))

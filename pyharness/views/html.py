@@ -37,11 +37,7 @@ def _cell(tag: str, text: str, left: bool, link: str | None = None) -> str:
 
 
 def _write_section(section: Section) -> Iterator[str]:
-    """Yield the HTML elements of a section.
-
-    Successive lines form one `pre` element; successive labelled paragraphs (Field), one `dl`
-    element.
-    """
+    """Yield the HTML of a section: successive Lines as one `pre`, successive Fields as one `dl`."""
     grouped: Any = groupby(section, type)
     for kind, parts in grouped:
         if kind is Line:

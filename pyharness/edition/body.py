@@ -97,7 +97,6 @@ def _first() -> Scene:
 
 
 def _picture(scene: Scene) -> Picture:
-    """Return a picture of omega over time, polhode and herpolhode, over three flips."""
     from matplotlib.figure import Figure
 
     assert scene.moments is not None

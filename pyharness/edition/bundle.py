@@ -1,8 +1,8 @@
 """Bundling of JavaScript (ES) modules into one classic script.
 
 Browsers do not import modules into a page that is opened from a file. In the script, every module
-is a function that returns its exports, and follows the modules that it imports. Only the forms of
-import and export that this project uses are supported.
+is a function that returns its exports, and follows the modules that it imports. Only this project's
+forms of import and export are supported.
 """
 
 import re
@@ -41,7 +41,6 @@ def _add(
     text = path.read_text(encoding="utf-8")
 
     def declare(found: re.Match[str]) -> str:
-        """Return the declaration of constants that replaces an import."""
         needed = (path.parent / found["path"]).resolve()
         if needed in (*importing, path):
             raise _error(path, text, found.start(), f"{needed.name} imports this module too")

@@ -61,7 +61,7 @@ def check_publishable() -> None:
 def bibtex(place: str = "", path: str = "") -> str:
     """Return BibTeX entries of the thesis and of the edition, or of a `place` in the edition.
 
-    `path` is the path of the place in the pages. It is appended to their address, if they have one.
+    The `path` of the place in the pages is appended to their address, if they have one.
     """
     described = codemeta()
     version, thesis = described["version"], described["referencePublication"]
@@ -97,7 +97,7 @@ def csl(place: str = "", path: str = "") -> list[dict[str, Any]]:
 
 
 def cite_data() -> dict[str, Any]:
-    """Return the data of the script that cites a place; the script fills in place and path."""
+    """Return the data of the script that cites a place, with placeholders for place and path."""
     place = "@PLACE@", "@PATH@"
     return {
         "address": address(), "publish": PUBLISH, "digest": text_digest(),
@@ -188,10 +188,7 @@ _DATA = "Software Heritage identifier of the edition's data"
 
 
 def crate_record(parts: Sequence[Part]) -> dict[str, Any]:
-    """Return the RO-Crate record of `parts` and of the files `KEPT`.
-
-    The entities of a crate are items of one list, and refer to each other by identifier.
-    """
+    """Return the RO-Crate record of `parts` and of the files `KEPT`."""
     software, thesis = codemeta(), thesis_record()
     files = [_file(each) for each in (*parts, *KEPT) if each.path != CRATE]
     people = [{"@id": f"#author-{n}", **each} for n, each in enumerate(software["author"], 1)]

@@ -79,7 +79,7 @@ def data_package(progress: Progress = no_progress) -> dict[str, bytes]:
 
 
 def archive(content: Mapping[str, bytes], folder: str) -> bytes:
-    """Return a ZIP file, without times, of the files in `content`, by path in `folder`."""
+    """Return a ZIP file, without times, of the files in `content`, under `folder`."""
     found = BytesIO()
     with ZipFile(found, "w") as packed:
         for path, each in content.items():

@@ -149,7 +149,6 @@ def _changes(name: str, program: str) -> tuple[float, float]:
 
 
 def _change(one: float, other: float) -> float:
-    """Return the difference of two errors to three digits; infinity if only one is finite."""
     if math.isfinite(one) and math.isfinite(other):
         return float(f"{abs(one - other):.2e}")
     return math.inf if math.isfinite(one) or math.isfinite(other) else 0.0

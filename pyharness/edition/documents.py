@@ -40,10 +40,7 @@ _LINK = re.compile(r"(?<!!)\[((?:[^][]|\[[^]]*\])*)\]\([^):]*\)")
 
 
 def documents_folder(given: str | None = None) -> Path:
-    """Return `given` or the checkout's `docs`; raise InputError if documents are missing.
-
-    An installed package does not contain the documents.
-    """
+    """Return `given` or the checkout's `docs`; raise InputError if documents are missing."""
     folder = shipped("docs") if given is None else Path(given)
     missing = [name for name in _LINKED if not (folder / name).is_file()]
     if not missing:

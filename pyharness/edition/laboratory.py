@@ -88,8 +88,7 @@ def _printed_parts(program: str) -> dict[str, Any]:
 def _deck_data() -> dict[str, Any]:
     """Return the cards that are executed in a step, and their alterations by corrections.
 
-    A pass is a part of a step that is executed once, with constant subscripts. Continuation cards
-    are joined to statements.
+    A pass is a part of a step that is executed once, with constant subscripts.
     """
     order = facts("cards/passes")
     found: dict[str, Any] = {}
@@ -128,7 +127,7 @@ def _described(scene: Scene) -> list[str]:
 
 
 def _first() -> dict[str, Any]:
-    """Return the run of `DEFAULTS`: ending, rows, largest error (rad/s), page and command."""
+    """Return the run of `DEFAULTS`; errors are in rad/s."""
     scene = case_scene(DEFAULTS["case"])
     program = DEFAULTS["program"]
     run = run_program(scene, Listing.original(program), "python")

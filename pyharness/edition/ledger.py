@@ -137,7 +137,7 @@ def thesis(judged: Sequence[Judgement]) -> list[SentenceVerdicts]:
 def thesis_context(told: Sequence[SentenceVerdicts]) -> dict[str, Any]:
     """Return the data of the page on the thesis: sentences and formulas by section, and a table.
 
-    The table counts sentences and claims. It counts as reproduced only claims about results.
+    The table counts sentences and claims, as reproduced only claims about results.
     """
     columns = [
         Column("section", left=True), Column("sentences"), Column("that make a claim"),
@@ -203,7 +203,7 @@ def printed_figures(
 
 
 def apparatus() -> dict[str, list[tuple[dict[str, Any], Markup]]]:
-    """Return each entry of the apparatus with its report as HTML, by the programs of its cards.
+    """Return each apparatus entry with its report as HTML, by the programs of its cards.
 
     The report of an entry with a switch includes its effect in every case.
     """

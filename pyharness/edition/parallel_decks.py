@@ -79,7 +79,7 @@ def _aligned(ranges: dict[str, str]) -> list[AlignedRow]:
 def _merged(rows: Sequence[dict[str, Card]], cards: Sequence[Card]) -> list[dict[str, Card]]:
     """Return aligned rows with a further deck's cards inserted.
 
-    Among all alignments that keep the order of the cards, the result has the largest sum of
+    Of all alignments that keep the order of the cards, the result has the largest sum of
     similarities.
     """
     # best[i][j] is the largest sum for the rows from i on and the cards from j on.

@@ -1,7 +1,7 @@
 """The data of the story, the home page: charts and numbers of its seven scenes.
 
-The data come from runs of the Python ports; when a visitor changes a value, a script runs the
-programs again.
+They come from runs of the Python ports; when a visitor changes a value, a script runs the programs
+again.
 """
 
 import math
@@ -211,7 +211,6 @@ def _fractions(program: str) -> list[float]:
 
 
 def _points_chart(step_size: float) -> Chart:
-    """Return the chart of the two-term program's collocation points by step."""
     axes = ("step", "time after the beginning of the step, s")
     found = _chart("points", axes, (0, 100), (-3, 0), is_log=True)
     steps = range(1, 101)
@@ -251,7 +250,7 @@ def _across(chart: Chart, x: float) -> float:
 
 
 def _up(chart: Chart, y: float) -> float:
-    """Return the height of a value in the picture, kept near the plot area."""
+    """Return a value's height in the picture, kept near the plot area."""
     _, top, _, bottom = BOX
     value = math.log10(y) if chart.is_logarithmic else y
     share = (value - chart.y[0]) / (chart.y[1] - chart.y[0])

@@ -23,8 +23,8 @@ class Item(NamedTuple):
 class Entry(NamedTuple):
     """A public name on the API page.
 
-    `kind` is "function", "class" or "property". `summary` is the first line of the docstring,
-    `text` its further paragraphs, and `groups` its sections by title.
+    `kind` is "function", "class" or "property". `summary` is the docstring's first line, `text` its
+    further paragraphs, and `groups` its sections by title.
     """
 
     name: str

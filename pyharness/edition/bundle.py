@@ -21,8 +21,8 @@ _COMMENT = re.compile(r"^ *//.*\n", re.M)
 def bundle(entry: Path) -> str:
     """Return a classic script of the module in the file `entry` with all its imports.
 
-    The script defines no global names. Raise ValueError, with file and line, for an unsupported
-    form, a missing file or name, or circular imports.
+    It defines no global names. Raise ValueError, with file and line, for an unsupported form, a
+    missing file or name, or circular imports.
     """
     exports: dict[Path, list[str]] = {}
     parts: list[str] = []
@@ -35,8 +35,8 @@ def _add(
 ) -> None:
     """Append a module to `parts`, after the modules that it imports.
 
-    `importing` is the chain of modules that led to this import; `exports` collects the names that
-    each module exports.
+    `importing` is the chain of modules up to this import; `exports` collects each module's exported
+    names.
     """
     text = path.read_text(encoding="utf-8")
 

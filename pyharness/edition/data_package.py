@@ -1,7 +1,7 @@
 """The edition as plain data: cards, apparatus, verdicts, runs and printed pages.
 
-The package is an RO-Crate. It contains no times and no paths of the machine, so that two runs write
-the same bytes.
+The package is an RO-Crate, without times and paths of the machine, so that two runs write the same
+bytes.
 """
 
 from collections.abc import Iterator, Mapping
@@ -229,7 +229,7 @@ def machine_parts() -> Iterator[Part]:
 
 
 def outcomes_table() -> str:
-    """Return a Markdown table of the conclusion from each possible outcome of a job."""
+    """Return a Markdown table of the conclusion from each outcome of a job."""
     rows = [[each["seen"], each["learned"], each["open"]] for each in facts("machine")["outcome"]]
     return table("outcome | what would be learned | what remains open", rows).rstrip()
 
@@ -240,7 +240,7 @@ def _name(program: str, case: int, listing: str, word: str) -> str:
 
 
 def _jobs(texts: dict[str, str]) -> Iterator[Part]:
-    """Yield the jobs for each system, also with the option ROUND if it changes the printed page."""
+    """Yield each system's jobs, also with the option ROUND if it changes the printed page."""
     for program, case in facts("cases")["published"].items():
         first, second = (texts[_name(program, case, "original", word)] for word in _MACHINE)
         for system in SYSTEMS:

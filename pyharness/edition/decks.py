@@ -36,7 +36,7 @@ _ORDER = (
 class Run(NamedTuple):
     """Successive characters of a card or of its line in the scan.
 
-    If card and scan differ here, `entry` explains the difference.
+    `entry` explains a difference of card and scan here.
     """
 
     text: str
@@ -77,11 +77,11 @@ class CardView(NamedTuple):
 
     `card` is our text, in brackets if the scan lacks the card. `witness` is our text with the
     scan's form of the names that we normalised; it is None if it equals `card`, and empty if the
-    scan lacks the card. `after` has the lines after this card that belong to no card. `scan` is the
+    scan lacks the card. `after` has the lines after this card that belong to no card, `scan` the
     line of the scan with its blanks, or None. `port` has each line of the Fortran port, the defect
-    or reading on which the line depends, and whether it is executed if this is active. `notes`
-    begin with the most important kind. `begins` has the notes with a range of cards that begins
-    here, each with only this range.
+    or reading on which it depends, and whether it is executed if this is active. `notes` begin with
+    the most important kind. `begins` has the notes with a range of cards that begins here, each
+    with only this range.
     """
 
     number: int
@@ -135,7 +135,7 @@ def notes(program: str) -> list[Note]:
 def _changes(name: str, program: str) -> tuple[float, float]:
     """Return by how much the correction of a defect changes the errors of omega and velocity.
 
-    The changes are the largest of all cases, in rad/s and m/s; they are 0 if `name` is no defect.
+    The changes are the largest of all cases (rad/s, m/s), and 0 if `name` is no defect.
     """
     if name not in names_of("defect", program):
         return 0.0, 0.0
@@ -187,7 +187,6 @@ def kinds_of(views: Iterable[CardView]) -> dict[str, int]:
 
 
 def _card(card: Card) -> list[Run]:
-    """Return a card's text as runs, in brackets if the scan lacks it."""
     if card.lost:
         statement = card.text.lstrip()
         # The bracket replaces a blank, so that the statement keeps its columns.

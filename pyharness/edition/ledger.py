@@ -71,8 +71,8 @@ def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
 def verdicts(judgement: Judgement) -> list[tuple[str, str]]:
     """Return the verdicts to show, each with a text on the programs that it judges.
 
-    A claim about results has two verdicts. A claim about a design has only the verdict on the
-    programs as printed, any other claim only the verdict on the corrected programs.
+    A claim about results has two verdicts; a claim about a design, only the verdict on the programs
+    as printed; any other, only the verdict on the corrected programs.
     """
     original, corrected = judgement.original.verdict, judgement.corrected.verdict
     if judgement.claim["kind"] == "result":

@@ -36,7 +36,7 @@ class Document(NamedTuple):
 def document(text: str, link: Callable[[str], str | None]) -> Document:
     """Return a Markdown text, whose first line is the title, as a Document.
 
-    `link` maps the target of a link or picture to its target on the site, or to None. With None a
+    `link` maps the target of a link or picture to its target on the site, or to None. For None a
     link becomes plain text, and a picture raises ValueError.
     """
     tokens = _parser().parse(text)

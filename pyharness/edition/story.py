@@ -50,8 +50,8 @@ class Chart(NamedTuple):
     """A chart with fixed axes, as numbers for SVG.
 
     `x` and `y` are the ranges of the axes; for a logarithmic `y`, exponents of ten. Ticks are pairs
-    of position and label. If `is_marked`, curves are drawn as marks without lines. `marks` on the
-    curves distinguish curves that coincide.
+    of position and label. If `is_marked`, curves are marks without lines. `marks` distinguish
+    curves that coincide.
     """
 
     name: str
@@ -138,7 +138,7 @@ def context() -> dict[str, Any]:
 def _run(
     case: int, program: str, listing: str = "original", without: Names = (), may_stop: bool = True
 ) -> Trajectory:
-    """Return the run of a Python port with `listing`, but without the defects in `without`."""
+    """Return the run of a Python port with `listing`, without the defects in `without`."""
     active = set(switches(program)) - set(without) if listing == "original" else set()
     return run_program(case_scene(case), Listing(program, active), "python", may_stop=may_stop)
 
@@ -188,7 +188,7 @@ def _chart_of_case(
 
 
 def _marks(chart: Chart, runs: Mapping[str, Trajectory]) -> list[Curve]:
-    """Return marks on the curves of omega1 over time, at different steps on each curve."""
+    """Return marks on the curves of omega1, at different steps on each."""
     return [
         _curve(chart, name, run.time[first::15].tolist(), run.omega[first::15, 0].tolist())
         for first, (name, run) in zip((7, 4, 12), runs.items(), strict=True)

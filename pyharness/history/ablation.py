@@ -183,7 +183,7 @@ def apparatus_report(entries: Sequence[dict[str, Any]], are_all_shown: bool = Tr
 def entry_report(
     entry: dict[str, Any], effects: Sequence[CaseEffects], names: Sequence[str] = FIELDS
 ) -> Report:
-    """Return the report of one entry: the fields `names`, and a table of its `effects`, if any."""
+    """Return the report of an entry: the fields `names`, and a table of any `effects`."""
     cards = "; ".join(f"{program} {cards}" for program, cards in entry["cards"].items())
     what = {each["siglum"]: each["what"] for each in facts("cards/scan")["ground"]}
     grounds = "; ".join(f"{siglum}, {what[siglum]}" for siglum in entry["grounds"])

@@ -111,7 +111,7 @@ def scan_report(
 
 
 def classes_report() -> Report:
-    """Return the report of the numbers of apparatus entries, and of their cards, by kind."""
+    """Return the report of the numbers of apparatus entries and their cards, by kind."""
     entries = facts("apparatus")["entry"]
     cards = [card for program in PROGRAMS for card in deck(program).cards.values()]
     entries_of = Counter(each.entry for card in cards for each in card.differences)
@@ -158,7 +158,7 @@ def _block(card: Card) -> Section:
 
 
 def beside(left: Iterable[str], right: Iterable[str]) -> list[Line]:
-    """Return the lines of two texts side by side; the left ones have at most `HALF` characters."""
+    """Return the lines of two texts side by side; left ones have at most `HALF` characters."""
     pairs = zip_longest(left, right, fillvalue="")
     return [Line(f"{a.ljust(HALF)}   {b}".rstrip()) for a, b in pairs]
 

@@ -55,8 +55,8 @@ MOST_STEPS = 2_000
 class Member:
     """A weighted residual method of the thesis.
 
-    The weight functions of least squares are i t**(i-1), the derivatives of the residual by ci if f
-    is constant (eq. 25). `terms` is n. `points`, for collocation only, are fractions of the step:
+    The weight functions of least squares are i t**(i-1), the derivatives of the residual by ci for
+    constant f (eq. 25). `terms` is n. `points`, for collocation only, are fractions of the step:
     "thesis" for k/(n+1), k = 1 to n; "gauss" for the Gauss-Legendre points; or n different numbers
     from 0 to 1.
     """
@@ -67,7 +67,7 @@ class Member:
     corrections: int = 1
 
     def __post_init__(self) -> None:
-        """Raise InputError for wrong fields; set the default points of collocation."""
+        """Raise InputError for wrong fields; set the default points."""
         if self.weighting not in WEIGHTINGS:
             raise unknown("weighting", self.weighting, WEIGHTINGS)
         if not 1 <= self.terms <= MOST_TERMS:
@@ -235,8 +235,8 @@ class OrderFinding:
     """The derived and the measured order of convergence of a method in a scene, and its error.
 
     `measured` is None if all errors are too large or only rounding errors. It is `settled` if the
-    last two measurements differ by at most 0.1. `error` (rad/s) is the error of omega with the
-    scene's step size.
+    last two measurements differ by at most 0.1. `error` (rad/s) is of omega, with the scene's step
+    size.
     """
 
     member: Member
@@ -264,7 +264,7 @@ def family_members() -> list[Member]:
 def order_table(
     scene: Scene, members: Sequence[Member] | None = None, progress: Progress = no_progress
 ) -> list[OrderFinding]:
-    """Return the order of convergence and the error of each method in `members`, by default all.
+    """Return the order of convergence and the error of each method, by default of `family_members`.
 
     Raise InputError if the solution is unbounded or the scene has more than `MOST_STEPS` steps.
     """
@@ -308,7 +308,7 @@ def order_table(
 
 
 def _ladder(scene: Scene, members: Sequence[Member], horizon: float, end: Array) -> Array:
-    """Return the relative errors of methods at `horizon` (s), shape (step sizes, members)."""
+    """Return the relative errors at `horizon` (s), shape (step sizes, members)."""
     scale = float(np.abs(end).max()) or 1.0
     rungs = []
     for steps in _LADDER:
@@ -363,7 +363,7 @@ def _finding(found: Sequence[OrderFinding]) -> list[str]:
 
 
 def verdict(found: Sequence[OrderFinding]) -> list[str]:
-    """Return a sentence for each order below the derived one, or else one sentence for all."""
+    """Return a sentence for each order below the derived one, else one for all."""
     unexpected = _unexpected(found)
     if unexpected:
         return [f"UNEXPECTED: {each}" for each in unexpected]

@@ -92,7 +92,7 @@ class Curve:
 
     @property
     def ending(self) -> str:
-        """Return the step and the reason of an early end; "" for a complete run."""
+        """Return step and reason of an early end; "" for a complete run."""
         run = self.trajectory
         if run.stop is not None:
             return f"stopped at step {run.stop.step} by {run.stop.variable}"

@@ -38,7 +38,7 @@ TERMS = 2
 class Attempt:
     """The result of one method with one mistake on Cases 1 and 2.
 
-    `shares` has, by case, the error divided by the largest omega; `failed` lists the failed cases.
+    `shares` has, by case, the error divided by the largest omega.
     """
 
     mistake: str
@@ -67,7 +67,7 @@ class Ranked:
 
 
 def ranked(word: str = BINARY64) -> list[Ranked]:
-    """Return the mistakes with the results of all methods, most failures in both cases first."""
+    """Return the mistakes with all results, most failures in both cases first."""
     limit = facts("lost")["limit"]
     found = []
     for entry in facts("lost")["mistake"]:

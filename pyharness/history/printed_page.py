@@ -66,7 +66,7 @@ def printed_numbers(text: str) -> list[list[str]]:
 
 
 def has_rows(lines: Iterable[Sequence[str]]) -> bool:
-    """Return whether a line has at least six numbers, as a row of results has."""
+    """Return whether a line has at least six numbers, as rows of results have."""
     return any(len(line) >= _LEAST for line in lines)
 
 
@@ -128,7 +128,7 @@ def verdict(path: str, found: Sequence[Fit]) -> list[str]:
 
 
 def main(arguments: Sequence[str], folder: Path) -> int:
-    """Compare the page in a file with those in `folder`; print the result and return the status."""
+    """Compare the page in a file with those in `folder`; return the exit status."""
     if len(arguments) != 1:
         print("usage: python judge.py FILE, a page as a program printed it", file=sys.stderr)
         return 2

@@ -43,7 +43,7 @@ def recapture_interval(first: int, second: int, both: int) -> tuple[int, int]:
     `first` and `second` are the sizes of two samples, `both` the number of their common members.
     For independent samples, `both` has the hypergeometric distribution. A size is in the interval
     if at most `both` and at least `both` common members each have a probability of 0.025 or more.
-    Raise ValueError if `both` is 0, because there is no upper limit then.
+    Raise ValueError if `both` is 0: there is no upper limit.
     """
     if both < 1:
         raise ValueError("both must be positive")
@@ -119,7 +119,7 @@ def disagreeing() -> list[ReadCard]:
 
 
 def second_reading_report() -> Report:
-    """Return the report on the two readings of the sample, with the estimated misreadings."""
+    """Return the report on the two readings, with the estimated misreadings."""
     table, cards, differing = recaptures(), [*read_cards()], disagreeing()
     frame = len(witness_lines())
     seed = facts("cards/second-reading")["seed"]

@@ -16,9 +16,9 @@ CHANGES = {"added": "new entries", "changed": "altered entries", "removed": "rem
 class Event(NamedTuple):
     """An event in the history of the thesis, with its date and source.
 
-    `first` and `last` are months, as in ``1979-01``, or empty; `why` explains a date that is not
-    certain. The date is ``certain`` if the source names it, ``probable`` if it follows from another
-    entry, and ``unknown`` if no source dates the event.
+    `first` and `last` are months, as in ``1979-01``, or empty; `why` explains an uncertain date.
+    The date is ``certain`` if the source names it, ``probable`` if it follows from another entry,
+    and ``unknown`` if no source dates the event.
     """
 
     id: str

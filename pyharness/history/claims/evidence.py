@@ -91,7 +91,7 @@ def evidence() -> Iterator[Combination]:
 
 
 def combinations() -> list[Assumptions]:
-    """Return every combination; start None stands for the omega(0) adopted for each case."""
+    """Return every combination; start None stands for the adopted omega(0)."""
     # The last name varies fastest.
     readings, conjectures = (
         list(subsets(names_of(kind)[::-1])) for kind in ("reading", "conjecture")

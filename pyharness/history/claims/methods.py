@@ -1,8 +1,8 @@
 """Tests of the thesis's claims about programs and methods over several cases.
 
-Each function is the `test` of one or more claims in `data/claims.toml`, whose `rule` describes the
-decision; `lab` runs the programs, original or corrected. For the original programs, tests of
-weightings other than collocation return "not testable", because the thesis prints no such program.
+Each function is the `test` of claims in `data/claims.toml`, whose `rule` describes the decision;
+`lab` runs the programs, original or corrected. For the original programs, tests of weightings other
+than collocation return "not testable", because the thesis prints no such program.
 """
 
 import math
@@ -126,8 +126,8 @@ def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
     """Judge the claim that collocation improves if the step size is divided by ten.
 
     The two-term program must not improve in case `exception`. The step size is a literal on several
-    cards; for the original programs, the numbers also count the cases of constant torque that
-    improve when only some of these literals are changed.
+    cards. For the original programs, the numbers also count the improved cases of constant torque
+    when only some of these literals change.
     """
     found = judged(rules.small_step(lab, cases, exception))
     if lab.is_original:
@@ -202,7 +202,7 @@ def execution_time(
 def seconds(lab: Laboratory) -> Judged:
     """Return "not testable" for claims on run times, with the number of operations in 100 steps.
 
-    Run times of a present computer are no evidence on the original machine's.
+    A present computer's run times are no evidence on the original machine's.
     """
     counts = {program: operations_per_step(lab.listing(program)).written for program in PROGRAMS}
     numbers = {f"{program}: operations in 100 steps": 100.0 * n for program, n in counts.items()}
@@ -213,7 +213,7 @@ def complexity(lab: Laboratory, factors: Sequence[float]) -> Judged:
     """Judge the claim that the three programs have about the same number of cards.
 
     The verdict is "undecided" if it depends on which of `factors` is the threshold, or on whether
-    the cards of our LEQT1F count.
+    our LEQT1F counts.
     """
     cards = {each: deck_text(lab.listing(each)).count("\n") for each in PROGRAMS}
     numbers = {f"{program}: cards": float(n) for program, n in cards.items()}
@@ -232,7 +232,7 @@ def complexity(lab: Laboratory, factors: Sequence[float]) -> Judged:
 
 
 def others_failed(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -> Judged:
-    """Judge the claim that the weightings other than collocation failed, in `cases`."""
+    """Judge the claim that the weightings other than collocation failed."""
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
     numbers, useless, worst = {}, False, 0.0

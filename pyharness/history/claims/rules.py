@@ -39,7 +39,7 @@ class Runs(NamedTuple):
 
 
 class Grade(NamedTuple):
-    """The result of a claim's test: numbers, and whether the claim holds, in whole or in part."""
+    """The result of a claim's test: numbers, and whether it holds, in whole or in part."""
 
     numbers: Mapping[str, Any]
     whole: Any
@@ -62,7 +62,7 @@ def concur(bench: Bench, case: int, share: float) -> Grade:
     """Grade the claim that the two-term and the four-term program agree in a case.
 
     Their difference must be at most `share` times the largest omega and, in each component, at most
-    a tenth of the range. If only the first condition is true, the claim holds in part.
+    a tenth of the range. The first condition alone suffices in part.
     """
     truth = bench.solution(case)
     two, four = (bench.runs(program, case) for program in COLLOCATION)
@@ -84,7 +84,7 @@ def concur(bench: Bench, case: int, share: float) -> Grade:
 def fails(bench: Bench, case: int, share: float) -> Grade:
     """Grade the claim that the Runge-Kutta program ends early and is wrong in a case.
 
-    The claim holds in part if only one of the two is true.
+    If only one of the two is true, the claim holds in part.
     """
     runs = bench.runs("runge-kutta", case)
     error = share_of_range(runs.omega, bench.solution(case))

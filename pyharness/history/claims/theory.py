@@ -1,8 +1,8 @@
 """Tests of the thesis's claims about history, theory and orders.
 
-Each function is the `test` of one or more claims in `data/claims.toml`, whose `rule` describes the
-decision; `lab` runs the programs. An error is the largest deviation of any omega component from the
-reference solution. `limit` is its allowed ratio to the largest omega.
+Each function is the `test` of claims in `data/claims.toml`, whose `rule` describes the decision;
+`lab` runs the programs. An error is the largest deviation of any omega component from the reference
+solution, `limit` its allowed ratio to the largest omega.
 """
 
 import math
@@ -41,7 +41,7 @@ def known_in_closed_form(lab: Laboratory, cases: list[int], limit: float) -> Jud
 
 
 def by_sources(lab: Laboratory, holds: bool) -> Judged:
-    """Return the verdict on a historical statement; `holds` says whether the sources support it."""
+    """Return the verdict on a historical statement; `holds` says whether sources support it."""
     return Judged(REPRODUCED if holds else FALSE, {})
 
 

@@ -68,14 +68,14 @@ def known_solution(lab: Laboratory, case: int) -> Judged:
 
 
 def omega3_varies(lab: Laboratory, case: int, limit: float) -> Judged:
-    """Judge the claim that omega3 varies in a case; if it is constant, the claim is "false"."""
+    """Judge the claim that omega3 varies in a case, or else is "false"."""
     return judged(rules.omega3_varies(lab, case, limit), FALSE)
 
 
 def no_deviation(lab: Laboratory, case: int, limit: float) -> Judged:
     """Judge the claim that all three programs coincide with the known solution of a case.
 
-    The numbers include the steps that Runge-Kutta ran from each initial omega in `starts`.
+    The numbers include the steps of Runge-Kutta from each initial omega in `starts`.
     """
     found = judged(rules.no_deviation(lab, case, limit))
     for start in starts():

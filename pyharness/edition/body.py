@@ -48,7 +48,7 @@ def context() -> dict[str, Any]:
     """Return the values for the page's template.
 
     `data` is the script's `window.bodyData`, `first` the first scene, and `flip` the time (s)
-    between flips of its body.
+    between its flips.
     """
     first = _first()
     printed = io.StringIO()
@@ -123,7 +123,7 @@ def _picture(scene: Scene) -> Picture:
 
 
 def _draw_polhode(axes: Any, moments: Array, found: Trajectory) -> None:
-    """Draw the path of omega on the ellipsoid of equal energy, in body axes."""
+    """Draw the path of omega on the energy ellipsoid, in body axes."""
     size = np.sqrt(moments @ np.square(found.omega[0]) / moments)
     u, v = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 33), np.linspace(0.0, np.pi, 17))
     ball = np.cos(u) * np.sin(v), np.sin(u) * np.sin(v), np.cos(v)

@@ -155,8 +155,8 @@ def _entry(kind: str, key: str, fields: dict[str, str]) -> str:
 class Part(NamedTuple):
     """A file of the data package.
 
-    `path` is relative to the package; `media_type` is a MIME type, as in ``text/csv``. `content` is
-    empty for the files that describe the other files.
+    `path` is relative to the package; `media_type` is as in ``text/csv``. `content` is empty for
+    the files that describe the others.
     """
 
     path: str
@@ -167,7 +167,7 @@ class Part(NamedTuple):
 
 
 def described(name: str, content: bytes = b"", /, **values: Any) -> Part:
-    """Return the file that table `name` of `package.toml` describes; `values` fill its fields."""
+    """Return the file that table `name` of `package.toml` describes, filled with `values`."""
     texts = (text.format(**values) for text in _descriptions()[name].values())
     path, title, description, media_type = texts
     return Part(path, title, description, media_type, content)

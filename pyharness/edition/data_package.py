@@ -60,7 +60,7 @@ _COLUMNS = "card kind text scan entries port twin swhid"
 def data_package(progress: Progress = no_progress) -> dict[str, bytes]:
     """Return all files of the data package, content by path.
 
-    `progress` receives the number of completed parts, the number of all parts, and a part's name.
+    `progress` receives the number of completed parts, of all parts, and a part's name.
     """
     parts = [*_list_files(progress)]
     parts.append(_readme(parts))
@@ -254,7 +254,7 @@ def _jobs(texts: dict[str, str]) -> Iterator[Part]:
 
 
 def _shared(texts: dict[str, str], rows: list[list[Any]]) -> Iterator[list[str]]:
-    """Yield for each page its file, number of rows, and the runs that print it."""
+    """Yield each page's file, number of rows, and the runs that print it."""
     for name, text in texts.items():
         _, printed = printed_page.split_page(printed_page.printed_numbers(text))
         words: dict[str, list[str]] = {}

@@ -1,7 +1,7 @@
 """The data of the pages that show the listings card by card, with scan and ports.
 
 A note is a numbered entry of the critical apparatus, the list of defects and of deviations of the
-scan. `entry` is the identifier of an entry.
+scan.
 """
 
 import math
@@ -36,7 +36,7 @@ _ORDER = (
 class Run(NamedTuple):
     """Successive characters of a card or of its line in the scan.
 
-    `entry` explains a difference of card and scan here.
+    If they differ here, `entry` is the identifier of the apparatus entry that explains it.
     """
 
     text: str
@@ -75,13 +75,12 @@ class Corrected(NamedTuple):
 class CardView(NamedTuple):
     """A card as shown on a page.
 
-    `card` is our text, in brackets if the scan lacks the card. `witness` is our text with the
-    scan's form of the names that we normalised; it is None if it equals `card`, and empty if the
-    scan lacks the card. `after` has the lines after this card that belong to no card, `scan` the
-    line of the scan with its blanks, or None. `port` has each line of the Fortran port, the defect
-    or reading on which it depends, and whether it is executed if this is active. `notes` begin with
-    the most important kind. `begins` has the notes with a range of cards that begins here, each
-    with only this range.
+    `card` is our text, in brackets if the scan lacks the card. `witness` is our text with the names
+    as in the scan; it is None if it equals `card`, and empty if the scan lacks the card. `after`
+    has the scan's lines after this card that belong to no card. `scan` is the line of the scan with
+    its blanks, or None. `port` has each line of the Fortran port, the defect or reading on which it
+    depends, and whether it is executed if this is active. `notes` begin with the most important
+    kind. `begins` has the notes with a range of cards that begins here, each with only this range.
     """
 
     number: int
@@ -108,7 +107,7 @@ class Sheet(NamedTuple):
 
 
 def sheets(program: str) -> list[Sheet]:
-    """Return the pages of a program, in the order of their lowest cards in the scan."""
+    """Return a program's pages, in the order of their lowest cards in the scan."""
     pages = [page for page in facts("cards/scan")["page"] if page["program"] == program]
     found = sorted((first_card(page["lines"]), page.get("moved")) for page in pages)
     ends = [*(first for first, _ in found[1:]), max(deck(program).cards) + 1]

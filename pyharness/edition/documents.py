@@ -99,8 +99,8 @@ def notebooks(folder: Path) -> dict[str, bytes]:
 def notebook(text: str, pictures: Mapping[str, bytes]) -> bytes:
     """Return a document as a notebook, JSON in format 4.5.
 
-    `pictures` maps file names to contents. Links to other documents become plain text, because a
-    notebook may be in any folder.
+    `pictures` maps file names to contents. Links to other documents become plain text, because
+    notebooks may be in any folder.
     """
     cells: list[dict[str, Any]] = []
 

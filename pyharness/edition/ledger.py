@@ -1,9 +1,8 @@
 """The data of the pages on the claims, the thesis, its figures and the apparatus.
 
 A claim is a statement of the thesis that we test; a judgement has our verdicts on it, for original
-and corrected programs. Three arguments are common: `judged` has the judgements of all claims,
-`told` all sentences with their judgements, and `figures` our versions of Figures 6 to 12, by file
-name without suffix.
+and corrected programs. The argument `judged` has the judgements of all claims, `told` all sentences
+with their judgements, and `figures` our versions of Figures 6 to 12, by file name without suffix.
 """
 
 from collections import Counter
@@ -186,7 +185,7 @@ def printed_figures(
 ) -> list[dict[str, Any]]:
     """Return the thesis's figures in order, each with its number, caption and place.
 
-    `drawn` has our drawings of the figure. `says` has the thesis's sentences on it, each with its
+    `drawn` has our drawings of the figure, `says` the thesis's sentences on it, each with its
     anchor, or "" in sections I to IV. `ours` is our text on a figure that we do not draw.
     """
     found = []

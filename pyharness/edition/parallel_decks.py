@@ -43,7 +43,7 @@ class Cell(NamedTuple):
 
 
 class AlignedRow(NamedTuple):
-    """Corresponding cards by program, None if missing, and the kinds of their differences."""
+    """Corresponding cards by program, None if missing, and their kinds of differences."""
 
     cells: dict[str, Cell | None]
     differences: list[str]

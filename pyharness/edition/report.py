@@ -30,12 +30,12 @@ def check_libraries() -> None:
 
 
 def listed(content: Mapping[str, bytes]) -> dict[str, Any]:
-    """Return a record: `build` has versions and compiler, `files` the size (bytes) of each."""
+    """Return a record: `build` has versions and compiler, `files` each size (bytes)."""
     return {"build": build_record(), "files": {name: len(each) for name, each in content.items()}}
 
 
 def edition_report(folder: str, content: Mapping[str, bytes]) -> Report:
-    """Return the report on the site's files, with number and size (kB) by suffix."""
+    """Return the report on the site's files, by suffix."""
     text: list[Section] = [[_sizes(content)], [f"Open {folder}/index.html in a browser."]]
     return Report("edition", text, lambda: {"folder": folder, **listed(content)})
 

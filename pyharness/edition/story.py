@@ -157,14 +157,14 @@ def _largest_error(case: int, program: str, listing: str) -> float:
 
 
 def _ratios(case: int) -> dict[str, float]:
-    """Return the ratio of each corrected collocation program's error to that of Runge-Kutta."""
+    """Return each corrected collocation program's error over that of Runge-Kutta."""
     errors = {name: _largest_error(case, name, "corrected") for name in PROGRAMS}
     least = errors.pop("runge-kutta")
     return {name: error / least for name, error in errors.items()}
 
 
 def _span(case: int) -> Range:
-    """Return an axis range for a case's true omega1 (rad/s), with a margin."""
+    """Return an axis range for a case's true omega1 (rad/s)."""
     values = [case_scene(case).omega[0], *case_truth(case).omega[:, 0]]
     low, high = min(values), max(values)
     margin = 0.25 * (high - low)

@@ -64,7 +64,7 @@ class Limit:
     """The limit of an original program as the step size goes to zero, and the convergence.
 
     `order` is measured with the last two step sizes. It is None if a run with one of them overflows
-    or has only rounding errors, or if there is no limit or it is unbounded at `blow_up` (s).
+    or has only rounding errors, or if the limit does not exist or is unbounded at `blow_up` (s).
     """
 
     program: str

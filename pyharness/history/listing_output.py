@@ -41,7 +41,7 @@ def fits(
 
     Pages have the same form if the moments and torques in their headings and the numbers of columns
     agree. Our runs have as many steps as in the text of the thesis or, if the page is longer, as on
-    the cards. Raise InputError if none of our pages has the form.
+    the cards. Raise InputError if no page of ours has the form.
     """
     found: list[Fit] = []
     listings = {program: listings_of(program) for program in programs}
@@ -91,7 +91,7 @@ def _lines(listing: Listing, case: int, steps: int, word: str = BINARY64) -> lis
 
 
 def listing_output_report(path: str, found: Sequence[Fit]) -> Report:
-    """Return the report on the program, listing and arithmetic of the page in file `path`."""
+    """Return the report on the program, listing and arithmetic of a page's file."""
     best = found[0]
     rows = [[x.program, x.case, x.listing, x.word, x.fields, len(x.differences)] for x in found]
     text: list[Section] = [printed_page.verdict(path, found), [Table(_TABLE, rows)]]

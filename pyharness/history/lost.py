@@ -2,7 +2,7 @@
 
 The thesis does not print its programs for the subdomain, Galerkin and least-squares methods.
 According to IV.2 they gave no meaningful results in Cases 1 and 2, where the solution is known.
-Each entry of `data/lost.toml` is a conjecture: a mistake that such a program may have had.
+`data/lost.toml` has our conjectures: mistakes that such a program may have had.
 
 The methods are as in IV.2. The trial function has two terms, and products are written out as
 polynomials. A first estimate assumes a constant right-hand side; one correction follows. A method
@@ -62,7 +62,7 @@ class Ranked:
 
     @property
     def in_either(self) -> int:
-        """Return the number of methods that fail in at least one case."""
+        """Return the number of methods that fail in either case."""
         return sum(bool(each.failed) for each in self.attempts)
 
 
@@ -161,7 +161,7 @@ def _solved(matrix: Array, right: Array, mistake: str, second: bool) -> Array:
 
 
 def _weighted(weighting: str, length: float, residual: Array) -> list[Any]:
-    """Return the integrals over (0, length) of a polynomial times each of the two weights."""
+    """Return the integrals over (0, length) of a polynomial times each weight."""
     # NumPy's polynomials of machine words are several times slower.
     coefficients = residual.tolist()
     found = []
@@ -194,7 +194,7 @@ _TABLE = (
 
 
 def lost_report(found: Sequence[Ranked], word: str = BINARY64) -> Report:
-    """Return the report on the mistakes, with errors and failures, in the arithmetic `word`."""
+    """Return the report on the mistakes, computed in the arithmetic `word`."""
     rows = []
     for each in found:
         shares = [share for attempt in each.attempts for share in attempt.shares.values()]

@@ -132,7 +132,7 @@ def _verdict(identity: str, assumptions: Assumptions) -> str:
 
 
 def evidence_report(found: Sequence[Combination]) -> Report:
-    """Return the report of the combinations, highest score first, with a picture."""
+    """Return the report of the combinations, highest score first."""
     ordered = sorted(found, key=lambda each: -each.score)
     axes = list(ordered[0].choices())
     columns = [

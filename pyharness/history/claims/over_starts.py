@@ -131,8 +131,8 @@ def _bench(one: Laboratory, batch: Batch) -> Starts:
 def _laboratory(batch: Batch, assumptions: Assumptions) -> Laboratory | None:
     """Return the laboratory of a sweep, or None if the claims do not apply.
 
-    They apply only to original or corrected programs, to the bodies and torques of the thesis's
-    cases, and to the stop test as on the cards.
+    They apply only to original or corrected programs, to bodies, torques and step sizes of the
+    thesis's cases, and to the stop test as on the cards.
     """
     if batch.listing is None or batch.arrays.keys() & _OF_CASES:
         return None

@@ -125,7 +125,7 @@ def local_error(
 def same_as_taylor(lab: Laboratory, cases: list[int], within: float) -> Judged:
     """Judge the claim that Runge-Kutta and the Taylor series up to h**4 are the same method.
 
-    The claim is reproduced in part if the results of one step differ by O(h**5).
+    It is reproduced in part if the results of one step differ by O(h**5).
     """
     numbers, same, near = {}, True, True
     for case in cases:

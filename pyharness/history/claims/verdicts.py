@@ -1,4 +1,4 @@
-"""Tests of the thesis's claims about one case; each test returns a verdict with its numbers.
+"""Tests of the thesis's claims about one case.
 
 Each function is the `test` of one or more claims in `data/claims.toml`; further tests are in
 `methods`, `theory` and `rules`. The claim's `rule` describes the decision, and its `parameters` are

@@ -115,7 +115,7 @@ def thesis_record() -> dict[str, Any]:
 
 
 def linked_data() -> dict[str, Any]:
-    """Return the software and data records as JSON-LD (schema.org)."""
+    """Return the software and data records as JSON-LD (schema.org), for search engines."""
     described = codemeta()
     software = {name: described[name] for name in _OF_SOURCE_CODE if name in described}
     names = {name: described[name] for name in ("version", "license", "copyrightYear")}

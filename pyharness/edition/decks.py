@@ -36,7 +36,7 @@ _ORDER = (
 class Run(NamedTuple):
     """Successive characters of a card or of its line in the scan.
 
-    If they differ here, `entry` is the identifier of the apparatus entry that explains it.
+    If card and scan differ here, `entry` is the identifier of the apparatus entry on it.
     """
 
     text: str

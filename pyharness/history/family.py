@@ -235,8 +235,8 @@ class OrderFinding:
     """The derived and the measured order of convergence of a method in a scene, and its error.
 
     `measured` is None if all errors are too large or only rounding errors. It is `settled` if the
-    last two measurements differ by at most 0.1. `error` (rad/s) is of omega, with the scene's step
-    size.
+    last two measurements differ by at most 0.1. `error` (rad/s) is the error of omega with the
+    scene's step size.
     """
 
     member: Member

@@ -128,7 +128,7 @@ def verdict(path: str, found: Sequence[Fit]) -> list[str]:
 
 
 def main(arguments: Sequence[str], folder: Path) -> int:
-    """Compare the page in a file with those in `folder`; return the exit status."""
+    """Compare the page in a file with those in `folder`; print the result and return the status."""
     if len(arguments) != 1:
         print("usage: python judge.py FILE, a page as a program printed it", file=sys.stderr)
         return 2

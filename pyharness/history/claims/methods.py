@@ -126,8 +126,8 @@ def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
     """Judge the claim that collocation improves if the step size is divided by ten.
 
     The two-term program must not improve in case `exception`. The step size is a literal on several
-    cards. For the original programs, the numbers also count the improved cases of constant torque
-    when only some of these literals change.
+    cards. For the original programs, the numbers also count the cases of constant torque that
+    improve if only some of these literals change.
     """
     found = judged(rules.small_step(lab, cases, exception))
     if lab.is_original:

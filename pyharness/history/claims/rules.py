@@ -62,7 +62,7 @@ def concur(bench: Bench, case: int, share: float) -> Grade:
     """Grade the claim that the two-term and the four-term program agree in a case.
 
     Their difference must be at most `share` times the largest omega and, in each component, at most
-    a tenth of the range. The first condition alone suffices in part.
+    a tenth of the range. If only the first condition is true, the claim holds in part.
     """
     truth = bench.solution(case)
     two, four = (bench.runs(program, case) for program in COLLOCATION)

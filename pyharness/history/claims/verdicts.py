@@ -68,7 +68,7 @@ def known_solution(lab: Laboratory, case: int) -> Judged:
 
 
 def omega3_varies(lab: Laboratory, case: int, limit: float) -> Judged:
-    """Judge the claim that omega3 varies in a case, or else is "false"."""
+    """Judge the claim that omega3 varies in a case; if not, the claim is "false"."""
     return judged(rules.omega3_varies(lab, case, limit), FALSE)
 
 

@@ -136,7 +136,7 @@ def thesis(judged: Sequence[Judgement]) -> list[SentenceVerdicts]:
 def thesis_context(told: Sequence[SentenceVerdicts]) -> dict[str, Any]:
     """Return the data of the page on the thesis: sentences and formulas by section, and a table.
 
-    The table counts sentences and claims, as reproduced only claims about results.
+    The table counts sentences and claims; only claims about results count as reproduced.
     """
     columns = [
         Column("section", left=True), Column("sentences"), Column("that make a claim"),

@@ -155,8 +155,8 @@ def _entry(kind: str, key: str, fields: dict[str, str]) -> str:
 class Part(NamedTuple):
     """A file of the data package.
 
-    `path` is relative to the package; `media_type` is as in ``text/csv``. `content` is empty for
-    the files that describe the others.
+    `path` is relative to the package; `media_type` is a MIME type, as in ``text/csv``. `content` is
+    empty for the files that describe the others.
     """
 
     path: str

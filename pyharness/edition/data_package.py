@@ -60,7 +60,7 @@ _COLUMNS = "card kind text scan entries port twin swhid"
 def data_package(progress: Progress = no_progress) -> dict[str, bytes]:
     """Return all files of the data package, content by path.
 
-    `progress` receives the number of completed parts, of all parts, and a part's name.
+    `progress` receives the numbers of completed and of all parts, and a part's name.
     """
     parts = [*_list_files(progress)]
     parts.append(_readme(parts))

@@ -35,7 +35,7 @@ def listed(content: Mapping[str, bytes]) -> dict[str, Any]:
 
 
 def edition_report(folder: str, content: Mapping[str, bytes]) -> Report:
-    """Return the report on the site's files, by suffix."""
+    """Return the report on the site's files: number and size (kB) by suffix."""
     text: list[Section] = [[_sizes(content)], [f"Open {folder}/index.html in a browser."]]
     return Report("edition", text, lambda: {"folder": folder, **listed(content)})
 

@@ -71,7 +71,7 @@ def _contents(cards: Sequence[Card]) -> list[Section]:
 def card_record(card: Card) -> dict[str, Any]:
     """Return a card as a JSON record, with its lines in Fortran and Python.
 
-    `scan` is null if it agrees with our text, empty if it lacks the card.
+    `scan` is null if the scan agrees with our text, empty if it lacks the card.
     """
     found = deck(card.program)
     scan = (card.scan or "") if card.deviates else None

@@ -75,7 +75,7 @@ class Limit:
 
     @property
     def approach(self) -> str:
-        """Return a phrase such as `order 1.00 toward the limit`."""
+        """Return a phrase on the convergence, such as `order 1.00 toward the limit`."""
         if self.blow_up is not None:
             return f"no order: the limit grows without bound at t = {self.blow_up:.3g} s"
         if self.order is not None:

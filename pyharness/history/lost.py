@@ -62,7 +62,7 @@ class Ranked:
 
     @property
     def in_either(self) -> int:
-        """Return the number of methods that fail in either case."""
+        """Return the number of methods that fail in at least one case."""
         return sum(bool(each.failed) for each in self.attempts)
 
 

@@ -131,8 +131,8 @@ def dynamic(bench: Bench, case: int, factor: float) -> Grade:
 def small_step(bench: Bench, cases: Sequence[int], exception: int) -> Grade:
     """Grade the claim that a tenth of the step size improves collocation, with one exception.
 
-    Without it, errors must be finite and at least halve in four fifths of the pairs of program and
-    case; in half of the pairs, the claim holds in part.
+    Without the exception, errors must be finite and at least halve in four fifths of the pairs of
+    program and case. If they do in half of the pairs, the claim holds in part.
     """
     numbers, improved, excepted = {}, [], np.False_
     for program in COLLOCATION:

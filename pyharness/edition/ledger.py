@@ -172,7 +172,7 @@ def formulas() -> dict[str, list[Formula]]:
 
 
 def draw_figures(figures: Mapping[str, FigureFinding]) -> dict[str, bytes]:
-    """Return the figures as SVG and CSV files, and a figure of both sets of Figure 7."""
+    """Return the figures as SVG and CSV files, and both sets of Figure 7 in one, also as PNG."""
     together = together_picture(figures["figure-07"], figures["figure-07-corrected"])
     files = saved(together, "figure-07-together.svg", "preview.png")
     for stem, each in figures.items():

@@ -100,9 +100,9 @@ class Truth:
     time, omega : ndarray of shape (n,) and (n, 3)
         Times (s) and angular velocities (rad/s).
     error : float
-        Bound on the error of any component of `omega` (rad/s).
+        Bound on the error of each component of `omega` (rad/s).
     flow : Conditioning
-        Error amplification and rounding errors of the motion.
+        Its error amplification and rounding errors.
     attitude, angle_error : ndarray of shape (n, 4) or None, float
         True quaternions, which are compared instead of omega, and a bound on their error (rad).
     is_signed : bool
@@ -110,10 +110,10 @@ class Truth:
     data : float
         Change of omega by the rounding of A, B and C, divided by the largest abs(omega).
     exact : bool
-        Whether the solution is a torque-free closed form: `data` is known, and energy and momentum
-        are conserved.
+        Whether it is a torque-free closed form, with known `data`, and conserved energy and
+        momentum.
     scene, reference, effort : Scene, Reference and float, or None
-        The scene, its reference solution and the factor on the work limit, if a reference was used.
+        The scene, the reference solution and its factor on the work limit, if one was used.
     """
 
     time: Array
@@ -251,8 +251,8 @@ AMPLIFIED = Policy(_granting(lambda growth: growth), FLOW)
 def judge(name: Name, tried: MethodRun, truth: Truth, policy: Policy) -> Check:
     """Return the check that a method's error is within its limit, or that its refusal is permitted.
 
-    Without a limit, a finite error is only reported. `closed-form` fails if it solves a scene that
-    has no closed form.
+    Without a limit, a finite error is only reported. `closed-form` fails if it solves a scene
+    without one.
     """
     answer = tried.answer
     if why := answer.refusal:

@@ -35,10 +35,9 @@ _EFFORT = 1e9  # so large that there is no limit: the caller has requested the w
 class Solver:
     """The solver of a batch: a method or a program of the thesis; the other field is None.
 
-    `t_end` (s) is by default the step size times the number of steps. The fields after it are for
-    programs: `listing` names the active defects, `reading` the interpretation of doubtful cards.
-    `lipschitz` is the limit (1/s) of the stop test; `may_stop` tells whether the test may end a
-    run. `compiled` is as in `solve_many`.
+    `t_end` (s) is by default the step size times the number of steps. `listing` to `may_stop` are
+    for programs: `reading` is the interpretation of doubtful cards, `lipschitz` the limit (1/s) of
+    the stop test, which may end a run if `may_stop`. `compiled` is as in `solve_many`.
     """
 
     method: str | None = "auto"
@@ -59,10 +58,9 @@ class Batch:
     Functions that check a claim of the thesis may read `omega0`, `omega`, `status`, `n_rows` and
     `stop_variable`, and call `rows` and `by_method`.
 
-    `scene` has the quantities that all scenes share. `arrays` has the other quantities, with a row
-    for each scene; its keys are arguments of `solve_many` and `run_many`, and include `omega`.
-    `listing` is None for a method. `t_end` (s) has shape (n,). `attitude`, for methods only, tells
-    whether attitudes are computed.
+    `scene` has the quantities that all scenes share, `arrays` the others, with a row for each
+    scene; its keys are arguments of `solve_many` and `run_many`, and include `omega`. `listing` is
+    None for a method. `t_end` (s) has shape (n,). `attitude`, for methods only, requests attitudes.
     """
 
     scene: Scene
@@ -112,7 +110,7 @@ class Batch:
 
     @property
     def n_rows(self) -> NDArray[np.int32]:
-        """Return the numbers of steps that a program completed, shape (n,)."""
+        """Return the numbers of completed steps of a program, shape (n,)."""
         return self._program.n_rows
 
     @property
@@ -166,8 +164,8 @@ class Batch:
     def run(self, at: list[int]) -> ProgramEnsemble:
         """Return a program's results at the steps `at`, ascending.
 
-        If the scenes differ in `torque_rate`, or the program refuses one of them, they run one by
-        one, without the error codes IER. Only refused scenes have the status REFUSED.
+        If the scenes differ in `torque_rate`, or the program refuses one, they run one by one,
+        without the error codes IER.
         """
         if "torque_rate" not in self.arrays:  # `run_many` takes one rate for all bodies
             try:

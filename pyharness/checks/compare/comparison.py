@@ -1,7 +1,7 @@
 """Comparisons of programs, original and corrected, and of methods, on one scene.
 
 Differences between Fortran and Python are in units in the last place. An error (rad/s) below the
-error of the reference solution has no meaning.
+reference solution's own has no meaning.
 """
 
 import itertools
@@ -63,9 +63,9 @@ def compare_programs(
     Parameters
     ----------
     scene : Scene
-        The body, the initial condition, the torque and the steps.
+        The motion and its steps.
     listings : sequence of Listing, optional
-        The versions of programs to run; by default all three programs, original and corrected.
+        The programs to run; by default all three, original and corrected.
     lipschitz : float
         The constant of the Runge-Kutta program's stop test (1/s).
     may_stop : bool
@@ -76,20 +76,19 @@ def compare_programs(
     effort : float
         Factor on the work limits of the programs, the methods and the reference.
     attitude : bool
-        Whether attitudes are compared too. The initial attitude is that of the scene, by default
-        the identity. A program's attitude is integrated from its omega by a method of order 4.
+        Whether attitudes are compared too, from the scene's, by default the identity. A program's
+        attitude is integrated from its omega by a method of order 4.
     word : str
-        The floating-point arithmetic of the programs, one of
-        `pyharness.thesis.programs.WORD_NAMES`. If there are no compiled programs for it, only the
-        Python ports run. Orders are measured in binary64 only.
+        The arithmetic of the programs, one of `pyharness.thesis.programs.WORD_NAMES`. Without
+        compiled programs for it, only the Python ports run. Orders are measured in binary64 only.
     methods : bool
         Whether SciPy's methods run; `unexpected` and `is_sensitive` do not depend on it.
 
     Returns
     -------
     Comparison
-        All results; its property `unexpected` is empty if Fortran and Python agree, and no
-        corrected program misses its order of convergence.
+        The results; `unexpected` is empty if Fortran and Python agree, and no corrected program
+        misses its order of convergence.
 
     Raises
     ------
@@ -148,9 +147,8 @@ def listings_for(
 ) -> list[Listing]:
     """Return the listings to compare: original, selected and corrected, for each program.
 
-    The selected listing is `base`, changed by `fix`, `keep`, `readings` and `conjectures`. If
-    `base` alone is specified, it is the only listing. Raise InputError for a name that none of
-    `programs` has.
+    The selected listing is `base`, changed by `fix` and `keep`. If `base` is specified without
+    them, it is the only listing. Raise InputError for a name that none of `programs` has.
     """
     chosen = list(programs)
     assumed = [name for name in conjectures or () if name != "none"]
@@ -190,7 +188,7 @@ def compare_methods(
     Parameters
     ----------
     scene : Scene
-        The scene; methods are compared at the ends of its steps. A torque may depend on omega or
+        The motion; methods are compared at the ends of its steps. A torque may depend on omega or
         attitude if it can be recorded.
     methods : sequence of str
         Names in `pyharness.engine.registry.METHODS`; by default `auto` and SciPy's methods.
@@ -200,12 +198,13 @@ def compare_methods(
     effort : float
         Factor on the work limits of the methods and the reference.
     attitude : bool
-        Whether attitudes are compared too. They always are if the torque depends on the attitude.
+        Whether attitudes are compared too, as they always are if the torque depends on the
+        attitude.
 
     Returns
     -------
     Comparison
-        The results; its property `unexpected` is empty if every method meets its tolerance.
+        The results; `unexpected` is empty if every method meets its tolerance.
 
     Raises
     ------

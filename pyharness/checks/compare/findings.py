@@ -62,20 +62,20 @@ class Comparison:
     Attributes
     ----------
     scene : Scene
-        The scene, with the initial attitude if attitudes were requested.
+        With the initial attitude if attitudes were requested.
     lipschitz : float or None
         The constant of the Runge-Kutta program's stop test, 1/s; None without programs.
     reference : Reference
-        The reference solution and the estimate of its error.
+        The reference solution, with an estimate of its error.
     bound : ErrorBound
         The error of the reference solution, proved or estimated.
     programs : tuple of ProgramFinding
-        The results of the programs, one for each listing.
+        One for each listing.
     methods : tuple of MethodFinding
-        The results of the methods: SciPy's, or those requested.
+        One for each of SciPy's methods, or of those requested.
     growth : float or None
-        The error amplification, if it is known: the largest norm of the state-transition matrix of
-        omega from any earlier time to the last.
+        The error amplification, if known: the largest norm of the state-transition matrix of omega
+        from any time to the last.
     word : str
         The arithmetic of the programs, as in ``binary64``.
     """
@@ -116,9 +116,9 @@ class Comparison:
     def unexpected(self) -> tuple[str, ...]:
         """Return a sentence for each unexpected result.
 
-        With programs, a result is unexpected if Fortran and Python differ, or a corrected program
-        misses its order. Without programs, it is unexpected if a method's error exceeds the limit
-        that follows from its tolerance, rows are missing, or no method has a result.
+        With programs, unexpected are differences between Fortran and Python, and a corrected
+        program that misses its order. Without programs, they are errors above the limit that
+        follows from a method's tolerance, missing rows, and no result at all.
         """
         found = [] if self.programs else [*filter(None, map(self._excess, self.methods))]
         if not self.programs and all(each.trajectory is None for each in self.methods):

@@ -1,16 +1,16 @@
 """Linear stability: the amplification matrix of a step of each program of the thesis.
 
-A perturbation x of a steady rotation, and the velocity during this rotation, obey x' = J x, where J
-is the constant Jacobian of their equations. A step of size h multiplies x by a matrix of
-polynomials in z, where z is h times an eigenvalue of J, or hJ itself. The coefficients are exact
-fractions. The matrix has m rows, one for each vector that a program propagates. The original
-Runge-Kutta program propagates two: the result, and U(1), at which the first stage is evaluated.
+A perturbation x of a steady rotation obeys x' = J x with a constant Jacobian J. A step of size h
+multiplies x by a matrix of polynomials in z, where z is h times an eigenvalue of J, or hJ itself.
+The coefficients are exact fractions. The matrix has a row for each of the m vectors that a program
+propagates. The original Runge-Kutta program propagates two: the result, and U(1), at which the
+first stage is evaluated.
 
-A program is linearly stable where the spectral radius is at most 1, a region in the plane of z.
+A program is linearly stable where, in the plane of z, the spectral radius is at most 1.
 
-A collocation program evaluates the right-hand side along a straight line, its first estimate, and
-corrects once. At time s the right-hand side on this line is F + s J F + s**2 Q(F), where F is its
-value at s = 0 and Q its quadratic part.
+A collocation program evaluates the right-hand side along its first estimate, a straight line, and
+corrects once. At time s of the step it is F + s J F + s**2 Q(F), where F is its value at s = 0 and
+Q its quadratic part.
 """
 
 from dataclasses import dataclass
@@ -94,8 +94,7 @@ class Amplification:
 def amplification(listing: Listing, step: int = 1) -> Amplification:
     """Return the amplification matrix of step `step` (from 1) of a program.
 
-    The number of the step matters only with the defect `dt-accumulates`, which moves the
-    collocation points.
+    `step` matters only with the defect `dt-accumulates`, which moves the collocation points.
     """
     if listing.program == "runge-kutta":
         return _runge_kutta(listing)
@@ -121,8 +120,8 @@ def _quadrature(listing: Listing, step: int) -> tuple[Fractions, Fractions]:
 def _runge_kutta(listing: Listing) -> Amplification:
     """Return the matrix of the Runge-Kutta program (cards 770-1200).
 
-    Stages depend on U(1) and on the base of the step, the previous result. A vector has the shape
-    (2, powers of z).
+    Stages depend linearly on U(1) and on the base of the step, the previous result. Such a vector
+    has the shape (2, powers of z).
     """
     first, base = np.full((2, 2, _HIGHEST), Fraction(0), dtype=object)
     first[0, 0] = base[1, 0] = Fraction(1)
@@ -159,9 +158,9 @@ def _polynomial_text(coefficients: Fractions) -> str:
 def boundary(matrix: Amplification, direction: complex) -> tuple[float, float]:
     """Return the distance of the stability boundary from z = 0, and the slope there.
 
-    `direction` is -1 for the negative real axis or 1j for the imaginary axis. The slope is the
+    `direction` is -1 for the negative real axis, 1j for the imaginary axis. The slope is the
     derivative of the spectral radius just beyond the boundary. Return (0, 1) if perturbations grow
-    already at a distance of 1/16.
+    at a distance of 1/16.
     """
 
     def grows(distance: float) -> bool:
@@ -194,7 +193,7 @@ class Region:
 
 @dataclass(frozen=True, eq=False)
 class Regions:
-    """The stability regions, where the spectral radius is at most 1, on one grid of z."""
+    """The stability regions on one grid of z."""
 
     # Real and imaginary parts of z on the grid.
     real: Array
@@ -206,8 +205,8 @@ class Regions:
 def regions() -> Regions:
     """Return the stability regions of all programs, original and corrected.
 
-    The Runge-Kutta program also has regions with `stage-base` or `base-not-restored` alone. Gauss
-    collocation is omitted; its region is the left half-plane.
+    The Runge-Kutta program also has regions with `stage-base` or `base-not-restored` alone. That of
+    Gauss collocation, the left half-plane, is omitted.
     """
     real, imaginary = np.linspace(*_REAL), np.linspace(*_IMAGINARY)
     distances = np.geomspace(*_DISTANCES)

@@ -2,7 +2,7 @@
 
 Brouwer 1937, Astronomical Journal 46: with random rounding, errors of energy and momentum grow with
 the power 1/2 of the number of steps, the phase error with the power 3/2. With biased rounding the
-two powers are 1 and 2.
+powers are 1 and 2.
 """
 
 import math
@@ -88,8 +88,7 @@ class Orbit:
 def orbit(scene: Scene) -> Orbit:
     """Return an Orbit: samples of omega over two periods, and the factors of error bounds.
 
-    The scene must have moments and no torque. The factors lead from an error of omega to the errors
-    of energy, momentum, frequency (2 pi over the period of omega) and phase.
+    The scene must have moments and no torque.
     """
     a = np.array(scene.euler_coefficients)
     frequency = _frequency(a, np.array(scene.omega))
@@ -120,9 +119,8 @@ def taylor_noise(body: Orbit, scene: Scene, step: float, order: int, left_out: f
     """Return error bounds of a Taylor step, by a running error analysis.
 
     `step` is in s; `left_out` is the truncation error relative to the largest omega. Term k is a
-    sum of k products of lower terms; each product has the errors of these terms and at most k + 3
-    roundings. The sum rounds each term three times. The remainder of compensated summation adds at
-    most half a unit in the last place.
+    sum of k products of lower terms, each with their errors and at most k + 3 roundings. The sum
+    rounds each term three times.
     """
     a = np.abs(np.array(scene.euler_coefficients))
     terms, errors = _terms(body, scene, step, order), [np.abs(body.states)]
@@ -144,11 +142,11 @@ def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
     The sum at each node has s + 3 roundings of the right-hand sides and one of omega. Its error is
     multiplied by the inverse of 1 - h A J, where A is the tableau's matrix and J the Jacobian.
 
-    The truncation error is the integral of the state-transition matrix times the residual. The
-    residual is zero at the nodes, the zeros of an orthogonal polynomial. Divide it by this
-    polynomial: in the Taylor series of the remaining factor of the integrand, only the power s of
-    time contributes. By Leibniz's rule its coefficient is a sum over j of multiples of (h J)**j /
-    j! times the Taylor term 2s + 1 - j of omega.
+    The truncation error is the integral of the state-transition matrix times the residual, which is
+    zero at the nodes, the zeros of an orthogonal polynomial. In the Taylor series of the integrand
+    divided by this polynomial, only the power s of time contributes. By Leibniz's rule its
+    coefficient is a sum over j of multiples of (h J)**j / j! times the Taylor term 2s + 1 - j of
+    omega.
     """
     from pyharness.checks.theory.tableau import tableau
 
@@ -189,8 +187,8 @@ def errors(
     """Return the signed errors of energy and momentum (relative) and of the phase (rad).
 
     The phase error is the time by which `omega` is ahead of the exact solution, times the frequency
-    of the motion. If `rounded`, the exact solution is for A, B, C rounded to binary64, as methods
-    use them.
+    of the motion. If `rounded`, this solution is for A, B, C rounded to binary64, as methods use
+    them.
     """
     start = [Decimal(w) for w in scene.omega]
     found = [Decimal(float(w)) for w in omega]

@@ -1,7 +1,7 @@
 """The collocation matrices (eq. 36), and the accuracy of their solution by LEQT1F.
 
 LEQT1F is the linear solver of the collocation programs, "two-term" and "four-term". Exact solutions
-are computed in fractions; every float is a fraction.
+are computed in fractions.
 """
 
 import math
@@ -154,9 +154,8 @@ def solved(program: str, step: float) -> Solved:
     def errors(solutions: Array) -> list[float]:
         """Return the largest ratios of three errors to their bounds, and a relative error.
 
-        The ratios are for the residual, the elements of X, and the increment of an unknown over the
-        step. The last value is the error of the increment, over `step` times the largest element of
-        the right-hand side.
+        The values are in the order of `residual`, `forward`, `increment` and `increment_error` in
+        `Solved`.
         """
         every = []
         for solution, side in zip(solutions.T, sides, strict=True):
@@ -202,12 +201,12 @@ def _small_step(program: str) -> tuple[Fraction, Fractions]:
 def solver_roundings(program: str) -> tuple[float, float]:
     """Return two bounds on the rounding error that the solver adds to a step's result.
 
-    Both bounds are in units of 2**-53 times step size times rate. The first is for equal rates at
-    all points, where only c1 is not zero. The second, multiplied by the relative deviation from
-    equal rates, is for unequal rates. They are 3n abs(powers) abs(inverse) abs(L) abs(U) abs(X) for
-    n points (Higham 2002, theorem 9.4), with the matrix's inverse and factors L and U, the solution
-    X and the powers of the step size. They do not depend on the step size as long as the largest
-    element of each row of the matrix is 1.
+    Both are in units of 2**-53 times step size times rate. The first is for equal rates at all
+    points, where only c1 is not zero. The second, times the relative deviation from equal rates, is
+    for unequal rates. For n points they are 3n abs(powers) abs(inverse) abs(L) abs(U) abs(X)
+    (Higham 2002, theorem 9.4), with the matrix's inverse and factors L and U, the solution X and
+    the powers of the step size. They do not depend on the step size while the largest element of
+    each row is 1.
     """
     step, matrix = _small_step(program)
     count = len(matrix)
@@ -225,10 +224,10 @@ def solver_roundings(program: str) -> tuple[float, float]:
 def singular_below(program: str, bits: int = 53) -> float:
     """Return the largest step size (s) for which LEQT1F must report a singular matrix.
 
-    With N rows, LEQT1F does so if the computed sum N + p equals N for a scaled pivot p, which means
-    that p is at most half a unit in the last place of N. As N is a power of 2, this unit is
-    N 2**(1 - bits), and a tie is rounded to N. The last scaled pivot, which is proportional to
-    step**(N-1), is the first to be so small.
+    With N rows, LEQT1F does so if the computed sum N + p equals N for a scaled pivot p: if p is at
+    most half a unit in the last place of N. As N is a power of 2, this unit is N 2**(1 - bits), and
+    a tie is rounded to N. The last scaled pivot, proportional to step**(N-1), is the first so
+    small.
     """
     step, matrix = _small_step(program)
     count = len(matrix)
@@ -267,8 +266,8 @@ def _share(error: Fraction, bound: Fraction) -> float:
 def _pivoting(matrix: Fractions, order: Sequence[int], sizes: Fractions) -> tuple[float, float]:
     """Return the largest relative shortfall of a pivot from the best candidate, and its bound.
 
-    The pivots are from exact elimination in `order`, the order that the solver chose. The bound is
-    the effect of rounding, computed from `sizes`, abs(L) abs(U).
+    The pivots are from exact elimination in the solver's `order`. The bound is for rounding,
+    computed from `sizes`, abs(L) abs(U).
     """
     shortfall, allowed = Fraction(0), Fraction(0)
     scale = 1 / abs(matrix).max(axis=1)
@@ -286,8 +285,8 @@ def _columns(
 ) -> Iterator[tuple[int, dict[int, Fraction], Fractions]]:
     """Eliminate a matrix exactly; yield pivot row, candidates and rows before each column.
 
-    A candidate is an element's magnitude divided by the largest in its row of `matrix`. Without
-    `order`, the largest candidate becomes the pivot, as in LEQT1F.
+    A candidate is an element's magnitude over the largest in its row of `matrix`. Without `order`,
+    the largest candidate becomes the pivot, as in LEQT1F.
     """
     rows = matrix.copy()
     scale = 1 / abs(matrix).max(axis=1)

@@ -2,8 +2,8 @@
 
 An error of omega at time s, multiplied by the state-transition matrix Phi(t, s) of the equations
 linearised along the solution, is the resulting error at time t. Under a torque that depends on
-omega or attitude, the matrix includes the attitude. The derivative of the matrix follows from the
-tape, the recorded operations of the equations.
+omega or attitude, the equations' Jacobian follows from the tape, their recorded operations, and Phi
+includes the scene's attitude, if any.
 """
 
 import math
@@ -54,9 +54,9 @@ class Conditioning:
     """The sensitivity of omega at the end of a motion to errors during it.
 
     `limit` and `angle_limit` add rounding errors to `made`, the sum of the errors allowed in the
-    steps (relative, or rad). `limit` amplifies `made`. It returns at most 2, because components up
-    to `largest` differ by no more; its argument `steps` is the number of roundings of omega, 0 with
-    compensated summation. `angle_limit` assumes the largest rounding error of omega at all times.
+    steps (relative, or rad). `limit` amplifies `made`, and is at most 2, because components up to
+    `largest` differ by no more; `steps` is the number of roundings of omega, 0 with compensated
+    summation. `angle_limit` assumes the largest rounding error of omega at all times.
     """
 
     # Largest factor, at least 1, from an error of omega at any time to the error at the end.
@@ -123,9 +123,8 @@ def sampled(
 ) -> tuple[Array, _Sample]:
     """Return equally spaced times up to `time` (s), between which the state changes little.
 
-    `sample` takes times, and returns the largest rate (1/s) at them and results. Return its results
-    at the returned times too. The first attempt has `fewest` intervals. Raise InputError if more
-    than `most` intervals are needed.
+    `sample` takes times, and returns the largest rate (1/s) at them and results, which are returned
+    too. The first attempt has `fewest` intervals. Raise InputError if more than `most` are needed.
     """
     count = fewest
     while True:
@@ -146,8 +145,8 @@ def of_flow(flow: Array, times: Array, state: Array, source: Array, largest: flo
     """Return the sensitivity of a final state, from state-transition matrices.
 
     `flow` has the matrix from each time to the last, shape (n, m, m). `state` has the shape (n, m),
-    and so has `source`, the sums of magnitudes of the terms of its derivative (1/s). Errors are
-    divided by `largest`. Raise InputError if the amplification exceeds binary64.
+    and so has `source`, the sums of magnitudes of the terms of its derivative. Errors are divided
+    by `largest`. Raise InputError if the amplification exceeds binary64.
     """
     steps, sizes = np.diff(times), np.abs(flow)
 
@@ -175,8 +174,7 @@ def of_flow(flow: Array, times: Array, state: Array, source: Array, largest: flo
 def magnitudes(scene: Scene, times: Array, omega: Array) -> Array:
     """Return the sums of magnitudes of the terms of Euler's equations (rad/s2), shape (n, 3).
 
-    A sine or cosine is multiplied by 1 plus its angle, to which the angle's rounding error is
-    proportional.
+    A sine or cosine is multiplied by 1 plus its angle, to allow for the angle's rounding error.
     """
     products = np.abs(np.roll(omega, -1, 1) * np.roll(omega, -2, 1))
     products *= np.abs(scene.euler_coefficients)
@@ -196,8 +194,8 @@ def conditioning_at(scene: Scene, times: Sequence[float]) -> Conditioning:
     """Return the sensitivity of a scene's solution at `times` (s) to earlier errors.
 
     Under a torque law it is the sensitivity at the last time; under other torques the largest at
-    any of the times, because damping may reduce errors. Raise InputError if the torque is opaque,
-    if the solution grows without bound, or if the motion is too fast or too long to be sampled.
+    any of the times, because damping may reduce errors. Raise InputError as `conditioning` does, or
+    if the torque is opaque.
     """
     if not isinstance(scene.torque, StateTorque):
         return conditioning(scene, times[-1])
@@ -243,8 +241,8 @@ def _path(scene: Scene, times: Array) -> Array:
 def _sources(tape: Tape, times: Array, state: Array) -> Array:
     """Return bounds on the rounding errors of the equations (1/s), divided by the unit roundoff.
 
-    In this running error analysis each operation adds the rounding error of its result. For a sum
-    it is taken from the magnitudes of the terms.
+    In this running error analysis each operation adds the rounding error of its result, or, for a
+    sum, of its terms' magnitudes.
     """
     given = [_Bounded(each, np.zeros(len(times))) for each in inputs_of(times, state)]
     with np.errstate(all="ignore"):

@@ -19,8 +19,8 @@ _NEAR = 2.0**-27
 def flip_times(moments: ArrayLike, omega0: ArrayLike) -> Array:
     """Return the time (s) between flips of each body, shape (n,).
 
-    This time is half the period of omega: pi over the arithmetic-geometric mean of two rates (1/s).
-    It is infinite on the separatrix and for a steady rotation. `moments` (kg m2, in any order) and
+    It is half the period of omega: pi over the arithmetic-geometric mean of two rates (1/s), and
+    infinite on the separatrix and for a steady rotation. `moments` (kg m2, in any order) and
     `omega0` (rad/s) have the shape (n, 3) or (3,).
     """
     bodies, omega = np.broadcast_arrays(np.atleast_2d(moments), np.atleast_2d(omega0))

@@ -1,12 +1,12 @@
 """Steady rotations under constant torque, and their linear stability.
 
 Grammel's method, equation 32 of the thesis (III.4.a): omega is a steady rotation (a, b, c) plus a
-small perturbation proportional to exp(Q t). Let A, B, C be the coefficients of Euler's equations,
-and M = N / I torque over moment. Then (a, b, c) is steady if A bc = -M1, B ca = -M2, C ab = -M3.
-The rates Q (1/s) are the roots of Q**3 - (BC a**2 + CA b**2 + AB c**2) Q - 2 ABC abc = 0.
+small perturbation proportional to exp(Q t). With the coefficients A, B, C of Euler's equations, and
+torque over moment M = N / I, (a, b, c) is steady if A bc = -M1, B ca = -M2, C ab = -M3. The rates Q
+(1/s) are the roots of Q**3 - (BC a**2 + CA b**2 + AB c**2) Q - 2 ABC abc = 0.
 
-In the functions, `share` is the magnitude of the initial perturbation divided by that of the
-rotation. Of a continuous family of steady rotations only some members are reported.
+In the functions, `share` is the initial perturbation divided by the rotation. Of a continuous
+family of steady rotations only some members are reported.
 """
 
 import cmath
@@ -77,7 +77,7 @@ def steady_rotations(scene: Scene, disturbance: float) -> SteadyRotations:
     """Return the steady rotations of a scene, and the development of perturbations.
 
     `disturbance` is the perturbation divided by the rotation. Raise InputError if the torque varies
-    with time, or if a rotation or its rates exceed binary64.
+    with time, or a rotation or its rates exceed binary64.
     """
     if scene.body_torque.varies:
         raise InputError(
@@ -160,8 +160,8 @@ def _growing(
 ) -> float | None:
     """Return the time (s) when second-order terms reach a tenth of a growing perturbation.
 
-    Linear theory is valid until this time. It is infinite if the terms are zero, and None if they
-    exceed binary64. `rate` is the Q (1/s) with the fastest growth, `matrix` the Jacobian (1/s).
+    It is infinite if these terms are zero, and None if they exceed binary64. `rate` is the Q (1/s)
+    with the fastest growth, `matrix` the Jacobian (1/s).
     """
     # The eigenvector of `rate`.
     grows = np.linalg.svd(matrix - rate * np.eye(3))[2][-1].conj()
@@ -183,9 +183,9 @@ def _phase(coefficients: Sequence[float], rate: float, share: float) -> float | 
     """Return the time (s) when the phase error about a stable axis reaches 0.1 rad.
 
     `coefficients` are in cyclic order from the axis; `rate` is the frequency (rad/s) by linear
-    theory. A tilt by d (rad) towards another axis changes the frequency by the fraction d**2 / 4
-    times the first coefficient divided by the coefficient of that axis. The time is infinite if the
-    first coefficient is 0, and None if the frequency is 0, when only the spin drifts.
+    theory. A tilt by d (rad) towards another axis changes it by the fraction d**2 / 4 times the
+    first coefficient over that of the other axis. The time is infinite if the first coefficient is
+    0, else None if the frequency is 0, when only the spin drifts.
     """
     spun, *others = map(abs, coefficients)
     if spun != 0.0 and rate == 0.0:
@@ -199,9 +199,9 @@ def _flip_interval(coefficients: Sequence[float], spin: float, share: float) -> 
 
     `coefficients` are in cyclic order from that axis; `spin` is in rad/s. The time is 2 K / lambda,
     where K is the complete elliptic integral of the first kind with complementary modulus k', and
-    lambda is near the growth rate. For a small perturbation the time is near (2 / lambda) ln(4 /
-    k'). It is shortest for a perturbation along the other axis with the smaller coefficient. Return
-    None if the signs of the coefficients are impossible for a middle axis.
+    lambda is near the growth rate. It is shortest for a perturbation along the other axis with the
+    smaller coefficient. Return None if the signs of the coefficients are impossible for a middle
+    axis.
     """
     first, second, third = coefficients
     if first * second >= 0.0 or first * third >= 0.0:
@@ -257,8 +257,8 @@ def _axes(coefficients: Triple, spin: float) -> tuple[str, Places]:
 def _hyperbola(coefficients: Triple, product: float, held: int) -> tuple[str, Places]:
     """Return a text and places for a torque about the axis `held` (counted from 0).
 
-    `product` is the constant product of the other components (rad2/s2). One branch is shown; the
-    other is its opposite.
+    `product` is the product of the other components (rad2/s2). One branch is shown; the other is
+    its opposite.
     """
     one, other = (held + 1) % 3, (held + 2) % 3
     told = (
@@ -285,8 +285,8 @@ def _three(components: dict[int, float]) -> Triple:
 def _across(products: Sequence[float], axis: int) -> tuple[str, Places]:
     """Return a text and places for a torque perpendicular to the axis of symmetry, `axis`.
 
-    `products` are the w2 w3, w3 w1 and w1 w2 that balance the torque (rad2/s2). One branch of the
-    hyperbola is shown.
+    `products` are the w2 w3, w3 w1 and w1 w2 that balance the torque (rad2/s2). One branch is
+    shown.
     """
     one, other = (axis + 1) % 3, (axis + 2) % 3
     # w_one w_axis and w_other w_axis.

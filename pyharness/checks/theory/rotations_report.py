@@ -1,6 +1,6 @@
 """The report of the command `rotations`, and its picture of polhodes and growth rates.
 
-A polhode, a curve of torque-free omega, is drawn as directions of the angular momentum.
+Polhodes, curves of torque-free omega, are drawn as directions of the angular momentum.
 """
 
 import math
@@ -132,8 +132,8 @@ _POINTS = 181
 def rotations_picture(scene: Scene) -> Picture:
     """Return the picture of a scene's polhodes and of the growth rates of all bodies.
 
-    The scene must have moments. The right panel shows the growth rate about the middle axis,
-    divided by the spin, and marks the cases of Table 1.
+    The scene must have moments. The right panel shows the growth rate about the middle axis over
+    the spin, and marks the cases of Table 1.
     """
     from matplotlib.figure import Figure
 
@@ -226,10 +226,9 @@ def _square(axes: "Axes", scene: Scene) -> list[list[Any]]:
 def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
     """Yield the name and the points, shape (n, 3), of torque-free curves of L / abs(L).
 
-    L is the angular momentum along the body axes. The last two curves are the separatrix, in the
-    planes L3 / L1 = +- sqrt((j1 - j2) / (j2 - j3)), with j = 1 / I and the middle moment about axis
-    2. With two equal moments both planes are perpendicular to the third axis. A sphere has no
-    curves.
+    L is the angular momentum along the body axes. The last two curves are the separatrix: if axis 2
+    is the middle one, it is in the planes L3 / L1 = +- sqrt((j1 - j2) / (j2 - j3)), j = 1 / I. With
+    two equal moments both planes are perpendicular to the third axis. A sphere has no curves.
     """
     high, middle, low = sorted(range(3), key=lambda axis: moments[axis])
     j = min(moments) / np.array(moments)
@@ -259,8 +258,7 @@ def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
 def growth_of_bodies(first: Array, third: Array) -> Array:
     """Return the growth rate Re Q about each middle axis, divided by the spin.
 
-    Q is the rate of equation 32 with the fastest growth. `first` and `third` are K1 = A and K3 =
-    -C, from -1 to 1.
+    Q is the fastest rate of equation 32; `first` and `third` are K1 = A and K3 = -C, from -1 to 1.
     """
     a, c = first, -third
     # A body has A + B + C + ABC = 0. At two corners, for bodies without extent, B is arbitrary.

@@ -1,8 +1,8 @@
 """The schemes of programs and fixed-step methods, implemented again for comparison.
 
-A scheme computes one step from `omega`, under constant torque (equations 16-18). Its argument `on`
-is a `Numbers`, or a `Series` for power series in the step size, which yield each term of the
-truncation error. Schemes share no code with the methods.
+A scheme computes one step from `omega` under constant torque (equations 16-18), sharing no code
+with the methods. Its argument `on` is a `Numbers`, or a `Series` for power series in the step size,
+which yield each term of the truncation error.
 """
 
 import math
@@ -136,8 +136,8 @@ def collocation_singular(program: str) -> Scheme:
 def runge_kutta_4(on: Numbers, omega: Array, punched: bool = False) -> Array:
     """Return omega after a step of classical Runge-Kutta (eq. 31).
 
-    If `punched`, it is the first step of the original program, in which the third and the fourth
-    stage start from the point of the stage before instead of from `omega`.
+    If `punched`, it is the first step of the original program, whose third and fourth stage start
+    from the point of the stage before instead of from `omega`.
     """
     first = on.times_step(on.rate(omega))
     at = omega + 0.5 * first
@@ -160,8 +160,8 @@ def improved_euler(on: Numbers, omega: Array) -> Array:
 def taylor_3(on: Numbers, omega: Array) -> Array:
     """Return omega after a step of the Taylor method with three terms (eq. 30).
 
-    As the right-hand side F is quadratic, its derivative in the direction F is exactly half of
-    F(omega + F) - F(omega - F).
+    As the right-hand side F is quadratic, its derivative along F is exactly half of F(omega + F) -
+    F(omega - F).
     """
     rate = on.rate(omega)
     along = 0.5 * (on.rate(omega + rate) - on.rate(omega - rate))
@@ -208,8 +208,8 @@ def local_error(scheme: Scheme, scene: Scene, omega: Array) -> Array:
 def spacing(count: int) -> Sequence[Fraction]:
     """Return the weights of a central difference for the first derivative.
 
-    Weight i, counted from 1, multiplies the difference of the values at i and -i spacings. The sum
-    over `count` pairs, divided by the spacing, is exact for polynomials up to degree 2 count.
+    Weight i, from 1, multiplies the difference of the values at i and -i spacings. The sum, divided
+    by the spacing, is exact for polynomials up to degree 2 count.
     """
     middle = math.comb(2 * count, count)
     return [

@@ -1,7 +1,7 @@
 """Predicted truncation and rounding errors of fixed steps at the end of a scene.
 
-The state-transition matrix propagates the errors of the steps to the end. Truncation errors are
-computed by `schemes`, without a run of the methods.
+The state-transition matrix propagates the errors of the steps to the end. Truncation errors come
+from `schemes`, without a run of the methods.
 """
 
 import math

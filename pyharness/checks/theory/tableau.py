@@ -1,9 +1,9 @@
 """Weighted residual methods as Runge-Kutta tableaux, for any step size.
 
 The methods are collocation, subdomain, Galerkin and least squares, with the trial function omega(0)
-+ c1 t + ... + cn t**n. Each method projects the right-hand side f along the step on the polynomials
-of degree n - 1; the projection is the derivative of the trial function. It is computed on the unit
-interval s = t / h in the well-conditioned basis of Legendre polynomials.
++ c1 t + ... + cn t**n. Its derivative is a projection of the right-hand side f along the step on
+the polynomials of degree n - 1, computed on the unit interval s = t / h in the well-conditioned
+basis of Legendre polynomials.
 """
 
 from dataclasses import dataclass
@@ -36,11 +36,10 @@ def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None =
     """Return the tableau of one weighted residual method.
 
     `weighting` is "collocation", "subdomain", "galerkin" or "least-squares", `terms` is n; `points`
-    is for collocation, as in `grid`. The other weightings use Gauss-Legendre quadrature with m
-    points, exact up to degree 2m - 1. For constant torques the products of two omegas have degree
-    2n, and the weight functions n (Galerkin), n - 1 (least squares) or 0 (subdomain). Under torques
-    that vary with time the error of the quadrature is of order 2n + 1 or higher, above the method's
-    order.
+    is for collocation, as in `grid`. The other weightings use Gauss-Legendre quadrature, exact
+    under constant torque: products of two omegas have degree 2n, and the weight functions n
+    (Galerkin), n - 1 (least squares) or 0 (subdomain). Under torques that vary with time its error
+    is of order 2n + 1 or higher, above the method's order.
     """
     n = terms
     if weighting == "collocation":

@@ -37,10 +37,10 @@ BITS = Basis(
 class Name:
     """The name of a check. Its id joins the parts by slashes, as in ``cells/two-term``.
 
-    `suite` is a kind of checks of `verify`, or a trial of `stress`. `subject` is a program or
-    method. `circumstance` names the problem; if this is a scene, `scene` holds it. `setting` is a
-    tolerance, step size or listing, and `quantity` the compared number. `command` (``verify`` or
-    ``stress``), the id and `options` form the command that repeats the check.
+    `suite` is a kind of checks of `verify`, or a trial of `stress`; `subject` is a program or
+    method. `circumstance` names the problem, with its `scene`, if any. `setting` is a tolerance,
+    step size or listing, `quantity` the compared number. `command` (``verify`` or ``stress``), the
+    id and `options` repeat the check.
     """
 
     suite: str
@@ -152,7 +152,7 @@ _OF_ANY = len(fields(Check))
 
 @dataclass(frozen=True)
 class Sample(Check):
-    """A check in a random scene; reports group such checks by the three fields below."""
+    """A check in a random scene, with three fields by which reports group such checks."""
 
     entrance: str = ""  # call that solved the scene, as in ``solve-taylor``
     tolerance: float = math.nan
@@ -163,7 +163,7 @@ class Sample(Check):
 class Attempt:
     """A deferred computation of all checks whose ids begin with the id of `name`.
 
-    ``make(name)`` is called only if one of these checks is requested.
+    ``make(name)`` is called only if one of them is requested.
     """
 
     name: Name
@@ -210,8 +210,8 @@ def run_suites(
 ) -> Iterator[Check]:
     """Yield the requested checks of all suites (kinds of checks).
 
-    An exception becomes a failed check. Only NotBuiltError is raised, and InputError in the suites
-    `of_the_user`, which read files of the user.
+    An exception becomes a failed check, except NotBuiltError, and InputError in the suites
+    `of_the_user`, which read the user's files.
     """
     for suite, attempts in suites.items():
         raised = (NotBuiltError, InputError) if suite in of_the_user else (NotBuiltError,)
@@ -228,7 +228,7 @@ def requested_suites(suites: Iterable[str], only: Sequence[str]) -> list[str]:
 
 
 def severity(check: Check) -> tuple[bool, float]:
-    """Return a sort key: passed before failed checks, then by the ratio of value to limit."""
+    """Return a sort key: passed before failed, then by the ratio of value to limit."""
     if check.value is None or check.limit is None or check.value == check.limit == 0.0:
         return not check.passed, 0.0
     ratio = abs(check.value) / check.limit if check.limit else math.inf

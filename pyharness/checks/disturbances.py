@@ -1,8 +1,8 @@
 """Amplification of perturbations by the programs, and step sizes at which runs diverge.
 
-The amplification by a step is measured in a run, and derived exactly in `theory.amplification`. The
-two may therefore differ by rounding errors only. The step sizes of divergence are compared with
-those that linear stability predicts. J is the Jacobian of Euler's equations (13-15 of the thesis).
+The amplification by a step, measured in a run, may differ only by rounding errors from the exact
+one of `theory.amplification`. The step sizes of divergence are compared with those that linear
+stability predicts. J is the Jacobian of Euler's equations (13-15 of the thesis).
 """
 
 import math
@@ -94,8 +94,8 @@ def eigenvalues(scene: Scene) -> Array:
 def first_step(scene: Scene, listing: Listing) -> Probe:
     """Return the 3 x 3 derivative of the first step at a steady rotation, measured and derived.
 
-    A step is a polynomial of omega with known degree. Differences over enough neighbours therefore
-    give its derivative exactly, except for rounding.
+    As a step is a polynomial of omega with known degree, differences over enough neighbours give
+    its derivative exactly, except for rounding.
     """
 
     def stepped(omega: Array) -> Array:
@@ -112,8 +112,8 @@ def first_step(scene: Scene, listing: Listing) -> Probe:
 def later_steps(scene: Scene, listing: Listing) -> Probe:
     """Return the perturbation of a spinning top after all steps of a scene, measured and derived.
 
-    omega3 is the spin; omega1 and omega2 are the perturbation. Euler's coefficient C and the torque
-    are zero, so that the equations are linear and the perturbation may have any size.
+    omega3 is the spin; omega1 and omega2 are the perturbation. C and the torque are zero, so that
+    the equations are linear and the perturbation may have any size.
     """
     rows = _run(scene, listing)
     found = rows[-1, :2] if len(rows) == scene.steps else np.full(2, np.nan)
@@ -136,7 +136,7 @@ def later_steps(scene: Scene, listing: Listing) -> Probe:
 def complex_step(listing: Listing, step: int, z: complex) -> Probe:
     """Return the growth factor of a collocation step on x' = z x, measured and derived.
 
-    The step, of 1 s, is number `step` of a run of the Python version.
+    The step, of 1 s, is number `step` of a run in Python.
     """
     program = listing.program
     moved = _moved(listing, step)
@@ -158,8 +158,8 @@ def observed_boundary(listing: Listing, direction: complex) -> Probe:
     """Return the distance of z from 0 at which perturbations begin to grow, measured and derived.
 
     z is the step size times an eigenvalue of J. The distance is bisected along `direction`, -1 or
-    1j, in runs of a spinning top. With the defect `base-not-restored` a constant part of omega
-    might hide the growth; the change of omega from step to step is then measured instead.
+    1j, in runs of a spinning top. With the defect `base-not-restored`, where a constant part of
+    omega might hide the growth, the change of omega from step to step is measured.
     """
     matrix = amplification(listing)
     expected, slope = boundary(matrix, direction)
@@ -196,8 +196,8 @@ def _moved(listing: Listing, step: int) -> float:
 def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
     """Return the derivative of a collocation step at an unsteady omega, measured and derived.
 
-    With step size h, omega becomes omega + h F + h**2/2 J F + w h**3 Q(F), where F is the
-    right-hand side and Q its quadratic part. Only the weight w depends on the collocation points.
+    A step h takes omega to omega + h F + h**2/2 J F + w h**3 Q(F), where F is the right-hand side
+    and Q its quadratic part. Only the weight w depends on the collocation points.
     """
     program, h = listing.program, scene.step_size
     moved = _moved(listing, step)
@@ -242,8 +242,7 @@ def _differentiated(
 def _units(scene: Scene, program: str, sizes: Array, moved: float = 1.0) -> Array:
     """Return a bound on the rounding error of omega in a step, in units of 2**-53 rad/s.
 
-    The bound is proportional to the sum of the magnitudes of the step's terms; `sizes` bounds
-    abs(omega).
+    It is proportional to the sum of the magnitudes of the step's terms; `sizes` bounds abs(omega).
     """
     on = Numbers(scene, scene.step_size, sizes=True)
     if program == "runge-kutta":
@@ -282,9 +281,9 @@ def divergence(
 ) -> tuple[float, float, float]:
     """Return measured and predicted step size (s) of divergence, and a bound on their difference.
 
-    The bound is relative to the predicted step size. The body spins for `time` (s) about axis 3,
-    which is stable. `smallest_divergent` measures the first step size. With the second, linear
-    theory predicts that the wobble about axis 3 doubles.
+    The bound is relative to the predicted step size, with which the wobble doubles by linear
+    theory. The body spins for `time` (s) about axis 3, which is stable. The measured step size is
+    from `smallest_divergent`.
     """
     found = smallest_divergent(scene, time, runner, smallest)
     a, b, c = scene.euler_coefficients
@@ -310,7 +309,7 @@ def smallest_divergent(scene: Scene, time: float, runner: Runner, smallest: floa
     """Return the smallest step size (s) with which a run diverges.
 
     In such a run a component of omega exceeds twice its largest true value, or the run ends early.
-    Return 0 if the step size is at most `smallest` (s), and infinity if there is none.
+    Return 0 if it is at most `smallest` (s), infinity if there is none.
     """
     bounds = 2.0 * np.array(_bounds(scene, time))
 
@@ -334,8 +333,7 @@ def _doubling(
 ) -> float:
     """Return the smallest step (s) with which, by theory, a wobble grows 2 exp(`missed`) times.
 
-    `missed` allows for a peak between two steps; `rate` is the angular frequency (1/s) of the
-    wobble.
+    `missed` allows for a peak between two steps; `rate` is the wobble's angular frequency (1/s).
     """
     wanted, low, high = math.log(2.0) + missed, smallest, time
     for _ in range(200):

@@ -1,7 +1,7 @@
 """Checks of every method against published results that were not computed here.
 
-The limit is the sum of three parts: the accuracy of the published number, a bound on the method's
-error, and the effect of rounding the problem's numbers to binary64.
+The limit is the sum of the accuracy of the published number, a bound on the method's error, and the
+effect of rounding the problem's numbers to binary64.
 """
 
 import math
@@ -89,8 +89,8 @@ def _triples(triple: Triple | None, part: float) -> Iterator[Triple]:
 def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> Iterator[Check]:
     """Yield checks of each method that accepts a problem: ``external/<problem>/<time>/<method>``.
 
-    Value is the error of a component of omega, in the problem's unit. Of the three components, the
-    one with the largest ratio of value to limit is reported.
+    The value is the error of the component of omega with the largest ratio of error to limit, in
+    the problem's unit.
     """
     for problem in problems:
         # Values are always solved together, so that repeating one check gives the same bits.
@@ -158,8 +158,8 @@ def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -
 def _turns(scene: Scene, times: Sequence[float]) -> Array:
     """Return the change of attitude (rad) at each time when the scene's numbers are rounded.
 
-    It is the sum of the magnitudes of first-order changes or, without a solution, the rounding of
-    quaternions alone.
+    It is the sum of the magnitudes of first-order changes; without a solution, that of quaternions
+    alone.
     """
     turned = np.full(len(times), 8.0 * _HALF_ULP)
     run = method_candidate("auto", METHODS["auto"].finest).rows
@@ -200,7 +200,7 @@ def _as_far_as_solved(
 ) -> tuple[list[_Row], str]:
     """Return the results of `solve` for as many values as possible, and its refusal or "".
 
-    If it refuses all values together, it may still solve those at the first times.
+    If it refuses all values together, it may solve the first ones.
     """
     try:
         return solve(values), ""
@@ -240,9 +240,10 @@ def _program(problem: Problem, value: Value, program: str) -> _Result | None:
     """Return omega by a corrected program at the time of `value`, and a bound on its error.
 
     The step is halved until the estimated error is below a tenth of the published accuracy, or
-    below the rounding error, which is taken as half a unit in the last place for each step. The
-    estimate is twice the change of the result by the last halving, divided by 2**order - 1. Return
-    None if the collocation matrix is singular even for the longest step.
+    below the rounding error, half a unit in the last place for each step. The estimate is twice the
+    change of the result by the last halving, divided by 2**order - 1. Return None if the
+    collocation matrix is singular in the first two runs. Raise InputError if the last run did not
+    complete.
     """
     scene, time = problem.scene, float(value.time)
     finest_print = min(figure.accuracy for figure in value.omega if figure is not None)
@@ -292,7 +293,7 @@ def _scale(scene: Scene, omega: Array) -> float:
 def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
     """Return, by printed time, the change of omega (rad/s) when a scene's numbers are rounded.
 
-    It is zero at times without a solution; each method's check reports why.
+    It is zero at times without a solution.
     """
 
     def solve(values: Sequence[Value]) -> list[Array]:

@@ -1,7 +1,6 @@
 """Published results that were not computed here, and the files that describe them.
 
-A file has a scene, the source of the results, and their printed digits, which determine their
-accuracy.
+A file has a scene, the source of the results, and their printed digits, which set their accuracy.
 """
 
 import math
@@ -72,7 +71,7 @@ def figure(where: str, text: object, good_to: float = 0.0) -> Figure:
     """Return the published number with the digits `text`, and its accuracy.
 
     The accuracy is half a unit of the last digit or, if larger, `good_to`. Raise InputError if
-    `text` is not a number or too large for binary64.
+    `text` is no number or too large for binary64.
     """
     if not isinstance(text, str):
         raise InputError(f"{where}: {kind_of(text)}; allowed: the digits as text, '0.606'")

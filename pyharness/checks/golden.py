@@ -1,8 +1,7 @@
 """The golden record: the trajectories of this version, as exact text.
 
-Each program or method has a file. An entry of the file describes one trajectory: the command that
-prints it, how the run ended, a digest of all rows, and the first, tenth and last row as hexadecimal
-floats.
+Each program or method has a file. An entry describes one trajectory: the command that prints it,
+its ending, a digest of all rows, and the first, tenth and last row as hexadecimal floats.
 """
 
 import hashlib
@@ -92,10 +91,9 @@ def recorded() -> Iterator[Recorded]:
 def golden(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred comparisons with the golden record, if its folder `chosen.record` exists.
 
-    Methods with a tolerance must agree with the record within twice the tolerance, because
-    processors and compilers round differently. Programs and all other methods must agree bit for
-    bit. If another mathematical library computes the torque's sines and cosines, they must agree
-    within the amplified rounding errors.
+    Methods with a tolerance must agree within twice the tolerance, because processors and compilers
+    round differently. Programs and other methods must agree bit for bit or, if another mathematical
+    library computes the torque's sines and cosines, within the amplified rounding errors.
     """
     if not chosen.record.is_dir():
         return
@@ -166,7 +164,7 @@ def read_record(folder: Path) -> dict[str, dict[str, Any]]:
 def files_made(folder: Path) -> set[str]:
     """Return the names of the files in `folder` that `verify --update` made.
 
-    Beside a record, a file with the name of another one is a damaged record.
+    Beside such a file, one with the name of another record is a damaged record.
     """
     found = set()
     for path in folder.glob("*.toml"):
@@ -177,7 +175,7 @@ def files_made(folder: Path) -> set[str]:
 
 
 def update(folder: Path) -> tuple[dict[str, bytes], list[str]]:
-    """Return the files of a new golden record, by name, and its differences from the old record."""
+    """Return the files of a new golden record, by name, and its differences from the old one."""
     known: dict[str, dict[str, Any]] = {}
     # Beside a damaged old record, every trajectory counts as new.
     with suppress(InputError):

@@ -1,9 +1,8 @@
 """Checks of methods against the true solution of a scene, within bounds derived beforehand.
 
 Errors of the programs of the thesis are reported without a bound. The `flow` of a scene holds its
-error amplification and a bound on rounding errors. `auto`, `quick` and all methods without a
-tolerance run as prepared solvers. These report a refused scene in their result; the other methods
-raise InputError.
+error amplification and a bound on rounding errors. `auto`, `quick` and methods without a tolerance
+run as prepared solvers, which report a refused scene in their result; the others raise InputError.
 """
 
 import math
@@ -69,7 +68,7 @@ FORMS = ("closed-form", "auto")
 def _series(name: str) -> tuple[float, ...]:
     """Return a method's step for y' = y**2, y(0) = 1, as coefficients of powers of the step size.
 
-    This is each of Euler's equations with A = B = C = 1 and equal components.
+    This is Euler's equations with A = B = C = 1 and equal components.
     """
     ones = np.ones(3)
     equal = Scene("equal", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))
@@ -123,11 +122,10 @@ def check_methods(
     """Yield deferred checks of each method's error at `time` (s) in the scene of `name`.
 
     By default, the limit is the sum of the amplified tolerance, the amplified rounding error, and
-    the error of the true solution. For methods with a fixed step, without torque, a bound from the
-    order replaces the tolerance. There is no limit if neither tolerance nor bound is known, or if
-    the sum leaves fewer than two digits of omega. Without torque, energy and momentum always have
-    a limit, because their errors are not amplified. Refusing a scene is a failure, unless
-    `refusable` permits it.
+    the error of the true solution. For fixed steps without torque, a bound from the order replaces
+    the tolerance. There is no limit without tolerance and bound, or if the sum leaves fewer than
+    two digits of omega. Without torque, energy and momentum always have a limit, because their
+    errors are not amplified. A refusal fails, unless `refusable` permits it.
     """
     scene = scene_of(name)
     known = cache(partial(truth, scene, time))
@@ -157,8 +155,8 @@ def _steps(scene: Scene, time: float) -> int:
 def refusable(tried: MethodRun, truth: Truth, why: str) -> bool:
     """Return whether a method may refuse a scene.
 
-    `quick` may refuse any scene; `closed-form`, a scene without a closed form; a series method, a
-    scene in which the phase of a sine or cosine of the torque exceeds 1e8 rad by the end.
+    `quick` may refuse any scene; `closed-form`, one without a closed form; a series method, one in
+    which the phase of a sine or cosine of the torque exceeds 1e8 rad by the end.
     """
     method, scene = tried.method, tried.scene
     if method == "closed-form":
@@ -171,8 +169,8 @@ def refusable(tried: MethodRun, truth: Truth, why: str) -> bool:
 def _derived(truth: Truth, tried: MethodRun) -> float | None:
     """Return the limit of a method's error, relative to the largest omega.
 
-    It is None without a bound on the errors of steps, and infinite if it would leave fewer than two
-    digits of omega.
+    It is None without a bound on the errors of steps, infinite if it leaves fewer than two digits
+    of omega.
     """
     made = promised_sum(tried, truth)
     if truth.exact and tried.method in FORMS:
@@ -228,8 +226,8 @@ def scene_of(name: Name) -> Scene:
 def promised_sum(tried: MethodRun, truth: Truth) -> float | None:
     """Return a bound on the summed errors of steps, relative to the largest omega, or None.
 
-    For fixed steps without torque, it is infinite if the product of the largest Euler coefficient,
-    the largest omega and the step is 0.5 rad or more.
+    For fixed steps without torque, it is infinite if the largest Euler coefficient times the
+    largest omega times the step is 0.5 rad or more.
     """
     method = tried.method
     if method not in FIXED_STEP or not truth.exact:
@@ -248,8 +246,7 @@ def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:
 
     The error is relative to `largest` (rad/s). Energy and squared momentum are sums of q w**2 over
     the components w, where q is the moment or its square. An error e of every component changes
-    such a sum by at most 2 e times the sum of q abs(w). The observed change therefore bounds e from
-    below.
+    such a sum by at most 2 e times the sum of q abs(w), so that the change bounds e from below.
     """
     assert scene.moments is not None
     if not np.isfinite(omega).all():

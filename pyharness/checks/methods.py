@@ -3,9 +3,9 @@
 The limit of an error is the requested tolerance. Errors of omega are relative to the largest omega,
 errors of the attitude are angles (rad).
 
-An order is the power of the step size to which errors are proportional. To measure orders, omega of
-the programs is compared with `solve_ivp`. The programs' translational velocity and the methods with
-a fixed step are compared with the reference.
+An order is the power of the step size to which errors are proportional. It is measured against
+`solve_ivp` for the programs' omega, against the reference for their translational velocity and for
+methods with a fixed step.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -70,7 +70,7 @@ def methods(chosen: Selection) -> Iterator[Attempt]:
 def prepared(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks of prepared solvers, at positive and negative times.
 
-    With the scene's step size, prepared solvers must agree bit for bit with the unprepared method.
+    With a fixed step, they must agree bit for bit with the unprepared method.
     """
     for case in cases(chosen):
         scene = case_scene(case)
@@ -218,8 +218,8 @@ def in_few_steps(scene: Scene, time: float) -> Scene:
 def order_if_seen(scene: Scene, truth: Callable[[], Reference], name: Name) -> Check:
     """Return the check of the order of the fixed-step method in `name`.
 
-    The order is reported, but not checked, if the scene is too fast or sensitive for 4096 steps, or
-    if the torque has a table, because steps across its changes lower the order.
+    The order is only reported if the scene is too fast or sensitive for 4096 steps, or if the
+    torque has a table, because steps across its changes lower the order.
     """
     method = name.setting or name.subject
     found = _order_of_method(scene, method, truth(), most_steps=_MOST)

@@ -1,7 +1,7 @@
 """Checks of a port, an implementation of the programs in any language, against the twins.
 
 A twin is our Python version. Results must agree bit for bit in random scenes and in all cells, the
-combinations of program, case, defects and readings. `docs/how-to/ports.md` describes the protocol.
+combinations of program, case, defects and readings. Protocol: `docs/how-to/ports.md`.
 """
 
 import math
@@ -40,8 +40,8 @@ _LIBRARY = "the torque has sines or cosines, whose last bits differ between libr
 class Cell:
     """A run to request from a port.
 
-    `of` is the name of the check of this run; `options`, given to ``verify --port``, request this
-    run alone. `lipschitz` is the constant of the stop test (1/s).
+    `of` is the name of its check; `options`, given to ``verify --port``, request this run alone.
+    `lipschitz` is the constant of the stop test (1/s).
     """
 
     name: str
@@ -67,8 +67,8 @@ class Cell:
 class PortCheck(Check):
     """The comparison of a port with the Python version in one run.
 
-    `difference` describes the first step that differs, with the value of each variable. `seconds`
-    is the time (s) until the port's answer.
+    `difference` has the values of all variables in the first step that differs; `seconds` is the
+    time (s) until the port's answer.
     """
 
     seconds: float | None = None
@@ -90,8 +90,8 @@ def random_cells(
 ) -> list[Cell]:
     """Return runs in random scenes, named as in ``random/7/two-term`` and ordered by number.
 
-    `cells` has the beginnings of the names of the runs to return, or is empty for all `draws`
-    scenes. A number in `cells` may exceed `draws`.
+    `cells` has the beginnings of the requested names, or is empty for all `draws` scenes. A number
+    in `cells` may exceed `draws`.
     """
     named = {int(match[1]) for each in cells if (match := _DRAWN.match(each))}
     found = []
@@ -109,8 +109,8 @@ def random_cells(
 def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Iterator[PortCheck]:
     """Yield checks that a port, started by `command`, agrees bit for bit with the Python version.
 
-    An invalid answer is a failed check and ends the comparison. `patience` is the longest wait (s)
-    for an answer. Raise InputError if `command` is empty.
+    An invalid answer is a failed check and ends the comparison. `patience` is the longest wait (s).
+    Raise InputError if `command` is empty.
     """
     name, again = Name("port", "start"), replay_command(command)
     try:
@@ -225,7 +225,7 @@ def port_report(command: str, checks: Sequence[PortCheck], asked: int, seed: str
 
 
 def step_section(check: PortCheck) -> Section:
-    """Return the exact values of all variables in the first step that differs."""
+    """Return a table of all variables in the first step that differs, exactly."""
     assert check.difference is not None
     rows = []
     for each in check.difference["values"]:

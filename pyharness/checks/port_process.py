@@ -1,7 +1,6 @@
-"""The process of a port or an integrator, which answers requests line by line.
+"""The process of a port or an integrator, which answers requests line by line in limited time.
 
-The process must answer within a time limit. At its end, all processes that it started are ended
-too.
+At its end, all processes that it started are ended too.
 """
 
 import contextlib

@@ -2,8 +2,8 @@
 
 The true omega is from `integer_series`, the true attitude from `reference`. An entry point is
 `solve` or a prepared solver, with one method. The tolerance limits the error of omega, relative to
-the largest omega until the last time, or the attitude error (rad). If errors are amplified by the
-factor K, rounding alone causes relative errors of 2e-15 K.
+the largest omega until the last time, or of the attitude (rad). With an error amplification of K,
+rounding alone causes relative errors of 2e-15 K.
 
 Torques that depend on omega or attitude are sums of recorded functions or of ready-made terms. The
 reference's series for them (`pyharness.truth.tape_series`) shares no code with the methods.
@@ -91,9 +91,9 @@ def truth_of(drawn: Draw) -> Truth:
 def may_refuse(tried: MethodRun, truth: Truth, why: str) -> bool:
     """Return whether a method may refuse its run `tried` with the message `why`.
 
-    `auto` may never refuse, `quick` always, and a closed form only near the limits of binary64.
-    Other methods may refuse the kinds of scenes in `_MAY_REFUSE`, and scenes whose error
-    amplification exceeds `_CALM`. SciPy's methods may also refuse a tolerance finer than they meet.
+    `auto` may never refuse, `quick` always, a closed form only near the limits of binary64. Others
+    may refuse the kinds of scenes in `_MAY_REFUSE`, and error amplifications above `_CALM`; SciPy's
+    methods also a tolerance finer than they meet, or below `_FINE` if it takes too much work.
     """
     method, kind = tried.method, tried.scene.name
     if method == "auto":
@@ -189,7 +189,7 @@ def _requested(is_asked: Callable[[str], bool], number: int, entrances: Entrance
 
 
 def _entrances(drawn: Draw, number: int, thin: bool) -> Entrances:
-    """Return deferred runs by name of the entry point; slow methods run in few draws."""
+    """Return deferred runs by entry point; slow methods run in few draws."""
     forms = ["closed-form"] if closed_form(drawn.scene) else []
     names = ["auto", "taylor", f"gauss-{drawn.stages}", *forms]
     if number // 2 % _EVERY_SLOW == 0 and not thin:
@@ -249,7 +249,7 @@ def random_torques(chosen: Selection) -> Iterator[Attempt]:
 
 
 def _torque_entrances(scene: Scene, time: float, source: Random, is_slow: bool) -> Entrances:
-    """Return deferred runs by name of the entry point, at tolerances from 1e-3 to the finest."""
+    """Return deferred runs by entry point, at tolerances from 1e-3 to the finest."""
     times, digits = (_EARLIER * time, time), source.random()
     slow = ("reference", *SCIPY_METHODS) if is_slow else ()
 

@@ -145,9 +145,8 @@ _SAMPLES = (
 def samples(checks: Sequence[Check], rounding: float) -> Section:
     """Return a table of the worst ratios of error to tolerance, by entry point and tolerance.
 
-    Before the division, `rounding` times the error amplification is subtracted from the error. For
-    each of three ranges of the amplification, columns show the number of samples and the worst
-    ratio.
+    `rounding` times the error amplification is first subtracted from the error. The columns show
+    the number of samples and the worst ratio for three ranges of the amplification.
     """
     cells: dict[tuple[str, str], list[list[float]]] = {}
     for check in checks:

@@ -1,7 +1,6 @@
 """Stress trials of a user's scene, with any torque that can be recorded.
 
-The trials compare results with the reference, and apply transformations that must not change the
-motion.
+Results are compared with the reference, and under transformations that must not change the motion.
 """
 
 from collections.abc import Callable, Iterator
@@ -52,7 +51,7 @@ State = tuple[Array, Array | None]
 def scene_trials(scene: Scene, options: str) -> dict[str, Trial]:
     """Return the trials of a scene by name; `options` end the command that repeats them.
 
-    Raise InputError if the torque is opaque, or needs an attitude that the scene does not have.
+    Raise InputError if the torque is opaque, or needs an attitude that the scene lacks.
     """
     if isinstance(scene.torque, StateTorque):
         system_of(scene)  # raises InputError for an opaque torque

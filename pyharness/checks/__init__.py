@@ -1,1 +1,1 @@
-"""Checks: each compares a value with a limit, and names the command that repeats the check."""
+"""Checks: each compares a value with a limit, and names the command that repeats it."""

@@ -54,7 +54,7 @@ def cells(chosen: Selection) -> Iterator[Attempt]:
 
 
 def of_cell(suite: str, listing: Listing, case: int) -> Name:
-    """Return the name of the check of a cell; `suite` is the kind of the check."""
+    """Return the name of a cell's check; `suite` is its kind."""
     return Name(suite, listing.program, f"case-{case}", listing_name(listing))
 
 

@@ -1,4 +1,4 @@
-"""Names and results of checks, and the selection of the checks to run."""
+"""Names and results of checks, and the selection of checks to run."""
 
 import math
 import shlex
@@ -87,11 +87,11 @@ class Name:
         limit: float | None = None,
         basis: Basis | None = None,
     ) -> "Check":
-        """Return a check that the caller has decided; `value` and `limit` are only shown."""
+        """Return a check decided by the caller; `value` and `limit` are only shown."""
         return Check(self, bool(passed), value, limit, basis, note)
 
     def described(self, value: float | None, note: str = "") -> "Check":
-        """Return a check without a limit, which reports `value` and can't fail."""
+        """Return a check without limit, which reports `value` and can't fail."""
         return Check(self, True, None if value is None else float(value), None, None, note)
 
 
@@ -138,7 +138,7 @@ class Check:
         return self.again or self.name.replay
 
     def record(self) -> dict[str, Any]:
-        """Return the check as a dictionary for JSON, including the fields of a subclass."""
+        """Return the check as a dictionary for JSON, with the fields of a subclass."""
         head = {"id": self.id, "passed": self.passed, "value": self.value, "limit": self.limit}
         more = {each.name: getattr(self, each.name) for each in fields(self)[_OF_ANY:]}
         bound = None if self.reference_bound is None else self.reference_bound()
@@ -178,7 +178,7 @@ def make_checks(
 ) -> Iterator[Check]:
     """Yield the finished checks in `attempts`, and the deferred ones that `only` requests.
 
-    An exception becomes a failed check, unless its type is in `raised`.
+    An exception becomes a failed check, unless `raised` has its type.
     """
     for each in attempts:
         if isinstance(each, Check):
@@ -237,7 +237,7 @@ def severity(check: Check) -> tuple[bool, float]:
 
 
 def selected(id: str, only: Sequence[str]) -> bool:
-    """Return whether `only` is empty, or contains the id or the first parts of the id."""
+    """Return whether `only` is empty, or contains the id or its first parts."""
     return not only or any(id == each or id.startswith(each + "/") for each in only)
 
 
@@ -263,7 +263,7 @@ class Selection:
         return may_hold(id, self.only)
 
     def name_draw(self, number: int, subject: str = "") -> Name:
-        """Return the name of the check of `subject` in random draw `number`."""
+        """Return the name of the check of `subject` in draw `number`."""
         draws = f" --draws {self.draws}" if self.draws > DRAWS else ""
         options = f"{draws} --seed {shlex.quote(self.seed)}"
         return Name("random", subject, str(number), options=options)

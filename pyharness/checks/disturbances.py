@@ -1,4 +1,4 @@
-"""Amplification of perturbations by the programs, and step sizes at which runs diverge.
+"""Amplification of perturbations by the programs, and step sizes of divergence.
 
 The amplification by a step, measured in a run, may differ only by rounding errors from the exact
 one of `theory.amplification`. The step sizes of divergence are compared with those that linear
@@ -222,7 +222,7 @@ def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
 def _differentiated(
     stepped: Callable[[Array], Array], scene: Scene, program: str, moved: float = 1.0
 ) -> tuple[Array, float]:
-    """Return the derivative of a step at the initial omega, and a bound on its rounding error."""
+    """Return the derivative of a step at the initial omega, and its rounding error bound."""
     base, count = np.array(scene.omega), _DEGREE[program] // 2
     reach = _REACH * float(np.abs(base).max())
     spread = reach / count
@@ -240,7 +240,7 @@ def _differentiated(
 
 
 def _units(scene: Scene, program: str, sizes: Array, moved: float = 1.0) -> Array:
-    """Return a bound on the rounding error of omega in a step, in units of 2**-53 rad/s.
+    """Return a bound on omega's rounding error in a step, in units of 2**-53 rad/s.
 
     It is proportional to the sum of the magnitudes of the step's terms; `sizes` bounds abs(omega).
     """

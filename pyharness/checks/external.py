@@ -122,7 +122,7 @@ def _names(
 
 
 def _without(problem: Problem, name: Name, refusal: str, value: Value) -> Check:
-    """Return the check of a method without a result; only a user's problem may be refused."""
+    """Return the check of a method without result; only a user's problem may be refused."""
     given = problem.path is not None and name.subject not in _MAY_NOT_REFUSE
     if refusal:
         return name.judged(given, f"{REFUSED}{refusal}")
@@ -156,7 +156,7 @@ def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -
 
 
 def _turns(scene: Scene, times: Sequence[float]) -> Array:
-    """Return the change of attitude (rad) at each time when the scene's numbers are rounded.
+    """Return the change of attitude (rad) at each time by rounding the scene's numbers.
 
     It is the sum of the magnitudes of first-order changes; without a solution, that of quaternions
     alone.
@@ -291,7 +291,7 @@ def _scale(scene: Scene, omega: Array) -> float:
 
 
 def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
-    """Return, by printed time, the change of omega (rad/s) when a scene's numbers are rounded.
+    """Return, by printed time, the change of omega (rad/s) by rounding a scene's numbers.
 
     It is zero at times without a solution.
     """
@@ -310,7 +310,7 @@ def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
 
 
 def _moves(scene: Scene, times: Sequence[float], method: str) -> Array:
-    """Return the first-order change of omega (rad/s) when the scene's numbers are rounded."""
+    """Return the first-order change of omega (rad/s) by rounding the scene's numbers."""
     moved = np.zeros((len(times), 3))
     run = method_candidate(method, METHODS[method].finest).rows
     here = run(scene, times).omega

@@ -77,7 +77,7 @@ def _series(name: str) -> tuple[float, ...]:
 
 
 def truth_of(scene: Scene, time: float, flow: Conditioning | None = None) -> Truth:
-    """Return the true omega of a scene at `time` (s), by elliptic functions if torque-free."""
+    """Return the true omega at `time` (s), by elliptic functions if torque-free."""
     flow = flow or conditioning(scene, time)
     if not _is_free(scene):
         return reference_truth(scene, [time], flow=flow)
@@ -188,7 +188,7 @@ DERIVED = Policy(_derived, STEPS, refusable)
 
 
 def _roundings(tried: MethodRun, truth: Truth) -> float:
-    """Return the number of uncompensated roundings of omega in a run; estimated for SciPy's."""
+    """Return the number of uncompensated roundings of omega; estimated for SciPy's."""
     method, answer = tried.method, tried.answer
     if tried.tolerance is None:
         return 0.0 if method in GAUSS else float(_steps(tried.scene, truth.end))

@@ -1,7 +1,7 @@
-"""Comparison of a method's result with the true solution, and limits of the error.
+"""Comparison of methods with the true solution, and limits of their errors.
 
-Errors of omega and their limits are relative to its largest component; those of the attitude are
-angles (rad).
+Errors and limits of omega are relative to its largest component; those of the attitude are angles
+(rad).
 """
 
 import math
@@ -131,7 +131,7 @@ class Truth:
 
     @cached_property
     def bound(self) -> ErrorBound | None:
-        """Return the error bound of the reference, relative or an angle (rad), or None."""
+        """Return the error bound of the reference (relative, or rad), or None."""
         if self.scene is None or self.reference is None:
             return None
         bound = bound_of(self.scene, self.reference, any_torque=True, effort=self.effort)

@@ -123,7 +123,7 @@ def _prepared(
 
 
 def run_of_solve(method: str, tolerance: float, scene: Scene, times: Sequence[float]) -> MethodRun:
-    """Return a deferred run by `solve` at all `times` (s), with a tolerance that SciPy can meet."""
+    """Return a deferred run by `solve` at `times` (s), with a tolerance that SciPy can meet."""
     if method in SCIPY_METHODS and scene.attitude:
         # SciPy's methods can't meet a smaller tolerance over a long time.
         tolerance = max(tolerance, 1.01 * finest(method, scene, times[-1]))
@@ -211,7 +211,7 @@ def _order_of_method(scene: Scene, method: str, truth: Reference, **limits: Any)
 
 
 def in_few_steps(scene: Scene, time: float) -> Scene:
-    """Return the scene with `_FEWEST` steps until `time` (s), the coarsest for measuring orders."""
+    """Return the scene in 16 steps until `time` (s), the coarsest to measure orders."""
     return replace(scene, step_size=time / _FEWEST, steps=_FEWEST)
 
 
@@ -231,7 +231,7 @@ def order_if_seen(scene: Scene, truth: Callable[[], Reference], name: Name) -> C
 
 
 def judged_order(name: Name, found: Order) -> Check:
-    """Return the check that an order is at most .2 too low, or all errors are rounding errors."""
+    """Return the check that an order is at most .2 too low, or all errors are rounding."""
     missing = None if found.value is None else found.due - found.value
     passed = found.state in ("as due", "rounding") and (missing or 0.0) <= _ORDER_SLACK
     return name.judged(passed, str(found), missing, _ORDER_SLACK, _SLACK)

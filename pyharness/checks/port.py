@@ -133,7 +133,7 @@ def refuse_port(command: str) -> None:
 
 
 def replay_command(command: str, cell: Cell | None = None) -> str:
-    """Return the command that repeats a port's checks, in one run or in all."""
+    """Return the command that repeats a port's checks in one run or all."""
     verb = f"python -m pyharness verify --port {shlex.quote(command)}"
     return verb if cell is None else f"{verb} {cell.options}"
 
@@ -155,7 +155,7 @@ def compared(
 
 
 def differences(twin: Trajectory, answer: Answer) -> list[str]:
-    """Return descriptions of how a port's answer differs from the Python version's run."""
+    """Return descriptions of a port's differences from the Python version's run."""
     wanted, given = _rows(twin), answer.rows
     found = []
     if difference := _difference(wanted, given):
@@ -173,7 +173,7 @@ def differences(twin: Trajectory, answer: Answer) -> list[str]:
 def _difference(wanted: Array, given: Array) -> dict[str, Any] | None:
     """Return the values in the first step that differs, or None.
 
-    They are in hexadecimal, because JSON has no inf and nan.
+    They are hexadecimal, because JSON has no inf and nan.
     """
     for step, (due, row) in enumerate(zip(wanted, given, strict=False), 1):
         if ulps(due, row):

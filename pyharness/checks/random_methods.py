@@ -133,7 +133,7 @@ TORQUE_POLICY = replace(POLICY, may_refuse=_may_refuse_torque)
 
 
 def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
-    """Yield checks of omega by every entry point; without a true solution, a check of the scene."""
+    """Yield checks of omega by every entry point; without a true solution, one of the scene."""
     for number in range(chosen.draws):
         if number // 2 % _EVERY or not chosen.may_ask(f"random/{number}"):
             continue
@@ -230,7 +230,7 @@ def sample(tried: Callable[[], MethodRun], truth: Truth, policy: Policy, name: N
 
 
 def random_torques(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks under torques that depend on the state, if the solution is known."""
+    """Yield deferred checks under torques that depend on the state, with known solutions."""
     for number in range(0, chosen.draws, _EVERY_TORQUE):
         if not chosen.may_ask(f"random/{number}"):
             continue

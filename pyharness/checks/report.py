@@ -78,7 +78,7 @@ def _failure(check: Check) -> str:
 
 
 def marks(checks: Sequence[Check]) -> str:
-    """Return how the checks' limits were set, as in ``proved, derived``; a dash without limits."""
+    """Return how limits were set, as in ``proved, derived``; a dash without limits."""
     found = {check.mark for check in checks}
     return ", ".join(mark for mark in MARKS if mark in found) or "-"
 
@@ -167,7 +167,7 @@ def samples(checks: Sequence[Check], rounding: float) -> Section:
 
 
 def references(checks: Sequence[Check]) -> Section:
-    """Return lines on the references: the largest proved and estimated error, and warnings."""
+    """Return lines on the references: largest proved and estimated errors, and warnings."""
     bounds = [each.reference_bound() for each in checks if each.reference_bound is not None]
     known = [each for each in bounds if each is not None]
     lines = []

@@ -1,12 +1,12 @@
 """Checks of the programs' steps and stops, by recomputing every step from its scheme.
 
 Fortran and Python could share a fault too small to change the order. Each step of the corrected
-programs is therefore recomputed from the program's previous state; only rounding errors may differ.
+programs is therefore recomputed from the previous state; only rounding errors may differ.
 
-The stop test of the Runge-Kutta program is equation 19 of the thesis. A run stops if within a step
-the change of K (right-hand side), divided by the change of U (state), exceeds the stop constant.
-These quotients are recomputed too, and the program is run with stop constants just below and above
-each new maximum of the quotients.
+By the stop test of the Runge-Kutta program (equation 19 of the thesis), a run stops if within a
+step the change of K (right-hand side), divided by the change of U (state), exceeds the stop
+constant. These quotients are recomputed too, and the program is run with constants just below and
+above each new maximum of them.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -52,7 +52,7 @@ _Stages = tuple[_Stage, _Stage, _Stage, _Stage]
 def schemes(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks of the programs' steps.
 
-    The value is the largest difference of a step from the recomputed step, over its rounding bound.
+    The value is the largest difference from the recomputed step, over its rounding bound.
     """
     for case in cases(chosen, (7,)):
         compare = partial(_compare_steps, case_scene(case))
@@ -123,7 +123,7 @@ def _beginning(scene: Scene, run: Trajectory) -> _Stage:
 def _stage(scene: Scene, part: float, state: Array) -> _Stage:
     """Return rates at the fraction `part` of every step, with bounds on their rounding errors.
 
-    They follow from equations 16-18 of the thesis and dV/dt = F/m - omega x V.
+    Equations: 16-18 of the thesis and dV/dt = F/m - omega x V.
     """
     omega, velocity = state[:, :3], state[:, 3:]
     times = scene.step_size * (np.arange(len(state), dtype=np.float64) + part)
@@ -148,7 +148,7 @@ _QUOTIENT = Basis(
 
 @dataclass(frozen=True, eq=False)
 class _Quotients:
-    """The quotients that the program compares with its stop constant, in the program's order."""
+    """The quotients that the program compares with its stop constant, in its order."""
 
     values: Array  # shape (n, m) for n steps, 1/s
     rounding: Array  # shape (n, m): bound on the difference of two computations, 1/s
@@ -158,8 +158,7 @@ class _Quotients:
 def stops(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks of the stops, for every combination of the stop test's defects.
 
-    The value is the largest difference of a quotient from the recomputed one, divided by the bound
-    on its rounding error.
+    The value is the largest difference from a recomputed quotient, over its rounding bound.
     """
     ways = tuple(name for name in names_of("defect", _PROGRAM) if name.startswith("lipschitz"))
     for case in cases(chosen, (3,)):

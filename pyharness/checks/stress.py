@@ -27,7 +27,7 @@ class Trial:
     """A group of checks of `stress` under one kind of extreme conditions.
 
     `bound` describes the limits in words. `attempts` takes the requested beginnings of ids, and may
-    omit checks that are not requested.
+    omit other checks.
     """
 
     name: str
@@ -53,7 +53,7 @@ def stress(only: Sequence[str] = (), trials: Mapping[str, Trial] | None = None) 
 
 
 def worst(checks: Iterable[Check]) -> dict[str, Check]:
-    """Return, by ``trial/method``, the worst check that has a limit and a scene."""
+    """Return, by ``trial/method``, the worst check with a limit and a scene."""
     found: dict[str, Check] = {}
     for check in checks:
         if check.name.scene is None or check.limit is None:

@@ -87,8 +87,8 @@ def _size(check: Check) -> float:
 class _Mark(NamedTuple):
     """A plotted check, with the properties that determine its position and style.
 
-    `kind` is the circumstance's name up to its first number. Marks with equal `rank` and `what` are
-    one series.
+    `kind` is the circumstance up to its first number. Marks with equal `rank` and `what` are one
+    series.
     """
 
     method: str
@@ -116,7 +116,7 @@ def _mark(check: Check) -> _Mark:
 
 
 def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
-    """Return the picture of a trial, with values and limits in a panel for each method.
+    """Return a trial's picture, with values and limits in a panel for each method.
 
     Raise InputError if no check has a value.
     """

@@ -1,7 +1,6 @@
 """Tolerances at which the checks run each method, and limits on its work.
 
-A work limit is a number of evaluations of the right-hand side. It determines which tolerances are
-affordable, and bounds no error.
+A work limit, in evaluations of the right-hand side, determines which tolerances are affordable.
 """
 
 import math
@@ -50,7 +49,7 @@ def finest(name: str, scene: Scene, time: float) -> float:
 
 
 def finest_and_middling(name: str, scene: Scene, time: float) -> list[float]:
-    """Return a method's finest tolerance, and 1e-6 if coarser; for a slow method only 1e-6."""
+    """Return a method's finest tolerance, and 1e-6 if coarser; for slow methods only 1e-6."""
     if name in _ONLY_MIDDLING:
         return [MIDDLING]
     least = finest(name, scene, time)
@@ -60,8 +59,8 @@ def finest_and_middling(name: str, scene: Scene, time: float) -> list[float]:
 def affordable(name: str, scene: Scene, time: float, flow: Conditioning) -> list[float | None]:
     """Return the tolerances at which a method is checked until `time` (s) in a scene.
 
-    These are the finest one within the work limit, and 1e-6 if affordable. For methods with a fixed
-    step and Gauss collocation, None stands for the scene's step size.
+    These are the finest one within the work limit, and 1e-6 if affordable. For fixed steps and
+    Gauss collocation, None stands for the scene's step size.
     """
     if name in FIXED_STEP:
         return [None]

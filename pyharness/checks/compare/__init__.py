@@ -1,1 +1,1 @@
-"""Comparison of programs, methods and prepared solvers with each other and with the reference."""
+"""Comparison of programs, methods, prepared solvers and the reference."""

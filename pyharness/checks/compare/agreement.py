@@ -14,7 +14,7 @@ from pyharness.truth.reference import Reference
 
 @dataclass(frozen=True, eq=False)
 class Accuracy:
-    """The errors of a trajectory against the reference, and its drifts of conserved quantities."""
+    """The errors of a trajectory against the reference, and drifts of conserved quantities."""
 
     omega: tuple[float, float, float]  # largest error of each component (rad/s)
     velocity: float | None  # largest error of any component (m/s)
@@ -37,7 +37,7 @@ class Accuracy:
 def accuracy(scene: Scene, trajectory: Trajectory, truth: Reference) -> Accuracy:
     """Return the errors of a trajectory against `truth`, and the drifts of conserved quantities.
 
-    Errors are compared up to the last time that both have, and are infinite without rows.
+    Errors are up to the last time that both have, and infinite without rows.
     """
     n = min(len(trajectory.time), len(truth.time))
     with np.errstate(all="ignore"):
@@ -84,7 +84,7 @@ def _drift_in_space(scene: Scene, trajectory: Trajectory) -> float:
 def distance(first: Trajectory, second: Trajectory) -> float:
     """Return the largest difference of two trajectories, in units in the last place.
 
-    It is infinite if the numbers of rows differ.
+    It is infinite for different numbers of rows.
     """
     if len(first.time) != len(second.time):
         return math.inf
@@ -118,7 +118,7 @@ def _rows(trajectory: Trajectory, name: str) -> Array:
 def ulps(x: Array | float, y: Array | float) -> float:
     """Return the largest distance, counted in floats, between corresponding elements.
 
-    The distance is 0 between two NaNs, and infinite between a NaN and a number.
+    It is 0 between two NaNs, infinite between a NaN and a number.
     """
     both_nan = np.isnan(x) & np.isnan(y)
     one_nan = np.isnan(x) ^ np.isnan(y)

@@ -1,4 +1,4 @@
-"""Batches of scenes, with arrays of the quantities in which the scenes differ."""
+"""Batches of scenes, with arrays of the quantities in which they differ."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -115,7 +115,7 @@ class Batch:
 
     @property
     def stop_variable(self) -> NDArray[np.int8]:
-        """Return the variable that stopped each run, by its number in STOP_VARIABLES, or 0."""
+        """Return the number in STOP_VARIABLES of the variable that stopped each run, or 0."""
         return self._program.stop_variable
 
     def sample_steps(self, samples: int) -> list[int]:
@@ -138,7 +138,7 @@ class Batch:
     def attitudes(self, samples: int) -> Array:
         """Return the attitudes at the ends of `samples` equal parts, shape (n, samples, 4).
 
-        They are quaternions, scalar first, from the body's axes to the body's axes at time 0.
+        They are quaternions, scalar first, from the body's axes to those at time 0.
         """
         ends = [each.attitude for each in self._samples(samples) if each.attitude is not None]
         found = np.stack(ends, axis=1)

@@ -1,7 +1,7 @@
 """Candidates, a common interface of methods, prepared solvers and programs.
 
 A prepared solver, made by `prepare`, solves one scene by one method, from many initial states.
-Tolerances are relative to the largest component of omega; `effort` multiplies the work limit.
+Tolerances are relative to the largest omega; `effort` multiplies the work limit.
 """
 
 import math
@@ -38,7 +38,7 @@ class End:
 
     @property
     def is_refused(self) -> bool:
-        """Return whether a prepared solver can't solve the scene or exceeded its work limit."""
+        """Return whether a prepared solver refused the scene or exceeded its work limit."""
         return self.ended in ("refused", "gave up")
 
     @property
@@ -68,7 +68,7 @@ class Candidate:
     rows: Callable[..., Trajectory]
 
     def end(self, scene: Scene, time: float) -> End:
-        """Return the result at one `time` (s); raise InputError if the candidate has none."""
+        """Return the result at `time` (s); raise InputError if there is none."""
         ready = self.ready(scene, time)
         return ready.read(ready.run())
 
@@ -94,10 +94,10 @@ def prepared_candidate(
     attitude: bool = False,
     compiled: bool = False,
 ) -> Candidate:
-    """Return a candidate that calls a solver made by `prepare` for the method `name`.
+    """Return a candidate that calls a prepared solver of the method `name`.
 
     If `primed`, the solver is first called with another omega, which must not affect the result.
-    Methods with a fixed step, and Gauss collocation without a tolerance, use the scene's step.
+    Fixed-step methods, and Gauss collocation without a tolerance, use the scene's step.
     """
     make: Any = partial(prepare, attitude=attitude, compiled=compiled)
     read = _turned if attitude else _answered
@@ -126,7 +126,7 @@ def program_candidate(
     effort: float = 1.0,
     word: str = BINARY64,
 ) -> Candidate:
-    """Return a candidate that runs a program of the thesis, with the options of `Program.run`."""
+    """Return a candidate that runs a program, with the options of `Program.run`."""
     options = lipschitz, may_stop, velocity
 
     def ready(scene: Scene, time: float) -> Ready:
@@ -149,7 +149,7 @@ def program_candidate(
 
 
 def unstopped(listing: Listing) -> Candidate:
-    """Return a compiled program without stop test and translational velocity as candidate."""
+    """Return a compiled program without stop test and velocity as candidate."""
     return program_candidate(listing, may_stop=False, velocity=False)
 
 

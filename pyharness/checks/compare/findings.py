@@ -23,7 +23,7 @@ _ROUNDING = 4e-15
 
 @dataclass(frozen=True, eq=False)
 class ProgramFinding:
-    """The results of one listing, compared with the reference and the Python version."""
+    """The results of one listing, against the reference and the Python version."""
 
     listing: Listing
     trajectory: Trajectory
@@ -37,7 +37,7 @@ class ProgramFinding:
 
     @property
     def who(self) -> str:
-        """Return the program's name and its listing's label, as in ``two-term original``."""
+        """Return the program and its listing's label, as in ``two-term original``."""
         return f"{self.listing.program} {self.listing.label}"
 
 
@@ -108,7 +108,7 @@ class Comparison:
 
     @property
     def is_complete(self) -> bool:
-        """Return whether every method has all rows, if there are no programs."""
+        """Return whether every method has all rows; true with programs."""
         found = [] if self.programs else [each.trajectory for each in self.methods]
         return all(each is not None and each.has_all_rows for each in found)
 
@@ -116,9 +116,9 @@ class Comparison:
     def unexpected(self) -> tuple[str, ...]:
         """Return a sentence for each unexpected result.
 
-        With programs, unexpected are differences between Fortran and Python, and a corrected
-        program that misses its order. Without programs, they are errors above the limit that
-        follows from a method's tolerance, missing rows, and no result at all.
+        With programs: if Fortran and Python differ, or a corrected program misses its order.
+        Without programs: if a method's error exceeds the limit that follows from its tolerance,
+        rows are missing, or no method has a result.
         """
         found = [] if self.programs else [*filter(None, map(self._excess, self.methods))]
         if not self.programs and all(each.trajectory is None for each in self.methods):
@@ -152,6 +152,6 @@ class Comparison:
 
     @property
     def not_judged(self) -> tuple[str, ...]:
-        """Return a sentence for each corrected program whose order could not be determined."""
+        """Return a sentence for each corrected program of undecided order."""
         orders = [(each.who, each.order) for each in self.programs if each.order is not None]
         return tuple(f"{who}: {order}" for who, order in orders if not order.is_judged)

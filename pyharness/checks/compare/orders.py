@@ -60,7 +60,7 @@ class Order:
 
     @property
     def is_judged(self) -> bool:
-        """Return whether the measurement decides if the method has its order."""
+        """Return whether the measurement decides about the order."""
         return self.state in ("as due", "rounding", "misses")
 
     def __str__(self) -> str:
@@ -84,8 +84,8 @@ def measured_order(
 ) -> Order:
     """Return the measured order with which omega of a compiled program converges to `truth`.
 
-    The state is `sensitive` if the error may be amplified rounding. A program that does not
-    converge has the state `misses` if a textbook method of the same order converges.
+    A program that does not converge has the state `misses` if a textbook method of the same order
+    converges, and `sensitive` if the error may be amplified rounding.
     """
 
     def omega(finer: Scene) -> Array:
@@ -121,8 +121,8 @@ def order_of(
 
     `solution` returns `quantity` after each step, shape (n, 3), with fewer rows after an overflow.
     The measurement ends when the orders from `pairs` consecutive halvings are all at least `due` -
-    0.5 or all smaller, or when the error is only rounding. A run has at most `most_steps` steps, by
-    default 2**18, or more if eight halvings require it.
+    0.5 or all smaller, or the error is only rounding. A run has at most `most_steps` steps, by
+    default 2**18, or more if eight halvings need it.
     """
     n = len(truth.time)
     if n < scene.steps:

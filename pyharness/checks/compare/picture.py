@@ -42,8 +42,8 @@ def _curves(comparison: Comparison) -> list[tuple[str, str, Trajectory, Accuracy
 def comparison_picture(comparison: Comparison) -> Picture:
     """Return a picture with one column per program or method.
 
-    Its panels show the components of omega and their largest error (rad/s), and the error of the
-    attitude (rad) if it is compared.
+    Its panels show the components of omega, their largest error (rad/s) and, if compared, the error
+    of the attitude (rad).
     """
     from matplotlib.figure import Figure
 

@@ -37,7 +37,7 @@ _DRIFTS = (Column("energy", short), Column("mom.sq", short))
 def comparison_report(comparison: Comparison, numerics: bool = False) -> Report:
     """Return the report of a comparison.
 
-    Without `numerics`, tables have only the programs' steps, stops and errors.
+    Without `numerics`, it has only the programs' steps, stops and errors.
     """
     has_programs = bool(comparison.programs)
     numerics = numerics or not has_programs

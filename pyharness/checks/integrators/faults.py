@@ -1,7 +1,7 @@
 """Known faults of integrators, each with the motion that a faulty integrator computes.
 
-This motion is our solution of another scene, or our solution in other conventions. An integrator
-has the fault if it converges to this motion.
+This motion is our solution of another scene, or in other conventions. An integrator has the fault
+if it converges to it.
 """
 
 import math
@@ -34,10 +34,10 @@ class State(NamedTuple):
 class Fault:
     """A fault of an integrator: its name, a sentence on it, and its changes.
 
-    The function `scene` returns the scene whose motion the faulty integrator computes, or None if
-    the fault has no effect. `times` returns the times (s) of its states, from the requested times
-    and the step size (s). `state` then changes the states; its second argument is the right scene.
-    If `of_step`, the faulty states approach the true ones as the step decreases.
+    `scene` returns the scene whose motion the faulty integrator computes, or None if the fault has
+    no effect. `times` returns the times (s) of its states, from the requested times and the step
+    size (s). `state` then changes the states; its second argument is the right scene. If `of_step`,
+    the states approach the true ones as the step decreases.
     """
 
     name: str
@@ -121,7 +121,7 @@ def _in_order(*order: int) -> Callable[[Scene], Scene]:
 
 
 def in_space(attitude: Array, vectors: Array) -> Array:
-    """Return n vectors, shape (n, 3), about the axes of space from those about the body axes."""
+    """Return vectors about the axes of space, shape (n, 3), from those about the body axes."""
     q = attitude.T
     turned = product(product(q, (np.zeros(len(vectors)), *vectors.T)), _conjugate(q))
     return np.array(turned[1:]).T
@@ -134,8 +134,8 @@ def _conjugate(q: Any) -> Any:
 def _with_space_rates(scene: Scene) -> Scene:
     """Return the scene of p and -omega, where q' = (0, omega) q/2 instead of q' = q (0, omega)/2.
 
-    The conjugate p of q satisfies p' = p (0, -omega)/2, and -omega satisfies Euler's equations with
-    opposite gyroscopic term and torque.
+    The conjugate p of q satisfies p' = p (0, -omega)/2, -omega Euler's equations with opposite
+    gyroscopic term and torque.
     """
     start, back = _conjugate(scene.attitude), np.negative(scene.omega).tolist()
     opposite = _with_gyroscopic(-1.0, -1.0, -1.0, applied=-1.0)(scene)

@@ -1,7 +1,7 @@
 """Checks of an integrator of rigid bodies in any language, against the true solution.
 
 Errors are measured in random scenes with decreasing steps or tolerances. If the integrator
-converges to another motion, the fault is named (docs/how-to/integrators.md).
+converges to a faulty motion, the fault is named (docs/how-to/integrators.md).
 """
 
 import math
@@ -96,8 +96,7 @@ def judge_integrator(
 
     `chosen` are the problems (random scenes), `due` is the required order. ``again(name)`` returns
     the command that repeats the checks in a scene; `told` receives the number of finished problems
-    and the name of the next. An invalid answer ends the checks. Raise InputError for an empty
-    command.
+    and the next name. An invalid answer ends the checks. Raise InputError for an empty command.
     """
     found = Verdict(command, again)
     where = "start"
@@ -131,8 +130,8 @@ def judge_integrator(
 def _unexplained(found: Verdict) -> tuple[str, ...]:
     """Return the problems with failed checks that no fault explains.
 
-    A fault also explains failures by an overflow of the faulty motion and, if it lowers the order,
-    by too low an order.
+    A fault also explains an overflow of the faulty motion and, if it lowers the order, too low an
+    order.
     """
     faults = {x.name: x.problems for x in found.findings if x.name not in FIRST_ORDER}
     explained = {*chain.from_iterable(faults.values()), *(["long"] if faults else [])}

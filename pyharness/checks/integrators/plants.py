@@ -34,7 +34,7 @@ class IntegratorPlant:
     """A fault planted in an integrator, and the name by which it must be recognised.
 
     `request` changes the request, `state` the answered states. `advance` computes the attitude
-    after a step from the attitude before it, omega (rad/s) before and after, and the step size (s).
+    after a step from that before it, omega (rad/s) before and after, and the step size (s).
     """
 
     name: str
@@ -182,7 +182,7 @@ def with_plant(ask: Ask, plant: IntegratorPlant, scene: Scene) -> Ask:
 
 
 def self_test(command: str, chosen: Sequence[Problem], due: float = 1.0) -> Iterator[Outcome]:
-    """Yield the outcome of the control, without a fault, then the outcome with each planted fault.
+    """Yield the outcome of the control, without a fault, then with each planted fault.
 
     If an answer of the control is invalid, only the failed control is yielded.
     """

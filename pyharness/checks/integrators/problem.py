@@ -2,7 +2,7 @@
 
 The drift is the change of conserved quantities in a long torque-free motion: relative for energy
 and |L|, an angle (rad) for the direction of the angular momentum L in space. A level, from 0 to
-`LEVELS` - 1, determines a step size (s) and a tolerance; both decrease as the level increases.
+`LEVELS` - 1, sets a step size (s) and a tolerance, which decrease from level to level.
 """
 
 import math
@@ -91,7 +91,7 @@ class Problem:
 
     @cached_property
     def faulty(self) -> list[tuple[Fault, State]]:
-        """Return the known faults that have an effect, with their states at the smallest step."""
+        """Return the known faults with an effect, and their states at the smallest step."""
         return list(motions(self.scene, self.times, self.step_size(LEVELS - 1)))
 
     def faulty_states(self, fault: Fault, level: int) -> State:
@@ -150,7 +150,7 @@ class Convergence:
     """The errors of a `part`, omega or attitude, in one problem, at decreasing settings.
 
     The errors are proportional to the power `order` of the setting, a step size (s) or a tolerance;
-    `order` is None if all errors are rounding errors.
+    it is None if all errors are rounding errors.
     """
 
     part: str
@@ -188,9 +188,9 @@ def convergence(
 ) -> Convergence:
     """Return the measured order of convergence of errors above `floor`.
 
-    It is the order from the last pair of settings. With `overall`, it is the smaller of two orders:
-    from the first setting to the last, and from the fourth last to the last; this is for
-    tolerances, with which errors decrease irregularly.
+    It is from the last pair of settings. With `overall`, for tolerances, with which errors decrease
+    irregularly, it is the smaller of two orders: from the first setting to the last, and from the
+    fourth last to the last.
     """
     seen = [k for k in range(1, len(errors)) if not errors[k] <= floor]
     order = None
@@ -205,7 +205,7 @@ def convergence(
 
 
 def _power(errors: float, settings: float) -> float:
-    """Return the power p such that `errors` = `settings`**p; both are ratios."""
+    """Return the power p in `errors` = `settings`**p; both are ratios."""
     if math.isnan(errors) or errors <= 0.0:  # the error of the smaller step is infinite
         return 0.0
     return math.log(errors) / math.log(settings)
@@ -228,7 +228,7 @@ class Judged:
     def lost(self) -> int:
         """Return the number of rows that should be finite and are not.
 
-        A level may overflow if the error of the next level and the order predict an error of 1 or
+        A level may overflow if the order and the error of the next level predict an error of 1 or
         more.
         """
         rows = self.finest.lost
@@ -243,7 +243,7 @@ class Judged:
     def error(self, level: int) -> float:
         """Return the larger error of omega (relative) and attitude (rad).
 
-        The result is at least the tolerance or, with a step size, the rounding error.
+        It is at least the tolerance or, with a step size, the rounding error.
         """
         problem, finest = self.problem, self.finest
         by_tolerance = finest.control == "tolerance"
@@ -266,8 +266,7 @@ def problems(seed: str, draws: int, names: Sequence[str] = ()) -> list[Problem]:
 class Drift:
     """The drifts since time 0 at n `times` (s), and the largest `change` from row to row.
 
-    `named` has the drifts, shape (n,), of "energy" and "momentum" and, with an attitude, of
-    "direction".
+    `named` has the drifts, shape (n,), of "energy", "momentum" and, with an attitude, "direction".
     """
 
     times: Array
@@ -278,8 +277,8 @@ class Drift:
 def long_motion(free: Judged) -> tuple[int, Array, float | None]:
     """Return level and times (s) of the long motion, and the limit of the drift between rows.
 
-    The level is the first one whose limits allow enough rows, or else the last. The limit is None
-    if the errors in the problem `free` are too large.
+    The level is the first that allows enough rows; without one, the last or, if errors do not
+    decrease, the first. The limit is None if the errors in the problem `free` are too large.
     """
     control = free.finest.control
     levels = range(_FIRST[control], LEVELS)

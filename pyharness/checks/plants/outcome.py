@@ -14,7 +14,7 @@ CONTROL = "none"
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of one planted fault: whether checks detected it, and how many checks failed."""
+    """The outcome of one planted fault: whether checks detected it, and how many failed."""
 
     name: str
     fault: str

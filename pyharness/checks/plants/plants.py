@@ -1,7 +1,6 @@
 """Planted faults, which test what each check detects.
 
-Compiled programs are altered at their entry point, twins (Python versions) in a copy of their
-source.
+Compiled programs are altered at their entry point, twins (Python versions) in a copy of the source.
 """
 
 import itertools
@@ -59,7 +58,7 @@ def _plus(found: Any, size: float) -> Any:
 
 
 def _off(found: Array, size: float) -> Array:
-    """Return an array with each element enlarged by `size` times the largest element."""
+    """Return an array with elements enlarged by `size` times the largest one."""
     return np.asarray(found + size * np.abs(found).max(initial=0.0) * np.sign(found))
 
 
@@ -283,7 +282,7 @@ def self_test(seed: str, record: Path) -> Iterator[Outcome]:
 
 
 def outcome(plant: Plant, chosen: Selection) -> Outcome:
-    """Return whether any check, apart from the golden record's, detects a planted fault."""
+    """Return whether any check but the golden record's detects a planted fault."""
     with plant.planted(plant.size):
         failed, note = _failed(replace(chosen, only=plant.kinds))
     noticed = failed.total() - failed[_NOT_ENOUGH]
@@ -291,7 +290,7 @@ def outcome(plant: Plant, chosen: Selection) -> Outcome:
 
 
 def _failed(chosen: Selection) -> tuple[Counter[str], str]:
-    """Return the numbers of failed checks by kind, and a note with the id of one of them."""
+    """Return the numbers of failed checks by kind, and a note with one id."""
     names = [check.id for check in verify(chosen) if not check.passed]
     failed = Counter(name.partition("/")[0] for name in names)
     example = min(names, key=lambda name: name.startswith(_NOT_ENOUGH), default="")

@@ -1,4 +1,4 @@
-"""Faults planted in the requests to a port and in its answers, and their self-test."""
+"""Faults planted in a port's requests and answers, and their self-test."""
 
 import copy
 import json
@@ -232,7 +232,7 @@ def _planted(process: PortProcess, cells: Sequence[Cell]) -> Iterator[Outcome]:
 
 
 def _parsed(line: bytes) -> dict[str, Any]:
-    """Return a valid answer as a dictionary, with numbers written as text converted to floats."""
+    """Return a valid answer as a dictionary, with numbers in text converted to floats."""
     answer: dict[str, Any] = json.loads(line)
     answer["rows"] = [[read_number("rows", x) for x in row] for row in answer["rows"]]
     change_at("stop.quotient", partial(read_number, "stop"))(answer)

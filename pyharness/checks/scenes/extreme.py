@@ -56,7 +56,7 @@ def _separatrix() -> Iterator[Circumstance]:
     """Yield perturbed rotations about the axis of the middle moment.
 
     Perturbations are from 1e-1 to 1e-15 rad/s. At a flip, omega about that axis changes its sign.
-    End times are before the first flip, during it, and during the fifth. Further scenes start on
+    End times are before the first flip, during it, and during the fifth; further scenes start on
     the separatrix.
     """
     for d in (10.0**-k for k in range(1, 16)):

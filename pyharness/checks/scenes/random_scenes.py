@@ -184,7 +184,7 @@ def _slow_waves(source: Random) -> Scene:
 
 
 def _many_speeds(source: Random) -> Scene:
-    """Return a random scene with torque waves of 1e-6 to 630 rad/s, some both sine and cosine."""
+    """Return a scene with torque waves of 1e-6 to 630 rad/s, some both sine and cosine."""
     scene = _plain(source)
     some: list[list[tuple[list[float], float]]] = [[], []]
     for _ in range(source.randint(2, 6)):
@@ -212,7 +212,7 @@ def _far_scale(source: Random) -> Scene:
 
 
 def _sensitive(source: Random) -> Scene:
-    """Return a random scene near a middle axis, where errors may grow by a factor of up to 1e6."""
+    """Return a scene near a middle axis, where errors may grow by a factor of up to 1e6."""
     low, middle, high = body = _body(source)
     spin = source.choice((-1.0, 1.0)) * 10.0 ** source.uniform(-1.0, 1.0)
     rate = abs(spin) * ((high - middle) * (middle - low) / (high * low)) ** 0.5
@@ -233,12 +233,12 @@ def _long(source: Random) -> Scene:
 
 
 def _no_body(source: Random) -> Scene:
-    """Return a random scene with coefficients A, B, C that no body has."""
+    """Return a scene with coefficients A, B, C that no body has."""
     return _scene(source, _vector(source, 2.0), None, _vector(source, 1.5))
 
 
 def _extreme(source: Random) -> Scene:
-    """Return a random scene with numbers from nearly all of binary64; most such runs overflow."""
+    """Return a scene with numbers from nearly all of binary64; most runs overflow."""
 
     def any_size() -> float:
         if source.random() < 0.1:
@@ -289,9 +289,9 @@ KINDS = {"plain": _plain, **NASTY, "pointing": _pointing, "driven": _driven}
 
 
 def _law(source: Random, size: float, kinds: int, frequencies: tuple[float, float]) -> TorqueLaw:
-    """Return a random torque law whose components do not exceed `size` (N m, N m/s).
+    """Return a random torque law with components of at most `size` (N m, N m/s).
 
-    `kinds` is the sum of the kinds of terms: 1 constant, 2 linear in time, 4 sine, 8 cosine.
+    `kinds` is a sum of kinds of terms: 1 constant, 2 linear in time, 4 sine, 8 cosine.
     `frequencies` are the lowest and the highest (rad/s).
     """
     low, high = map(math.log10, frequencies)

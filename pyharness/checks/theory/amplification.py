@@ -182,7 +182,7 @@ def boundary(matrix: Amplification, direction: complex) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """The spectral radius of an amplification matrix on a grid of z and on the imaginary axis."""
+    """The spectral radius of a matrix on a grid of z and on the imaginary axis."""
 
     name: str  # the programs and methods with this matrix
     # Spectral radius on the grid, of the matrix from `moving`; shape (imaginary, real).

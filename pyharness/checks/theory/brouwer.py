@@ -232,7 +232,7 @@ def _frequency(a: Array, omega: Array) -> float:
 
 
 def _steepness(a: Array, omega: Array) -> float:
-    """Return the sum of magnitudes of the derivatives of `_frequency` with respect to omega."""
+    """Return the sum of magnitudes of the derivatives of `_frequency` by omega."""
     size = 1e-6 * float(np.abs(omega).max())
     return sum(
         abs(_frequency(a, omega + shift) - _frequency(a, omega - shift)) / (2.0 * size)

@@ -53,7 +53,7 @@ class SteadyRotation:
 
     @property
     def doubling_time(self) -> float | None:
-        """Return the doubling time of the fastest growth exp(Q t) (s), or None without growth."""
+        """Return the doubling time (s) of the fastest growth exp(Q t), or None without growth."""
         rate = self.rates[0].real
         return math.log(2.0) / rate if rate > 0.0 else None
 
@@ -66,7 +66,7 @@ class SteadyRotation:
 
 @dataclass(frozen=True)
 class SteadyRotations:
-    """The steady rotations of a scene, perturbed by the same relative magnitude."""
+    """The steady rotations of a scene, with equal relative perturbations."""
 
     told: str  # text: which steady rotations exist, and which are shown
     disturbance: float  # perturbation divided by the rotation

@@ -1,4 +1,4 @@
-"""The schemes of programs and fixed-step methods, implemented again for comparison.
+"""The schemes of programs and fixed-step methods, implemented again.
 
 A scheme computes one step from `omega` under constant torque (equations 16-18), sharing no code
 with the methods. Its argument `on` is a `Numbers`, or a `Series` for power series in the step size,
@@ -45,7 +45,7 @@ class Numbers:
 class Series(Numbers):
     """Euler's equations for power series in the step size.
 
-    Omega has the shape (TERMS, ..., 3), the first axis for the powers.
+    Omega has the shape (TERMS, ..., 3), powers first.
     """
 
     def rate(self, omega: Array) -> Array:

@@ -1,7 +1,7 @@
 """Predicted truncation and rounding errors of fixed steps at the end of a scene.
 
-The state-transition matrix propagates the errors of the steps to the end. Truncation errors come
-from `schemes`, without a run of the methods.
+The state-transition matrix propagates the steps' errors to the end. Truncation errors come from
+`schemes`, without a run of the methods.
 """
 
 import math
@@ -134,7 +134,7 @@ class Forecaster:
     def crossing(self, smallest: float) -> float:
         """Return the step size (s) below which expected rounding exceeds the truncation error.
 
-        The result, found by bisection, is at least `smallest` (s).
+        It is at least `smallest` (s).
         """
         time = float(self._path.times[-1])
         high = max(1, math.floor(time / smallest))

@@ -91,7 +91,7 @@ def _limit(truth: Truth, tried: MethodRun) -> float:
 
 
 def _allowed(method: str, tolerance: float, flow: Conditioning, time: float) -> float:
-    """Return the largest error of the attitude (rad) that a method may have at `time` (s)."""
+    """Return a method's largest allowed error of the attitude (rad) at `time` (s)."""
     made = tolerance * lively(flow.amplification)
     return ATTITUDE if method in FORMS else flow.angle_limit(made, time)
 
@@ -167,10 +167,9 @@ def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterato
 def _montgomery(name: Name) -> Check:
     """Return the check of the body's rotation in a period against Montgomery's formula.
 
-    The angle about the angular momentum L is 2 E T/L minus a solid angle, with energy E and period
-    T. In a period the direction of L encloses this solid angle in the body, about the axis along
-    which its component keeps its sign. Only this check detects a wrong rate of the angle, because
-    the angle is not conserved.
+    The angle about the angular momentum L is 2 E T/L, with energy E and period T, minus the solid
+    angle that the direction of L encloses in the body, about the axis along which its component
+    keeps its sign. Only this check detects a wrong rate of the angle, which is not conserved.
     """
     scene = scene_of(name)
     period = float(period_of(scene) or 0.0)

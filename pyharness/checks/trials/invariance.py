@@ -1,7 +1,7 @@
 """Trial of invariance: results must transform with a rotated or rescaled problem.
 
-Methods whose operations differ only in axes, signs or exponents must return the same bits, all
-others agree within an error bound.
+Methods whose operations differ only in axes, signs or exponents must return the same bits, others
+agree within an error bound.
 """
 
 import random
@@ -52,7 +52,7 @@ SCENES = {
 class Symmetry:
     """A rotation or rescaling of a problem, with its inverse for omega.
 
-    `turn` transforms the scene, and `back` omega in the result. A time t becomes t/`faster`; the
+    `turn` transforms the scene, `back` the resulting omega. A time t becomes t/`faster`; the
     methods in `bitwise` must return the same bits.
     """
 

@@ -1,6 +1,6 @@
 """Trial of length: energy, momentum and phase over a million revolutions, by Brouwer's law.
 
-The phase is the position along the closed curve of omega; `theory.brouwer` states the law.
+The phase is the position along the closed curve of omega; for the law see `theory.brouwer`.
 """
 
 import math
@@ -70,9 +70,9 @@ class Integrator:
     """A method whose error growth is measured, with bounds on the errors of its steps.
 
     `run` returns omega, shape (n, 3), and the number of steps until each time; `noise` bounds the
-    errors of a step of given size (s). `revolutions` is the length, in revolutions, of the longest
-    run from the first initial condition; `others` is that from each other initial condition.
-    `preference` tells whether rounding errors are biased.
+    errors of a step of given size (s). `revolutions` is the length of the run from the first
+    initial condition, `others` from the others, in revolutions. `preference` tells whether rounding
+    errors are biased.
     """
 
     run: Runner
@@ -139,7 +139,7 @@ def _attempts() -> Iterator[Attempt]:
 
 
 def check_growth(integrator: Integrator, name: Name) -> Iterator[Check]:
-    """Yield the checks of fitted powers, and of errors after each number of revolutions."""
+    """Yield checks of fitted powers, and of errors after each number of revolutions."""
     motion = name.circumstance
     for what, found, steps, limits in measured(integrator, MOTIONS[motion], orbit_of(motion)):
         horizons = np.array(REVOLUTIONS[: len(steps)])
@@ -159,8 +159,8 @@ def check_growth(integrator: Integrator, name: Name) -> Iterator[Check]:
 class Drift:
     """The errors of a quantity of a motion, integrated by one method, after n numbers of `steps`.
 
-    `what` is the quantity. `error` is the root mean square over `starts` initial conditions;
-    `limits` are the bounds on it by Brouwer's law.
+    `what` is the quantity, `error` the root mean square over `starts` initial conditions; `limits`
+    are its bounds by Brouwer's law.
     """
 
     motion: str
@@ -173,7 +173,7 @@ class Drift:
 
 
 def curves() -> Iterator[Drift]:
-    """Yield the errors of energy, momentum and phase by every method in every motion."""
+    """Yield the errors of every quantity by every method in every motion."""
     for motion, scene in MOTIONS.items():
         for method, integrator in INTEGRATORS.items():
             for what, found, steps, limits in measured(integrator, scene, orbit_of(motion)):
@@ -185,7 +185,7 @@ def curves() -> Iterator[Drift]:
 def measured(
     integrator: Integrator, scene: Scene, body: Orbit
 ) -> Iterator[tuple[str, Array, Array, list[float]]]:
-    """Yield name, errors, numbers of steps and error bounds of energy, momentum and phase.
+    """Yield name, errors, numbers of steps and error bounds of each quantity.
 
     Errors have the shape (initial conditions, horizons), with NaN after the end of a run.
     """
@@ -209,7 +209,7 @@ def measured(
 
 @cache
 def orbit_of(motion: str) -> Orbit:
-    """Return the Orbit of a motion, with the factors from errors of omega to other errors."""
+    """Return the Orbit of a motion."""
     return brouwer.orbit(MOTIONS[motion])
 
 

@@ -34,7 +34,7 @@ _OVERFLOW = Basis(
 
 
 def _bit_for_bit(method: str, kind: str, scene: Scene, powers: Sequence[int]) -> Iterator[Attempt]:
-    """Yield deferred checks that scaling a motion by a power of two changes no mantissa."""
+    """Yield deferred checks that scaling by a power of two changes no mantissa."""
     time = scene.step_size * scene.steps
     plain = cache(lambda: _tried(method, scene, time))
 

@@ -26,7 +26,6 @@ _UNDISTURBED = Basis(
 
 
 def _undisturbed() -> Iterator[Attempt]:
-    """Yield checks that the unperturbed rotation is constant; `quick` may round once."""
     scene = Scene("middle axis, undisturbed", (0.0, 1.0, 0.0), moments=MIDDLE_AXIS)
     scene = in_steps(scene, _STAYS)
 

@@ -51,7 +51,6 @@ def _attempts() -> Iterator[Attempt]:
 
 
 def _of_case(case: int, listing: Listing | None, place: Name) -> Iterator[Attempt]:
-    """Yield deferred checks of a method's errors, crossing and divergence in a case."""
     before = listing is not None and listing.label == "original"
     method, place = place.subject, replace(place, scene=case_scene(case))
     scenes = {n: replace(case_scene(case), step_size=TIME / n, steps=n) for n in COUNTS}

@@ -1,6 +1,6 @@
 """Trial of threads: concurrent calls must return bit-for-bit identical results.
 
-`choose_instructions` is not called: it must be called before threads start.
+`choose_instructions` is not called, because it must precede all threads.
 """
 
 import random
@@ -53,7 +53,7 @@ _LATE = 20.0  # end time (s)
 
 @dataclass(frozen=True)
 class Job:
-    """A call of a method or program, which returns the bits of its results."""
+    """A call of a method or program, which returns its results' bits."""
 
     subject: str
     scene: Scene
@@ -72,7 +72,7 @@ def _run(only: Sequence[str]) -> Iterator[Check]:
 
 
 def different(jobs: Sequence[Job], repeats: int = _REPEATS) -> list[Job]:
-    """Return the jobs whose bits differ in threads, once for each call that differs."""
+    """Return the jobs whose bits differ in threads, once for each such call."""
     alone = [bits(job) for job in jobs]
     order = [index for index in range(len(jobs)) for _ in range(repeats)]
     random.Random("threads").shuffle(order)

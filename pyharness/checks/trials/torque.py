@@ -61,9 +61,8 @@ class Circumstance:
 def axial(scene: Scene, time: float) -> Truth:
     """Return the true omega at `time` (s) of a symmetric body with a torque along its axis.
 
-    The phase of a wave has a random rounding error in each of n evaluations, at least one in a
-    period. `conditioning` adds all n errors; as they are random, 4 sqrt(n) suffice (Hoeffding
-    1963).
+    The phase of a wave has a rounding error in each of n evaluations, at least one in a period.
+    `conditioning` adds all n; as they are random, 4 sqrt(n) suffice (Hoeffding 1963).
     """
     flow = conditioning(scene, time)
     waves = scene.law.sines + scene.law.cosines
@@ -96,7 +95,7 @@ def summed(scene: Scene, time: float) -> Truth:
 
 
 def _wave(frequency: float) -> Circumstance:
-    """Return a scene with waves of one `frequency` (rad/s) about all axes, for 500 radians."""
+    """Return a scene with waves of one `frequency` (rad/s), for 500 radians."""
     size = 10.0 * frequency
     sine, cosine = ((4.0 * size, 0.0, 2.0 * size), frequency), ((0.0, 3.0 * size, 0.0), frequency)
     law = TorqueLaw(sines=[sine], cosines=[cosine])

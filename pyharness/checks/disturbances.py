@@ -112,8 +112,8 @@ def first_step(scene: Scene, listing: Listing) -> Probe:
 def later_steps(scene: Scene, listing: Listing) -> Probe:
     """Return the perturbation of a spinning top after all steps of a scene, measured and derived.
 
-    omega3 is the spin; omega1 and omega2 are the perturbation. C and the torque are zero, so that
-    the equations are linear and the perturbation may have any size.
+    omega3 is the spin; omega1 and omega2 are the perturbation. Euler's coefficient C and the torque
+    are zero, so that the equations are linear and the perturbation may have any size.
     """
     rows = _run(scene, listing)
     found = rows[-1, :2] if len(rows) == scene.steps else np.full(2, np.nan)

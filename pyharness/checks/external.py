@@ -158,8 +158,8 @@ def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -
 def _turns(scene: Scene, times: Sequence[float]) -> Array:
     """Return the change of attitude (rad) at each time by rounding the scene's numbers.
 
-    It is the sum of the magnitudes of first-order changes; without a solution, that of quaternions
-    alone.
+    It is the sum of the magnitudes of first-order changes; without a solution, the rounding of
+    quaternions alone.
     """
     turned = np.full(len(times), 8.0 * _HALF_ULP)
     run = method_candidate("auto", METHODS["auto"].finest).rows

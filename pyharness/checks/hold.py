@@ -68,7 +68,7 @@ FORMS = ("closed-form", "auto")
 def _series(name: str) -> tuple[float, ...]:
     """Return a method's step for y' = y**2, y(0) = 1, as coefficients of powers of the step size.
 
-    This is Euler's equations with A = B = C = 1 and equal components.
+    This is each of Euler's equations with A = B = C = 1 and equal components.
     """
     ones = np.ones(3)
     equal = Scene("equal", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))

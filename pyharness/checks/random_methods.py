@@ -92,8 +92,9 @@ def may_refuse(tried: MethodRun, truth: Truth, why: str) -> bool:
     """Return whether a method may refuse its run `tried` with the message `why`.
 
     `auto` may never refuse, `quick` always, a closed form only near the limits of binary64. Others
-    may refuse the kinds of scenes in `_MAY_REFUSE`, and error amplifications above `_CALM`; SciPy's
-    methods also a tolerance finer than they meet, or below `_FINE` if it takes too much work.
+    may refuse the kinds of scenes in `_MAY_REFUSE`, and scenes with an error amplification above
+    `_CALM`. SciPy's methods may also refuse a tolerance finer than they meet, or one below `_FINE`
+    that takes too much work.
     """
     method, kind = tried.method, tried.scene.name
     if method == "auto":

@@ -165,7 +165,7 @@ class Batch:
         """Return a program's results at the steps `at`, ascending.
 
         If the scenes differ in `torque_rate`, or the program refuses one, they run one by one,
-        without the error codes IER.
+        without the error codes IER. Only refused scenes have the status REFUSED.
         """
         if "torque_rate" not in self.arrays:  # `run_many` takes one rate for all bodies
             try:

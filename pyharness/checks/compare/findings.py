@@ -72,7 +72,7 @@ class Comparison:
     programs : tuple of ProgramFinding
         One for each listing.
     methods : tuple of MethodFinding
-        One for each of SciPy's methods, or of those requested.
+        One for each method: SciPy's, or those requested.
     growth : float or None
         The error amplification, if known: the largest norm of the state-transition matrix of omega
         from any time to the last.

@@ -60,7 +60,7 @@ class Order:
 
     @property
     def is_judged(self) -> bool:
-        """Return whether the measurement decides about the order."""
+        """Return whether the measurement decides if the method has its order."""
         return self.state in ("as due", "rounding", "misses")
 
     def __str__(self) -> str:

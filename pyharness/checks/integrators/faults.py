@@ -134,8 +134,8 @@ def _conjugate(q: Any) -> Any:
 def _with_space_rates(scene: Scene) -> Scene:
     """Return the scene of p and -omega, where q' = (0, omega) q/2 instead of q' = q (0, omega)/2.
 
-    The conjugate p of q satisfies p' = p (0, -omega)/2, -omega Euler's equations with opposite
-    gyroscopic term and torque.
+    The conjugate p of q satisfies p' = p (0, -omega)/2, and -omega satisfies Euler's equations with
+    opposite gyroscopic term and torque.
     """
     start, back = _conjugate(scene.attitude), np.negative(scene.omega).tolist()
     opposite = _with_gyroscopic(-1.0, -1.0, -1.0, applied=-1.0)(scene)

@@ -119,8 +119,8 @@ def taylor_noise(body: Orbit, scene: Scene, step: float, order: int, left_out: f
     """Return error bounds of a Taylor step, by a running error analysis.
 
     `step` is in s; `left_out` is the truncation error relative to the largest omega. Term k is a
-    sum of k products of lower terms, each with their errors and at most k + 3 roundings. The sum
-    rounds each term three times.
+    sum of k products of lower terms, each with the errors of its factors and at most k + 3
+    roundings. The sum rounds each term three times.
     """
     a = np.abs(np.array(scene.euler_coefficients))
     terms, errors = _terms(body, scene, step, order), [np.abs(body.states)]
@@ -232,7 +232,7 @@ def _frequency(a: Array, omega: Array) -> float:
 
 
 def _steepness(a: Array, omega: Array) -> float:
-    """Return the sum of magnitudes of the derivatives of `_frequency` by omega."""
+    """Return the sum of magnitudes of the derivatives of `_frequency` with respect to omega."""
     size = 1e-6 * float(np.abs(omega).max())
     return sum(
         abs(_frequency(a, omega + shift) - _frequency(a, omega - shift)) / (2.0 * size)

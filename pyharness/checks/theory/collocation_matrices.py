@@ -224,10 +224,10 @@ def solver_roundings(program: str) -> tuple[float, float]:
 def singular_below(program: str, bits: int = 53) -> float:
     """Return the largest step size (s) for which LEQT1F must report a singular matrix.
 
-    With N rows, LEQT1F does so if the computed sum N + p equals N for a scaled pivot p: if p is at
-    most half a unit in the last place of N. As N is a power of 2, this unit is N 2**(1 - bits), and
-    a tie is rounded to N. The last scaled pivot, proportional to step**(N-1), is the first so
-    small.
+    With N rows, LEQT1F does so if the computed sum N + p equals N, that is, if a scaled pivot p is
+    at most half a unit in the last place of N. As N is a power of 2, this unit is N 2**(1 - bits),
+    and a tie is rounded to N. The last scaled pivot, proportional to step**(N-1), is the first to
+    be so small.
     """
     step, matrix = _small_step(program)
     count = len(matrix)

@@ -259,7 +259,7 @@ class Selection:
     thin: bool = False  # a few checks of every kind, for `verify --self-test`
 
     def may_ask(self, id: str) -> bool:
-        """Return whether the selection can include a check whose id begins with `id`."""
+        """Return whether a check whose id begins with `id` may be selected."""
         return may_hold(id, self.only)
 
     def name_draw(self, number: int, subject: str = "") -> Name:

@@ -282,8 +282,7 @@ def divergence(
     """Return measured and predicted step size (s) of divergence, and a bound on their difference.
 
     The bound is relative to the predicted step size, with which the wobble doubles by linear
-    theory. The body spins for `time` (s) about axis 3, which is stable. The measured step size is
-    from `smallest_divergent`.
+    theory. The body spins for `time` (s) about axis 3, which is stable.
     """
     found = smallest_divergent(scene, time, runner, smallest)
     a, b, c = scene.euler_coefficients

@@ -293,7 +293,7 @@ def _scale(scene: Scene, omega: Array) -> float:
 def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
     """Return, by printed time, the change of omega (rad/s) by rounding a scene's numbers.
 
-    It is zero at times without a solution.
+    It is of first order, and zero at times without a solution.
     """
 
     def solve(values: Sequence[Value]) -> list[Array]:
@@ -310,7 +310,6 @@ def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
 
 
 def _moves(scene: Scene, times: Sequence[float], method: str) -> Array:
-    """Return the first-order change of omega (rad/s) by rounding the scene's numbers."""
     moved = np.zeros((len(times), 3))
     run = method_candidate(method, METHODS[method].finest).rows
     here = run(scene, times).omega

@@ -1,8 +1,8 @@
 """Checks of methods against the true solution of a scene, within bounds derived beforehand.
 
-Errors of the programs of the thesis are reported without a bound. The `flow` of a scene holds its
-error amplification and a bound on rounding errors. `auto`, `quick` and methods without a tolerance
-run as prepared solvers, which report a refused scene in their result; the others raise InputError.
+Errors of the programs of the thesis are reported without a bound. `auto`, `quick` and methods
+without a tolerance run as prepared solvers, which report a refused scene in their result; the
+others raise InputError.
 """
 
 import math

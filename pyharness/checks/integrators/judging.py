@@ -242,7 +242,6 @@ def _returned(ask: Ask, judged: Judged) -> list[Check]:
 
 
 def _judge_long(ask: Ask, found: Verdict) -> None:
-    """Append the checks of a long torque-free motion: finite numbers and conserved quantities."""
     free = next((each for each in found.judged if each.problem.scene.torque.is_zero), None)
     if free is None:
         return

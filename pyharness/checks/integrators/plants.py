@@ -149,7 +149,7 @@ PLANTS = (
 
 
 def with_plant(ask: Ask, plant: IntegratorPlant, scene: Scene) -> Ask:
-    """Return a function that requests states in a scene from an integrator with a planted fault."""
+    """Return a function that requests states from an integrator with a planted fault."""
 
     def advanced(advance: Advance, asked: dict[str, Any]) -> Motion:
         h, times = asked["step_size"], asked["times"]

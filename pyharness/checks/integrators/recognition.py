@@ -100,7 +100,6 @@ def _best(
 def _approaches(
     judged: Judged, fault: Fault, states: Callable[[int], State], parts: Sequence[int]
 ) -> bool:
-    """Return whether the answers converge to the states of a fault."""
     errors = [errors_between(states(k), motion) for k, motion in enumerate(judged.answers)]
     floor = max(judged.problem.floor(judged.finest.rounding), _OF_MOTIONS)
     for k in parts:

@@ -131,7 +131,6 @@ _FIXED = [code for name, code in _CODES.items() if name.startswith(("gauss", "rk
 
 
 def _too_large(packed: Array, answer: _Answer, size: float) -> _Answer:
-    """Return an enlarged omega for fixed-step methods and Gauss collocation."""
     omega, status, steps, found = answer
     wrong = omega * (1.0 + size)
     return (wrong if packed[Places.METHOD] in _FIXED else omega, status, steps, found)

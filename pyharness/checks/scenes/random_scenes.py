@@ -233,7 +233,6 @@ def _long(source: Random) -> Scene:
 
 
 def _no_body(source: Random) -> Scene:
-    """Return a scene with coefficients A, B, C that no body has."""
     return _scene(source, _vector(source, 2.0), None, _vector(source, 1.5))
 
 

@@ -76,7 +76,6 @@ def _body(source: Random) -> Body:
 def _moving(
     source: Random, chosen: list[str], body: Body, torque: Any, with_attitude: bool
 ) -> tuple[Scene, float]:
-    """Return a scene with random omega and, if wanted, attitude, and its end time (s)."""
     _, moments, speed = body
     omega = [source.uniform(-speed, speed) for _ in range(3)]
     attitude = [source.gauss(0.0, 1.0) for _ in range(4)] if with_attitude else None

@@ -9,8 +9,8 @@ first stage is evaluated.
 A program is linearly stable where, in the plane of z, the spectral radius is at most 1.
 
 A collocation program evaluates the right-hand side along its first estimate, a straight line, and
-corrects once. At time s of the step it is F + s J F + s**2 Q(F), where F is its value at s = 0 and
-Q its quadratic part.
+corrects once. At time s it is F + s J F + s**2 Q(F) there, where F is the right-hand side at s = 0
+and Q its quadratic part.
 """
 
 from dataclasses import dataclass
@@ -69,7 +69,7 @@ class Amplification:
     def moving(self) -> "Amplification":
         """Return the matrix without the row and column of the step's result, if possible.
 
-        This is possible if only the new result depends on the old result, by a constant factor.
+        It is possible if only the new result depends on the old one, by a constant factor.
         """
         column = self.coefficients[:, -1]
         if self.size > 1 and not column[:-1].any() and not column[-1, 1:].any():

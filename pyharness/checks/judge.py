@@ -102,7 +102,7 @@ class Truth:
     error : float
         Bound on the error of each component of `omega` (rad/s).
     flow : Conditioning
-        Its error amplification and rounding errors.
+        Error amplification and rounding errors of the motion.
     attitude, angle_error : ndarray of shape (n, 4) or None, float
         True quaternions, which are compared instead of omega, and a bound on their error (rad).
     is_signed : bool

@@ -123,7 +123,7 @@ def _beginning(scene: Scene, run: Trajectory) -> _Stage:
 def _stage(scene: Scene, part: float, state: Array) -> _Stage:
     """Return rates at the fraction `part` of every step, with bounds on their rounding errors.
 
-    Equations: 16-18 of the thesis and dV/dt = F/m - omega x V.
+    They follow from equations 16-18 of the thesis and dV/dt = F/m - omega x V.
     """
     omega, velocity = state[:, :3], state[:, 3:]
     times = scene.step_size * (np.arange(len(state), dtype=np.float64) + part)

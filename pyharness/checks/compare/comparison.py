@@ -147,8 +147,9 @@ def listings_for(
 ) -> list[Listing]:
     """Return the listings to compare: original, selected and corrected, for each program.
 
-    The selected listing is `base`, changed by `fix` and `keep`. If `base` is specified without
-    them, it is the only listing. Raise InputError for a name that none of `programs` has.
+    The selected listing is `base`, changed by `fix` and `keep`; `readings` and `conjectures` apply
+    to all. If `base` is specified without `fix` and `keep`, it is the only listing. Raise
+    InputError for a name that none of `programs` has.
     """
     chosen = list(programs)
     assumed = [name for name in conjectures or () if name != "none"]

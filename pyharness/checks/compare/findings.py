@@ -116,9 +116,9 @@ class Comparison:
     def unexpected(self) -> tuple[str, ...]:
         """Return a sentence for each unexpected result.
 
-        With programs: if Fortran and Python differ, or a corrected program misses its order.
-        Without programs: if a method's error exceeds the limit that follows from its tolerance,
-        rows are missing, or no method has a result.
+        With programs, these are differences between Fortran and Python, and corrected programs that
+        miss their order. Without programs, they are errors above the limit that follows from a
+        method's tolerance, missing rows, and no result of any method.
         """
         found = [] if self.programs else [*filter(None, map(self._excess, self.methods))]
         if not self.programs and all(each.trajectory is None for each in self.methods):

@@ -27,7 +27,7 @@ ORDER_SLACK = 0.5
 # the torque also seem to converge.
 _SMALL_CHANGE = 1e-3
 _SMALL_ANGLE = 0.5
-# The step is halved at least eight times, and until a run takes so many steps.
+# The step is halved at least eight times, and until a run takes this many steps.
 _MOST_STEPS = 2**18
 _HALVINGS = 8
 # A program that does not converge is incorrect if a textbook method of the same order converges,

@@ -1,10 +1,10 @@
 """Linear stability: the amplification matrix of a step of each program of the thesis.
 
-A perturbation x of a steady rotation obeys x' = J x with a constant Jacobian J. A step of size h
-multiplies x by a matrix of polynomials in z, where z is h times an eigenvalue of J, or hJ itself.
-The coefficients are exact fractions. The matrix has a row for each of the m vectors that a program
-propagates. The original Runge-Kutta program propagates two: the result, and U(1), at which the
-first stage is evaluated.
+A perturbation x of a steady rotation, or the velocity during it, obeys x' = J x with a constant
+Jacobian J. A step of size h multiplies x by a matrix of polynomials in z, where z is h times an
+eigenvalue of J, or hJ itself. The coefficients are exact fractions. The matrix has a row for each
+of the m vectors that a program propagates. The original Runge-Kutta program propagates two: the
+result, and U(1), at which the first stage is evaluated.
 
 A program is linearly stable where, in the plane of z, the spectral radius is at most 1.
 

@@ -152,8 +152,7 @@ def solved(program: str, step: float) -> Solved:
     powers = np.array([Fraction(step) ** k for k in range(1, count + 1)], dtype=object)
 
     def errors(solutions: Array) -> list[float]:
-        """Return the fields `residual`, `forward`, `increment` and `increment_error` of `Solved`.
-        """
+        """Return the `residual`, `forward`, `increment` and `increment_error` of `Solved`."""
         every = []
         for solution, side in zip(solutions.T, sides, strict=True):
             x, b = fractions(solution), fractions(side)

@@ -291,9 +291,9 @@ def _scale(scene: Scene, omega: Array) -> float:
 
 
 def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
-    """Return, by printed time, the change of omega (rad/s) when a scene's numbers are rounded.
+    """Return, by printed time, omega's change (rad/s) when a scene's numbers are rounded.
 
-    It is zero at times without a solution.
+    It is of first order, and zero at times without a solution.
     """
 
     def solve(values: Sequence[Value]) -> list[Array]:

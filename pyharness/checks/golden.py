@@ -164,7 +164,7 @@ def read_record(folder: Path) -> dict[str, dict[str, Any]]:
 def files_made(folder: Path) -> set[str]:
     """Return the names of the files in `folder` that `verify --update` made.
 
-    Beside such a file, one with the name of another record is a damaged record.
+    If there are any, all files with the name of a record count, even damaged ones.
     """
     found = set()
     for path in folder.glob("*.toml"):

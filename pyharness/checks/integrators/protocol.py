@@ -27,8 +27,8 @@ class Motion:
 
     `omega` is about the body axes (rad/s), shape (n, 3). `attitude` is from body to space, scalar
     first, normalised, shape (n, 4); `norm` is the largest difference of its norm from 1 before
-    that. `control` is the field of the request that sets the accuracy; `rounding` is the relative
-    rounding error of the integrator's arithmetic.
+    normalisation. `control` is the field of the request that sets the accuracy; `rounding` is the
+    relative rounding error of the integrator's arithmetic.
     """
 
     omega: Array

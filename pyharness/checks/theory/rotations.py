@@ -199,7 +199,7 @@ def _flip_interval(coefficients: Sequence[float], spin: float, share: float) -> 
 
     `coefficients` are in cyclic order from that axis; `spin` is in rad/s. The time is 2 K / lambda,
     where K is the complete elliptic integral of the first kind with complementary modulus k', and
-    lambda is near the growth rate; for a small k' it is near (2 / lambda) ln(4 / k'). It is
+    lambda is near the growth rate; for a small k' the time is near (2 / lambda) ln(4 / k'). It is
     shortest for a perturbation along the other axis with the smaller coefficient. Return None if
     the signs of the coefficients are impossible for a middle axis.
     """

@@ -22,7 +22,7 @@ def run(
 ) -> Trajectory:
     """Run the compiled program of a listing on a scene, and return its trajectory.
 
-    The arguments are those of `pyharness.thesis.programs.run_program`, but are not checked.
+    The arguments are those of `programs.run_program`, but are not checked.
     """
     given = program_arguments(scene, listing, lipschitz, may_stop, velocity)
     rows, ier, n_rows, *ended = extension().run_program(*given)
@@ -39,7 +39,7 @@ def read_rows(
     `rows` has shape (n, 8): true time and the program's TIME (s), omega (rad/s) and translational
     velocity (m/s). The first n values of `ier` are used. `stop_variable` is the number in
     `STOP_VARIABLES`, from 1, of the variable that failed the stop test, or 0. `stop_quotient` is
-    the change of this variable's right-hand side divided by the variable's change (1/s).
+    the change of its right-hand side divided by its change (1/s).
     """
     n = len(rows)
     return trajectory_of(
@@ -58,7 +58,7 @@ def program_arguments(
 
     Among them are a bit mask of defects, readings and conjectures, and seven triples: moments (kg
     m2), or A, B and C of Euler's equations; omega (rad/s); masses (kg); forces (N); constant (N m)
-    and rate (N m/s) of the torque; initial torque divided by the moments (rad/s2), or zeros.
+    and rate (N m/s) of the torque; initial torque over the moments (rad/s2), or zeros.
     """
     first = initial_torque(scene) if listing.has("initial-torque") else None
     if first is None and listing.has("initial-torque"):
@@ -88,5 +88,5 @@ def program_arguments(
 
 
 def stop_reads_velocity(listing: Listing, may_stop: bool) -> bool:
-    """Return whether the stop test reads the velocity, as with `lipschitz-tests-velocity`."""
+    """Return whether the stop test reads the velocity."""
     return may_stop and listing.has("lipschitz-tests-velocity")

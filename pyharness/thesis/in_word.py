@@ -1,7 +1,7 @@
 """Runs of the programs in a floating-point format of `word.py`, such as the CDC's 48 bits.
 
-The Python ports run in every format, the compiled programs only in formats of IEEE 754. Numbers are
-passed to and from the extension module as bytes, in this machine's order.
+The Python ports run in every format, the compiled programs only in formats of IEEE 754. The
+extension module exchanges numbers as bytes, in this machine's order.
 """
 
 import copy
@@ -37,7 +37,7 @@ def run(
 ) -> Trajectory:
     """Run the Python port of a listing in the arithmetic `word`; no argument is checked.
 
-    The results are rounded to floats; the attribute `exact` has the unrounded results.
+    The results are rounded to floats; the attribute `exact` has them unrounded.
     """
     twin = importlib.import_module(f"pyharness.thesis.{listing.program.replace('-', '_')}")
     found: Trajectory = twin.run(scene_in(scene, word), listing, lipschitz, may_stop)
@@ -47,7 +47,7 @@ def run(
 
 
 def scene_in(scene: Scene, word: Word) -> Scene:
-    """Return a copy of a checked scene with all numbers, except counts, in the format `word`."""
+    """Return a copy of a checked scene with all numbers but counts in the format `word`."""
     law = scene.law
 
     def converted(value: Any) -> Any:
@@ -73,8 +73,8 @@ def run_compiled(
 ) -> Trajectory:
     """Run a listing's compiled program in the arithmetic `word`; the result is that of `run`.
 
-    Raise InputError if the compiler does not support this arithmetic, or if angles in the torque
-    are too large for its sine; raise NotBuiltError if the extension is not built.
+    Raise InputError if the compiler does not support this arithmetic, or angles in the torque are
+    too large for its sine; raise NotBuiltError if the extension is not built.
     """
     if word.p > 53:
         _check_angles(scene)

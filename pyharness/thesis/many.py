@@ -38,7 +38,7 @@ _NOT_REACHED = -1
 class ProgramEnsemble(BatchResult):
     """The results of a program of the thesis for n bodies at m requested steps.
 
-    If a body's run ended before a requested step, its values at this step are NaN, in `ier` -1.
+    If a body's run ended before a requested step, its values there are NaN, in `ier` -1.
 
     Attributes
     ----------
@@ -55,11 +55,11 @@ class ProgramEnsemble(BatchResult):
     n_rows : ndarray of int32, shape (n,)
         The number of steps with a result in each body's run, requested or not.
     stop_variable : ndarray of int8, shape (n,)
-        The variable that failed the stop test, or 0: 1-3 for U1-U3 (angular velocity), 4-6 for
-        V1-V3 (translational velocity), 7 for the norm of U, 8 for the norm of U and V.
+        The variable that failed the stop test, or 0: 1-3 for U1-U3 (omega), 4-6 for V1-V3
+        (velocity), 7 for the norm of U, 8 for the norm of U and V.
     stop_quotient : ndarray, shape (n,)
-        The change of the right-hand side divided by the change of the variable (1/s); infinite if
-        the variable did not change, NaN if the stop test did not end the run.
+        Change of the right-hand side over change of the variable (1/s); infinite if the variable
+        did not change, NaN if the stop test did not end the run.
     ier : ndarray of int32, shape (n, m), or None
         The error code of the linear solver in the collocation programs; None for Runge-Kutta.
     """
@@ -98,7 +98,7 @@ def run_many(
     Parameters
     ----------
     scene : Scene
-        The scene that supplies every value for which no array is specified.
+        The source of each value for which no array is specified.
     listing : Listing
         The program with its active defects, readings and conjectures.
     omega, moments, coefficients, torque_constant : array_like, shape (n, 3) or (3,), optional
@@ -106,7 +106,7 @@ def run_many(
         C, and constant torques (N m; rad/s2 for bodies specified by coefficients). At most one of
         `moments` and `coefficients` may be specified.
     step_size, lipschitz : array_like, shape (n,) or one number, optional
-        Step sizes (s; by default the scene's) and Lipschitz constants of the stop test (1/s).
+        Step sizes (s) and Lipschitz constants of the stop test (1/s).
     may_stop : bool
         Whether the stop test, which only the Runge-Kutta program has, may end runs.
     velocity : bool
@@ -114,12 +114,12 @@ def run_many(
     at : sequence of int, optional
         The steps whose results are returned, from 1, in any order; by default only the last.
     threads : int
-        The number of threads. The results do not depend on it.
+        Number of threads; the results do not depend on it.
     effort : float
         Factor on the work limit. The work is bodies times steps times (1 + the number of sines and
         cosines in the torque).
     progress : bool
-        Whether to show a progress bar, in a terminal or in a notebook.
+        Whether to show a progress bar in a terminal or notebook.
 
     Returns
     -------

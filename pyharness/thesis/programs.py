@@ -22,8 +22,8 @@ WORD_NAMES = (*COMPILED_WORDS, "cdc48", "cdc48-rounded")
 class Program:
     """One of the three programs of the appendix.
 
-    The corrected version has a global error of O(h**order), h the step size. `source` names the
-    equation and the sections of the thesis that describe the program.
+    The corrected version has a global error of O(h**order), h the step size. `source` is where the
+    thesis describes the program.
     """
 
     name: str
@@ -117,29 +117,29 @@ def run_program(
     effort: float = 1.0,
     word: str = BINARY64,
 ) -> Trajectory:
-    """Run one of the three programs of the thesis, with a choice of its defects, on a scene.
+    """Run a program of the thesis, with a choice of its defects, on a scene.
 
     Parameters
     ----------
     scene : Scene
-        The body, the initial condition, the torque, the step size and the number of steps.
+        Body, initial condition, torque, step size and number of steps.
     listing : Listing
         The program with its active defects, readings and conjectures.
     implementation : {"fortran", "python"}
-        The compiled program or its Python port, the twin; the results are bit-for-bit identical.
+        The compiled program or its Python port; the results are bit-for-bit identical.
     lipschitz : float
         Lipschitz constant of the stop test (1/s), which only the Runge-Kutta program has.
     may_stop : bool
         Whether the stop test may end the run.
     velocity : bool
-        Whether to compute the translational velocity. If False, the compiled program computes it
-        only if the stop test reads it; the other results are the same.
+        Whether to return the translational velocity. False has an effect only on the compiled
+        program in binary64, and not on its other results.
     effort : float
         Factor on the work limit. The work is the number of steps, increased for each sine or cosine
         of the torque.
     word : str
-        The floating-point arithmetic, one of `pyharness.thesis.programs.WORD_NAMES`. An arithmetic
-        that is not in `pyharness.thesis.programs.COMPILED_WORDS` needs `implementation="python"`.
+        The floating-point arithmetic: binary64, binary32, binary128, cdc48 or cdc48-rounded. The
+        last two need `implementation="python"`.
 
     Returns
     -------
@@ -150,8 +150,8 @@ def run_program(
     Raises
     ------
     InputError
-        If `scene` or `listing` is of another type, the implementation or the word is unknown, the
-        compiled programs do not support the word, or the run exceeds the work limit.
+        If an argument has a wrong type or an unknown value, the compiled programs do not support
+        the word, or the run exceeds the work limit.
     NotBuiltError
         If the compiled program is requested and the extension is not built.
 

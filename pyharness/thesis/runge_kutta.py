@@ -26,7 +26,7 @@ def run(
 ) -> Trajectory:
     """Run the program on a scene, and return its trajectory.
 
-    `lipschitz` is the constant of the stop test (1/s). The test is omitted unless `may_stop`.
+    `lipschitz` is the constant of the stop test (1/s), which is omitted unless `may_stop`.
     """
     a, b, c = scene.euler_coefficients
     acceleration = accelerations(scene, listing)
@@ -107,9 +107,9 @@ def lipschitz_test(
     """Return a variable that violates eq. 19, and its quotient of changes (1/s), or None.
 
     `change_k` and `change_u` are absolute changes of the six right-hand sides and unknowns in a
-    step. The test compares norms of the changes. With the defect `lipschitz-per-component` it
-    compares single components. It tests omega and, with `lipschitz-tests-velocity`, the velocity.
-    The quotient is infinite if the unknown does not change.
+    step. The test compares their norms or, with the defect `lipschitz-per-component`, single
+    components: of omega and, with `lipschitz-tests-velocity`, the velocity. The quotient is
+    infinite if the unknown does not change.
     """
     velocity_counts = listing.has("lipschitz-tests-velocity")
     last = 6 if velocity_counts else 3

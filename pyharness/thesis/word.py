@@ -1,14 +1,14 @@
 """Words: floating-point formats of p bits with a rounding rule, for runs of the Python ports.
 
 A number of such a format has the operators of a float. The other operand may be an integer, a
-float, or a number of the same format. A float is converted like a literal in a source text: its
-shortest decimal representation is rounded, not its exact binary value.
+number of the same format, or a float, which is converted like a literal in a source text: from its
+shortest decimal representation.
 
 The rules of arithmetic are functions of pairs of integers (m, e), for a number m 2**e; m has p
 bits, or fewer if the number is subnormal. If m is 0, e is the value as a float: 0.0, -0.0, inf,
--inf or nan. Operands of an `Operation` have m other than 0. No library has all these rules: mpmath
-does not limit exponents; gmpy2, SoftFloat and numpy round only as IEEE 754 does; and none has the
-rules of the CDC machines.
+-inf or nan. Operands of an `Operation` have m other than 0. No library has the rules of the CDC
+machines: gmpy2, SoftFloat and numpy round only as IEEE 754 does, and mpmath does not limit
+exponents.
 """
 
 import math
@@ -34,8 +34,8 @@ class Rules(NamedTuple):
     """The arithmetic of a format, as functions of integers m and e.
 
     `nearest` (ties to even) rounds square roots, sines, cosines and literals; `cut` (towards zero)
-    rounds literals if the format truncates them. Subtraction adds the negative number. `difference`
-    is for comparisons alone: two numbers are equal if it is zero.
+    rounds literals if the format truncates them. `difference` serves comparisons alone: two numbers
+    are equal if it is zero.
     """
 
     nearest: Rounding
@@ -50,9 +50,8 @@ class Rules(NamedTuple):
 def rounding(p: int, least: int, most: int, cut: bool, gradual: bool) -> Rounding:
     """Return a function that rounds m 2**e to p bits and an exponent from `least` to `most`.
 
-    The integer m may have any length. Rounding is towards zero if `cut`, else to nearest, ties to
-    even. A number with a larger exponent becomes infinite. A number with a smaller one becomes zero
-    or, if `gradual`, subnormal or zero as in IEEE 754.
+    Rounding is towards zero if `cut`, else to nearest, ties to even. A larger exponent gives
+    infinity. A smaller one gives zero or, if `gradual`, a subnormal number or zero as in IEEE 754.
     """
     shortened = _cut if cut else _to_even
 
@@ -92,8 +91,8 @@ def _to_even(m: int, shift: int) -> int:
 def ieee(p: int, largest: int, cut: bool) -> Rules:
     """Return the rules of IEEE 754 for p-bit coefficients and numbers below 2**(largest + 1).
 
-    If `cut`, sums, products and quotients are truncated towards zero. A result that is too large
-    becomes infinite, as on machines that truncated, although IEEE 754 requires the largest number.
+    If `cut`, sums, products and quotients are truncated towards zero. Results that are too large
+    become infinite, as on machines that truncated, although IEEE 754 requires the largest number.
     """
     least, most = 2 - largest - p, largest - p + 1
     fit = rounding(p, least, most, cut, gradual=True)
@@ -125,10 +124,9 @@ def cdc(p: int, rounds: bool) -> Rules:
 
     The source is the CYBER 170 hardware reference, CDC 60463560. A number is an integer coefficient
     of p = 48 bits and an exponent; a sum is formed in a register of 2 p bits, the frame. Without
-    `rounds` the instructions are `FX`, with truncated sum, difference, product and quotient (octal
-    30, 31, 40 and 44); with `rounds` they are `RX`, with rounded results (34, 35, 41 and 45). There
-    is no guard bit: the bits below the unit of the larger operand are truncated before NX (24)
-    normalises a sum.
+    `rounds`, sums, differences, products and quotients are truncated by the instructions FX (octal
+    30, 31, 40 and 44), else rounded by RX (34, 35, 41 and 45). There is no guard bit: the bits
+    below the unit of the larger operand are truncated before NX (24) normalises a sum.
 
     Literals are rounded to nearest, an assumption: no source states how CDC's FTN converted them.
     """
@@ -156,9 +154,9 @@ def cdc(p: int, rounds: bool) -> Rules:
 def framed(p: int, rounds: bool, xm: int, xe: int, ym: int, ye: int) -> tuple[int, int]:
     """Return the sum of xm 2**xe and ym 2**ye before normalisation, as a pair (frame, e).
 
-    The frame is in units of 2**(e - p), where e is the larger exponent; coefficients have p bits.
-    The operand with the smaller exponent is shifted and truncated. If `rounds`, half a unit in the
-    last place is first added to each operand, as RX does.
+    The frame is in units of 2**(e - p), where e is the larger exponent. The operand with the
+    smaller exponent is shifted and truncated. If `rounds`, half a unit in the last place is first
+    added to each operand, as RX does.
     """
     if xe <= ye:
         xm, xe, ym, ye = ym, ye, xm, xe
@@ -201,9 +199,9 @@ def _comparison(compare: Callable[[float, float], bool]) -> Callable[["Number", 
 class Number:
     """An immutable number of a floating-point format: the integer `m` times 2**`e`.
 
-    If `m` is 0, `e` is the value as a float: 0.0, -0.0, inf, -inf or nan. `Word` makes a subclass
-    for each format. The operators round their results; x/0 is infinite, 0/0 is nan. Square roots,
-    sines and cosines are rounded to nearest even if the format truncates.
+    If `m` is 0, `e` is the value as a float. `Word` makes a subclass for each format. The operators
+    round their results; x/0 is infinite, 0/0 is nan. Square roots, sines and cosines are rounded to
+    nearest even if the format truncates.
     """
 
     __slots__ = ("e", "m")
@@ -219,11 +217,11 @@ class Number:
     __truediv__ = _operator("divide", _quotient)
 
     def __rsub__(self, other: Any) -> "Number":
-        """Return `other`, converted to this format, minus this number."""
+        """Return `other` minus this number."""
         return self.word(other) - self
 
     def __rtruediv__(self, other: Any) -> "Number":
-        """Return `other`, converted to this format, divided by this number."""
+        """Return `other` divided by this number."""
         return self.word(other) / self
 
     def __neg__(self) -> "Number":
@@ -311,8 +309,8 @@ class Number:
     def _special(self, operation: Callable[[float, float], float], other: "Number") -> "Number":
         """Return the result of an operation with an operand that is zero, infinite or nan.
 
-        It is computed from the floats `_shadow`. If they give a finite result other than 0, one
-        operand was 0, and the other is the result.
+        If the floats `_shadow` give a finite result other than 0, one operand was 0, and the other
+        is the result.
         """
         found = operation(self._shadow, other._shadow)
         if found and math.isfinite(found):
@@ -339,7 +337,7 @@ class Number:
 
 
 class Word:
-    """A floating-point format with its arithmetic: a number of bits p, and a rounding rule.
+    """A floating-point format of p bits with a rounding rule, and its arithmetic.
 
     `rule` is "nearest-even", "chop" (towards zero), or the CDC's "FX" (truncating) or "RX"
     (rounding). Except for FX and RX, numbers are below 2**(largest + 1), and the smallest exponent
@@ -378,8 +376,7 @@ class Word:
     def __call__(self, value: Any) -> Number:
         """Return a float, integer, fraction, decimal text or `Number` as a number of this format.
 
-        A float is converted from its shortest decimal representation. Raise TypeError for any other
-        type, and for a number of another format.
+        Raise TypeError for any other type, and for a number of another format.
         """
         if isinstance(value, Number) and value.word is self:
             return value

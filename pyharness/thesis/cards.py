@@ -2,9 +2,9 @@
 
 A card is a line of a printed program, a deck the cards of one program. A line of the scan consists
 of card number, dash and text; blanks are ignored. `data/cards` has the decks, the pages of the
-scan, and for each card the corresponding lines of the Python port (the twin). In the Fortran port a
-comment on each line names its cards. `data/apparatus.toml`, the critical apparatus, explains where
-the scan deviates from our text.
+scan, and for each card the corresponding lines of the Python port (the twin). Comments in the
+Fortran port name the cards of each line. `data/apparatus.toml`, the critical apparatus, explains
+where the scan deviates from our text.
 """
 
 import re
@@ -27,7 +27,7 @@ PORT = "fortran/original"
 class Difference(NamedTuple):
     """A passage of a card, without blanks, that differs between our text and the scan.
 
-    `entry` is the identifier of the apparatus entry that explains the difference.
+    `entry` is the apparatus entry that explains the difference.
     """
 
     ours: str
@@ -46,9 +46,9 @@ class Place(NamedTuple):
 class Card(NamedTuple):
     """A card of a printed program, and its appearance in the scan.
 
-    `text` is columns 1 to 72 in our text. `differences` are ordered from left to right. If the scan
-    has another card number, `printed` is this number, with the apparatus entry that explains it. If
-    the scan lacks the card, `lost` is the apparatus entry on it.
+    `text` is columns 1 to 72 in our text. `differences` are ordered from left to right. `printed`
+    is the scan's card number if it differs, with the apparatus entry that explains it; `lost` is
+    the apparatus entry on a card that the scan lacks.
     """
 
     program: str
@@ -65,7 +65,7 @@ class Card(NamedTuple):
 
     @property
     def statement(self) -> str:
-        """Return the text with each sequence of blanks reduced to one blank."""
+        """Return the text with each sequence of blanks reduced to one."""
         return " ".join(self.text.split())
 
     @property
@@ -90,8 +90,8 @@ class Card(NamedTuple):
     def passages(self) -> Iterator[tuple[str, Difference | None]]:
         """Yield each passage of the text, with its difference from the scan or None.
 
-        A difference is at the first occurrence of its characters after the previous difference.
-        Raise ValueError if there is none.
+        A difference is at the first occurrence of its characters after the previous one. Raise
+        ValueError if there is none.
         """
         places = [n for n, letter in enumerate(self.text) if not letter.isspace()]
         letters = tight(self.text)
@@ -111,7 +111,7 @@ class Card(NamedTuple):
 
     @property
     def text_with_scanned_names(self) -> str:
-        """Return our text, but with the scan's form of each name that we normalised."""
+        """Return our text with the scan's form of each name that we normalised."""
         kinds = {each["id"]: each["kind"] for each in facts("apparatus")["entry"]}
         return "".join(
             each.scans if each and kinds[each.entry] == "normalization" else text
@@ -137,7 +137,6 @@ class Deck:
     """The cards of a program by number, with their lines in the Fortran and the Python port."""
 
     def __init__(self, program: str) -> None:
-        """Read the program's cards."""
         self.program = program
         self._places = facts("cards/places")[program]
         self.cards = {
@@ -199,7 +198,7 @@ class Deck:
 
 @cache
 def deck(program: str) -> Deck:
-    """Return the deck of a program; all callers share it and must not change it."""
+    """Return the deck of a program; callers share it and must not change it."""
     return Deck(program)
 
 
@@ -302,8 +301,7 @@ def port_file(program: str) -> str:
 def switch_at(place: Place) -> tuple[str, bool] | None:
     """Return the switch on which a Fortran line depends, and whether the line runs if it is active.
 
-    A switch is the flag of a defect or reading. Return None if the line depends on no switch or on
-    several.
+    A switch is the flag of a defect or reading. Return None unless the line depends on exactly one.
     """
     lines = _lines(shipped(PORT) / place.file)
     depth = _indentation(lines[place.line - 1])

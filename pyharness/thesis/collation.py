@@ -1,7 +1,7 @@
 """Comparisons of the scan with our text of the cards, and of the three decks with the thesis.
 
 `data/cards/collation.toml` lists the operations of the programs, and the statements of sections II
-to V about them. Whether the decks agree is computed from their Fortran statements.
+to V about them. Whether the decks agree is computed from their cards.
 """
 
 import difflib
@@ -23,8 +23,8 @@ _OF_THE_SCAN = ("misreading", "missing text", "normalization")
 def expected_lines() -> list[tuple[str, str]]:
     """Return the lines that our tables expect in the appendix of the thesis, as pairs (text, name).
 
-    The text has no blanks. The name is that of a card, such as ``two-term:1660``, ``furniture`` for
-    a line that an editor added, or ``phantom`` for text that belongs to no card at its place.
+    The text has no blanks. The name is a card's, such as ``two-term:1660``, ``furniture`` for a
+    line that an editor added, or ``phantom`` for text that belongs to no card at its place.
     """
     found = []
     for page in facts("cards/scan")["page"]:
@@ -41,9 +41,9 @@ def expected_lines() -> list[tuple[str, str]]:
 
 @cache
 def witness_lines() -> dict[str, str]:
-    """Return the line of each card as scanned, with its blanks, by the name of the card.
+    """Return the line of each card as scanned, by the name of the card.
 
-    The blanks are from `data/cards/blanks.toml`. Callers must not change the dictionary.
+    Its blanks are from `data/cards/blanks.toml`. Callers must not change the dictionary.
     """
     blanks = facts("cards/blanks")
     found = {}
@@ -126,14 +126,13 @@ def undeclared() -> list[str]:
 
 
 class Row(NamedTuple):
-    """A row of the comparison: an operation, and whether the decks and the thesis agree on it.
+    """A row of the comparison: whether the decks and the thesis agree on an operation, `what`.
 
-    `what` is the operation. `cards` has the card numbers by program, as in ``750-770, 800``.
-    `decks` is ``agree`` if all decks with the operation have the same statements, ``names`` if only
-    names differ, ``order`` if only names and order differ, else ``differ``; it is ``-`` if no deck
-    has the operation. `thesis` is ``agrees``, ``differs`` or ``silent``; `text` is the place in the
-    thesis, `says` the statement there. `entries` of the apparatus, or `reason`, explain a
-    disagreement.
+    `cards` has the card numbers by program, as in ``750-770, 800``. `decks` is ``agree`` if all
+    decks with the operation have the same statements, ``names`` if only names differ, ``order`` if
+    only names and order differ, ``-`` if no deck has the operation, else ``differ``. `thesis` is
+    ``agrees``, ``differs`` or ``silent``; `text` is the place in the thesis, `says` the statement
+    there. `entries` of the apparatus, or `reason`, explain a disagreement.
     """
 
     what: str
@@ -170,8 +169,8 @@ def faults(found: list[Row]) -> list[str]:
     """Return a sentence for each mistake or unexplained disagreement in the rows `found`.
 
     Every entry in a row must be in the apparatus, and name a card of the row. Every card except
-    comments must be in exactly one row. Every apparatus entry with cards must be in a row, unless
-    it concerns only the scan.
+    comments must be in exactly one row, and every apparatus entry with cards in some row, unless it
+    concerns only the scan.
     """
     told = [f"{row.what}: no entry or reason" for row in found if not row.is_explained]
     known = {entry["id"]: entry for entry in facts("apparatus")["entry"]}

@@ -1,9 +1,9 @@
 """Collocation as in section IV.2 of the thesis, with up to five terms: one step, and a run.
 
-In a step, every unknown is a polynomial x(0) + c1 t + c2 t**2 + ... (eq. 34). At n collocation
-points, n the number of terms after x(0), its derivative equals the right-hand side (eq. 36). A
-first estimate assumes a constant right-hand side. One correction then uses the right-hand sides
-at the collocation points of this estimate.
+In a step, every unknown is a polynomial x(0) + c1 t + c2 t**2 + ... (eq. 34). With n terms after
+x(0), its derivative equals the right-hand side at n collocation points (eq. 36). A first estimate
+assumes a constant right-hand side. One correction then uses the right-hand sides at the collocation
+points of this estimate.
 """
 
 from collections.abc import Callable, Sequence
@@ -30,9 +30,9 @@ def integrate(
 ) -> Trajectory:
     """Run a collocation program on a scene, and return its trajectory.
 
-    `points_of` returns the collocation points (s) for DT (s), the program's variable for the step
-    size. `rates` returns the right-hand sides at point k (0 for the start). Its arguments are the
-    torques over the moments (rad/s2) at the start and at all points, k, and the six unknowns.
+    `points_of` returns the collocation points (s) for the program's step size DT (s). `rates`
+    returns the right-hand sides at point k (0 for the start). Its arguments are the torques over
+    the moments (rad/s2) at the start and at all points, k, and the six unknowns.
     """
     h = scene.step_size
     dt = h

@@ -41,7 +41,7 @@ class Run(NamedTuple):
     """The output of a compiled deck.
 
     `tape5` has shape (n, 7): TIME (s), U1 to U3 (rad/s) and V1 to V3 (m/s). `page` is the text of
-    the printer file TAPE6, without carriage-control characters and trailing blanks.
+    the printer file TAPE6, without carriage control and trailing blanks.
     """
 
     tape5: np.ndarray
@@ -54,11 +54,10 @@ def deck_text(
     """Return a program as fixed-form FORTRAN, with card numbers in columns 73 to 80.
 
     The published cards have the data of Case 2 with 300 steps (collocation) or Case 5 with 100
-    steps (Runge-Kutta). A `scene` of Table 1 replaces the numbers in the assignments and in the DO
-    statement.
+    steps (Runge-Kutta). A `scene` of Table 1 replaces these data.
 
-    In the `dialect` "1982" the cards are as published. "ftn" adds cards for the torque of Case 7.
-    "gfortran" also adapts cards to a modern compiler. Column 73 marks added and adapted cards.
+    The `dialect` "1982" leaves the cards as published, "ftn" adds cards for the torque of Case 7,
+    and "gfortran" also adapts cards to a modern compiler. Column 73 marks added and adapted cards.
     `terms`, 3 or 5, requests the conjectural deck of `model_cards`. Raise InputError if the dialect
     is unknown, or if the request can't be expressed in cards.
     """
@@ -102,7 +101,7 @@ def corrected_cards(program: str) -> dict[int, str]:
 
 
 def corrections(program: str) -> dict[int, list[str]]:
-    """Return, by card number, the defects whose correction replaces, deletes or adds the card."""
+    """Return, by card number, the defects whose correction changes the card."""
     found: dict[int, list[str]] = {}
     for each in facts("cards/alterations")["alteration"]:
         if each["program"] == program and "corrects" in each and "case" not in each:
@@ -161,7 +160,7 @@ def model_cards(terms: int) -> dict[int, str]:
     """Return the cards of a collocation deck with `terms` terms, by their new numbers.
 
     The deck is a conjecture: V.2 uses three and five terms in Case 6, but the thesis prints no such
-    deck. The n collocation points are at the fractions k/(n+1) of the interval, k = 1 to n.
+    deck. The collocation points are at the fractions k/(terms + 1) of the interval.
     """
     text = [card.text for card in deck("four-term").cards.values()]
     terms_range = range(1, terms + 1)
@@ -249,8 +248,8 @@ def compiler() -> str | None:
 def run_deck(text: str, folder: Path | None = None) -> Run:
     """Compile and run a deck in the dialect `gfortran`, and return its output.
 
-    The compiled solver is kept in `folder` for later calls. Raise RuntimeError if the compiler or
-    the program fails.
+    `folder` keeps the compiled solver for later calls. Raise RuntimeError if the compiler or the
+    program fails.
     """
     with TemporaryDirectory() as place:
         here = Path(place)

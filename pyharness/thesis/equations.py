@@ -48,7 +48,7 @@ def initial_torque(scene: Scene) -> Vector | None:
 
 
 def card_torque(scene: Scene) -> Vector | None:
-    """Return the initial torque (N m) of a scene's case in Table 1, or None if it has none."""
+    """Return the initial torque (N m) of a scene's case in Table 1, or None."""
     given = {each["case"]: each["torque"] for each in facts("printer")["initial_torque"]}
     return given.get(scene.case)
 
@@ -67,7 +67,6 @@ class Record:
     """The results of a Python port's run, a row for each step."""
 
     def __init__(self, scene: Scene, evaluations_per_step: int) -> None:
-        """Create an empty record; each step has `evaluations_per_step` evaluations."""
         self._step_size = scene.step_size
         self._per_step = evaluations_per_step
         self._rows: list[list[float]] = []

@@ -31,8 +31,8 @@ ALIKE = dict.fromkeys(_OPERATIONS, 1)
 class Count(NamedTuple):
     """The number of additions, subtractions, multiplications and divisions in a step.
 
-    `written` counts every operation on the cards; `once` counts an operation that is repeated with
-    the same operands only once. If operations are weighted with times, both are times.
+    `written` counts every operation on the cards; `once` counts repetitions with the same operands
+    only once. If operations are weighted with times, both are times.
     """
 
     written: int
@@ -64,10 +64,7 @@ def _operator(name: str, reflected: bool = False) -> Callable[["_Number", Any], 
 
 
 class _Number(float):
-    """A floating-point value, with the counter of the operations on it.
-
-    Repeated operations on the same operands return the same object.
-    """
+    """A floating-point value, with the counter of the operations on it."""
 
     counter: _Counter
 
@@ -117,7 +114,7 @@ def operations_per_step(listing: Listing, times: Mapping[str, int] = ALIKE) -> C
 
 
 def _moved(value: Any, counter: _Counter) -> Any:
-    """Return a copy of `value` whose numbers count in `counter`; other values are unchanged."""
+    """Return a copy of `value` whose numbers count in `counter`."""
     if isinstance(value, _Array):
         moved = {k: _moved(x, counter) for k, x in value.items()}
         return _Array(lambda: _Number(counter, 0.0), moved)

@@ -2,7 +2,7 @@
 
 The page omits the first character of each record, the carriage control, which is always a blank.
 `data/printer.toml` has the FORMATs, and marks their conjectural parts. The package `fortranformat`
-writes the values; only negative zeros and values that are not finite are treated here.
+writes the values, except negative zeros and values that are not finite.
 """
 
 import math
@@ -103,9 +103,9 @@ def tape5(trajectory: Trajectory) -> bytes:
     """Return the bytes of TAPE5 for a trajectory with translational velocities.
 
     TAPE5 is a file of unformatted sequential records. Each WRITE(5)TIME,U1,U2,U3,V1,V2,V3 is one
-    record: its length in bytes, seven binary64 numbers, and the length again. All are
-    little-endian, as in today's Fortran compilers and `scipy.io.FortranFile`. The author's tape had
-    other record marks and, as we infer, words of 60 bits.
+    record: its length in bytes, seven binary64 numbers, and the length again, all little-endian, as
+    in today's Fortran compilers and `scipy.io.FortranFile`. The author's tape had other record
+    marks and, as we infer, words of 60 bits.
     """
     assert trajectory.velocity is not None
     result = np.empty(len(trajectory.time), dtype=TAPE5)

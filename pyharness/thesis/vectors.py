@@ -1,13 +1,13 @@
 """Numbers and instructions of CDC machines in octal, and test vectors for their arithmetic.
 
 A CDC word has 60 bits: a sign bit, an exponent field of 11 bits, and a coefficient of 48 bits. All
-60 bits of a negative number are complemented. The exponent is the field minus 2000 (octal),
-plus one if the field is below 2000 (octal).
+60 bits of a negative number are complemented. The exponent is the field minus 2000 (octal), plus
+one if the field is below 2000.
 
 The test vectors in `data/words/cdc.json` follow from the CYBER 170 hardware reference, CDC
-60463560; a public emulator agrees with them. A file of test vectors is a JSON object with `schema`
-and `vectors`. Each vector has `name`, `op` (an instruction of `operated`), and `x`, `y` and
-`result` in octal.
+60463560; a public emulator agrees with them. Such a file is a JSON object with `schema` and
+`vectors`. Each vector has `name`, `op` (an instruction of `operated`), and `x`, `y` and `result` in
+octal.
 """
 
 import json
@@ -93,7 +93,7 @@ def from_octal(text: str) -> Pair:
     """Return the number m 2**e that a CDC word of 20 octal digits represents, as the pair (m, e).
 
     Words with all bits 0 or all bits 1 are zero. For zero, infinity and nan, m is 0 and e is the
-    value as a float. Raise InputError if `text` is no such word, or if the coefficient is not
+    value as a float. Raise InputError if `text` is no such word, or its coefficient is not
     normalised.
     """
     digits = "".join(text.split()) if isinstance(text, str) else ""
@@ -130,8 +130,8 @@ def to_octal(number: Pair) -> str:
 def operated(name: str, x: str, y: str) -> str:
     """Return the result of a CDC instruction on the words `x` and `y`, all in octal.
 
-    `name` is FX (truncating) or RX (rounding) followed by +, -, * or /, as in ``FX*``. A sum or
-    difference is normalised only if NX follows, as in ``RX+ NX``. Raise InputError for other names.
+    `name` is FX (truncating) or RX (rounding) followed by +, -, * or /. A sum or difference is
+    normalised only if NX follows, as in ``RX+ NX``. Raise InputError for other names.
     """
     if name not in _INSTRUCTIONS:
         raise unknown("instruction", name, _INSTRUCTIONS)

@@ -61,8 +61,7 @@ def _refuse(*_: Any) -> Any:
 def functions_at(time: Fraction, forward: bool) -> Functions[Any]:
     """Return the functions of tapes (recorded operations) for a step from `time` (s).
 
-    A table is replaced by its piece that applies in the step: after `time` if `forward`, else
-    before it.
+    A table is replaced by its piece after `time` if `forward`, else before it.
     """
 
     def table(each: Table, at: Any) -> Any:

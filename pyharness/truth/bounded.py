@@ -1,7 +1,7 @@
 """Error of the reference solution: a proved bound where a proof is cheap, else the estimate.
 
 A proof encloses the solution in balls (intervals, given by middle and radius). The largest distance
-between the reference and any point of the ball at the same time bounds the error.
+between the reference and any point of the ball bounds the error.
 """
 
 import math
@@ -63,7 +63,7 @@ class ErrorBound(NamedTuple):
 
     @property
     def turned(self) -> "ErrorBound | None":
-        """Return the bound for the attitude alone (rad), or None without attitude."""
+        """Return the bound for the attitude alone (rad), or None."""
         if self.angle is None or self.angle_basis is None:
             return None
         return ErrorBound(self.angle, self.angle_basis, warning=self.warning)
@@ -94,7 +94,7 @@ def bound_of(
 ) -> ErrorBound:
     """Return the error bound of the reference `known` of a scene.
 
-    If `before_rounding`, the bound is for omega plus `remainder`, the part that rounding removed.
+    If `before_rounding`, the bound is for omega plus `remainder`, which rounding removed.
     """
     exact = before_rounding and known.remainder is not None
     largest = float(np.abs(known.omega).max(initial=0.0))
@@ -128,10 +128,9 @@ def error_bound(
     `omega` (rad/s) and `remainder`, which is added to it, have the shape (n, 3), `attitude` (n, 4).
     `claimed` (rad/s) and `claimed_angle` (rad) are the estimates, returned where nothing is proved.
 
-    The bound of omega is proved, even without python-flint, if the scene can have a certificate.
-    With python-flint, the bound of the attitude is proved in torque-free motion. With python-flint
-    and `any_torque`, both bounds are proved under any recorded torque. The work limit of a proof is
-    about half a second times `effort`.
+    The bound of omega is proved if the scene can have a certificate. With python-flint, both bounds
+    are proved in torque-free motion and, with `any_torque`, under any recorded torque at up to 30
+    times on one side of 0. The work limit of a proof is about half a second times `effort`.
     """
     rows = _exact(omega, remainder)
     order = sorted(range(len(times)), key=lambda k: abs(times[k]))
@@ -258,13 +257,12 @@ def _distance(x: float | Fraction, y: Fraction) -> float:
 def _extreme_angles(
     rows: Sequence[Sequence[Fraction]], found: Sequence[Balls]
 ) -> tuple[float, float]:
-    """Return the least and the largest error (rad) that the quaternions `rows` may have.
+    """Return a lower and an upper bound on the largest error (rad) of the quaternions `rows`.
 
     The error is twice the angle between the lines of a row and of the true quaternion. This angle
     is at most the sum of two. The first, between the row and the middle of its ball, has the sine
     s; if s <= 1/2, it is less than s (1 + s**2). The second, between the middle and the true
-    quaternion, is at most arcsin(2 r) < 4 r, as each of four components differs by at most the
-    radius r.
+    quaternion, is at most arcsin(2 r) < 4 r, as each component differs by at most the radius r.
     """
     least = most = 0.0
     for row, (middle, radius) in zip(rows, found, strict=True):

@@ -1,7 +1,7 @@
 """Proved enclosures of omega by Taylor steps in integer arithmetic, and their certificates.
 
-`certificate_checker` explains the bound on the error of a step. It verifies each step and ball
-(interval) of a certificate, without trusting this module.
+`certificate_checker` explains the bound on the error of a step, and verifies a certificate without
+trusting this module.
 """
 
 import math

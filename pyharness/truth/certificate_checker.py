@@ -9,10 +9,10 @@ torque. In a step of length h, a polynomial p(s), s from 0 to 1, approximates th
 Taylor series with coefficients rounded down. Any polynomial would do, because the proof bounds its
 residual d = p' - h f(p).
 
-The error e = y - p obeys |e|' <= h mu |e| + |d| (Dahlquist 1958). Here mu bounds the logarithmic
+The error e = y - p obeys |e|' <= h mu |e| + |d| (Dahlquist 1958), where mu bounds the logarithmic
 norm of the Jacobian of f in a tube around p. The resulting bound on |e|, the radius of the step,
-holds while |e| is less than the radius of the tube. If the bound is less than this radius too, it
-holds on the whole step, because |e| is continuous.
+holds while |e| is less than the tube's radius. If the bound is less too, it holds on the whole
+step, because |e| is continuous.
 
 A number y is stored as the integer y 2**bits, a time t (s) as t 2**clock. The norm of an error of
 omega is sqrt(sum (e_i / scale_i)**2), with scales in units of 2**-20.
@@ -50,9 +50,9 @@ class System:
     """Euler's equations of a scene, with integer coefficients: equations 13-15 of the thesis.
 
     They are D y_i' = P y_j y_k + C + R t + sum over f of (S s_f + G c_f), with i, j, k in cyclic
-    order. Each frequency f of the torque adds the unknowns s_f and c_f, its sine and cosine, with
-    s_f' = f c_f and c_f' = -f s_f. An entry of `rows` is D, and a list of P, C, R and of S, G for
-    each frequency.
+    order. Each frequency f of the torque adds its sine s_f and cosine c_f as unknowns, with s_f' =
+    f c_f and c_f' = -f s_f. An entry of `rows` is D, and a list of P, C, R and of S, G for each
+    frequency.
     """
 
     def __init__(self, scene: dict[str, Any], bits: int, clock: int, scales: Sequence[int]) -> None:
@@ -265,7 +265,7 @@ def check_file(name: str, text: str | None = None) -> tuple[dict[str, Any] | Non
 
 
 def main(names: Sequence[str]) -> int:
-    """Check certificates in files and print what they prove; return 1 if any does not hold."""
+    """Check certificates in files and print what they prove; return 1 unless all hold."""
     found = [(name, *check_file(name)) for name in names]
     for name, proved, why in found:
         lines = [f"not proved: {why}"]

@@ -85,7 +85,7 @@ def _arctan_inverse(n: int) -> Decimal:
 def product(x: Row, reversed_y: Row) -> Decimal:
     """Return coefficient k of the product of two series, from their coefficients 0 to k.
 
-    The coefficients of the second series are in reverse order.
+    The second series is in reverse order.
     """
     if x and not x[-1]:
         # Series of polynomials end in many zeros, which change no digit of the sum.
@@ -111,5 +111,5 @@ def unit(row: Row) -> Row:
 
 
 def to_decimal(x: Fraction) -> Decimal:
-    """Return a fraction, rounded to the digits of the current context."""
+    """Return a fraction rounded to the digits of the current context."""
     return Decimal(x.numerator) / x.denominator

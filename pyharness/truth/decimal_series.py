@@ -49,9 +49,9 @@ def taylor_series(
 
     The rows end where omega grows without bound or the torque is singular. Quaternions keep the
     norm of the scene's quaternion. `order` is the degree of the series, which high powers in the
-    torque may increase. `tolerance` is local and relative. `effort` is a factor on a work limit of
-    some ten seconds; None means a limit of 100 000 steps, fewer if the torque depends on the state.
-    `start` replaces the initial state of the scene.
+    torque may increase; `tolerance` is local and relative. `effort` is a factor on a work limit of
+    some ten seconds; None means 100 000 steps, fewer if the torque depends on the state. `start`
+    replaces the scene's initial state.
     """
     equations, limit = _Equations(scene, coefficients, velocity), _Limit(scene, effort)
     tape = equations.tape
@@ -171,8 +171,8 @@ class _Limit:
         """Return the expected number of steps until the end.
 
         `begin` (s) is the time after `step` steps, `rest` (s) the remaining time. The mean length
-        of a step is assumed to remain; but if the number of steps so far grew with a power of time
-        above 1.3, it is extrapolated with this power, at most 3.
+        of a step is assumed to remain. If the number of steps grew with a power of time above 1.3,
+        it is extrapolated with this power, at most 3.
         """
         step_before, begin_before = self._before
         power = Decimal(1)
@@ -248,7 +248,7 @@ def _is_continued(
     """Return whether the rates at the end of a step agree with the derivative of the Taylor series.
 
     They disagree after a pulse of the torque that is invisible at the beginning of the step.
-    Differences due to rounding, which the last of the `equations` show, are allowed.
+    Rounding differences, which the last of the `equations` show, are allowed.
     """
     slopes = _evaluate([[k * x for k, x in enumerate(row)][1:] for row in series], length)
 
@@ -307,7 +307,7 @@ class _Equations:
     def expand(self, time: Decimal, state: Row, order: int, forward: bool) -> list[Row]:
         """Return the Taylor coefficients 0 to `order` of all unknowns around `time` (s).
 
-        If a table changes at `time`, they hold after it if `forward`, else before it.
+        If a table changes then, they hold after `time` if `forward`, else before it.
         """
         series = [[x] for x in state]
         torque = self._torque_series(time, order, series, forward)
@@ -395,7 +395,7 @@ def _rates_by_momentum(
     """Return Taylor coefficient k of the derivative of omega, from L' = N - omega x L.
 
     `torque` is coefficient k of N. `momentum` (L = I omega), `series` (omega) and `inertia` (I)
-    have coefficients 0 to k; `backward` has those of omega reversed.
+    have coefficients 0 to k; `backward` is `series` reversed.
     """
     right = []
     for i in range(3):

@@ -58,8 +58,8 @@ class Switches:
     def turns(self, time: Decimal, length: Decimal) -> bool:
         """Change the result of an operand that moves to the other side of its level.
 
-        Return whether a result was changed. Raise TimedError if the operand moves to the other side
-        with either result.
+        Return whether a result was changed. Raise TimedError if the operand does so with either
+        result.
         """
         for slot, is_floor, x in self._tape.operands_of_switches():
             level = self._levels.get(slot)
@@ -104,7 +104,7 @@ class Switches:
         return first.copy_sign(length)
 
     def step(self, is_whole: bool) -> None:
-        """Change the results at the end of a step, unless the step was shortened."""
+        """Change the results at the end of a step that was not shortened."""
         self._levels = {}
         if is_whole:
             for slot, level in self._next.items():
@@ -122,8 +122,7 @@ class Switches:
 def _first_root(terms: Row, length: Decimal, side: int) -> Decimal | None:
     """Return the first place up to `length` where a series gets the sign opposite to `side`.
 
-    The roots of the polynomial are the eigenvalues of its companion matrix, in binary64, which
-    Newton's method corrects.
+    Newton's method corrects the eigenvalues, in binary64, of the polynomial's companion matrix.
     """
     scaled = [each * length**k for k, each in enumerate(terms)]
     if not scaled[0]:

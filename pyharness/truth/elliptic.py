@@ -1,8 +1,8 @@
 """Torque-free motion by Jacobi's elliptic functions in decimals, to check other methods.
 
-Unlike a Taylor series, they lose no digits with time, and a long time with many flips (sign changes
-of omega near the separatrix) takes no more work. The module uses Landen's transformation, and
-shares no code with the closed form that it checks.
+Unlike a Taylor series, they lose no digits with time, and flips (sign changes of omega near the
+separatrix) take no more work. The module uses Landen's transformation, and shares no code with the
+closed form that it checks.
 """
 
 import decimal
@@ -23,8 +23,8 @@ def torque_free(scene: Scene, time: float | Decimal, rounded: bool = False) -> R
     """Return omega (rad/s) of a scene without torque at `time` (s).
 
     If `rounded`, A, B and C are rounded to binary64. Raise InputError if the torque depends on the
-    state, or an unsteady motion may be unbounded. It is bounded if the body has moments, or if at
-    least one of A, B, C is above 0 and one below 0.
+    state, or an unsteady motion may be unbounded. It is bounded if the body has moments, or at
+    least one of A, B, C is above 0 and one below.
     """
     i = checked_scene(scene).exact_moments
     a, w = [Fraction(x) for x in scene.euler_coefficients], [Fraction(x) for x in scene.omega]

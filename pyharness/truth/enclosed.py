@@ -23,8 +23,8 @@ class Enclosure:
     """Balls that contain the solution of one scene; quantities that were not requested are None.
 
     The attitude is a unit quaternion, scalar first. The transition matrix has, row by row, the
-    derivatives of omega and of the quaternion with respect to omega at time 0, before the
-    quaternion is normalised.
+    derivatives of omega and of the quaternion, before it is normalised, with respect to omega at
+    time 0.
     """
 
     time: tuple[float, ...]  # s
@@ -44,7 +44,7 @@ class Enclosure:
     def rows(self) -> list[dict[str, Any]]:
         """Return a dictionary for JSON for each time, with decimals as strings.
 
-        Each radius includes the rounding error of the decimals.
+        Each radius includes their rounding error.
         """
         rows = []
         for n, time in enumerate(self.time):
@@ -85,7 +85,7 @@ def decimals(balls: Balls) -> tuple[list[str], float]:
 
 
 def rounded_up(x: Fraction) -> float:
-    """Return a binary64 number of four digits that is at least `x`; `x` is not negative."""
+    """Return a binary64 number of four digits that is at least `x`, which is not negative."""
     # A factor above 1 compensates for rounding to a decimal string.
     candidates = (float(f"{float(x) * factor:.3e}") for factor in (1.0, 1.001, 1.01))
     # Near the least binary64 number, the factors may change nothing.
@@ -122,9 +122,9 @@ def _decimal(x: Fraction, digits: int) -> str:
 def scales_of(coefficients: Sequence[Fraction]) -> list[float]:
     """Return the units in which proofs measure errors of the components of omega, at most 1.
 
-    They are the square roots of abs(A), abs(B) and abs(C), divided by the largest of these, but at
-    least 0.01. Without a unit of 0.01, the logarithmic norm is 0 for rotations about the axes of
-    the largest and the smallest moment.
+    They are the square roots of abs(A), abs(B) and abs(C) over the largest of these, but at least
+    0.01. Without a unit of 0.01, the logarithmic norm is 0 for rotations about the axes of the
+    largest and the smallest moment.
     """
     sizes = [abs(x) for x in coefficients]
     largest = max(sizes) or Fraction(1)

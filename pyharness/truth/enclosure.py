@@ -1,7 +1,7 @@
 """Proved enclosures: balls (intervals, given by middle and radius) that contain the solution.
 
 Torque-free motion is proved in closed form (`enclosure_free`), motion under torques of time alone
-by Taylor steps in integers (`certificate`), and all other motion by Taylor steps in balls
+by Taylor steps in integers (`certificate`), other motion by Taylor steps in balls
 (`enclosure_steps`). The closed form and the steps in balls need python-flint.
 """
 
@@ -40,13 +40,13 @@ def enclose(
 
     `times` (s) have one sign and lead away from 0; the first may be 0. A radius of omega is at most
     10**-digits rad/s, times the largest component of omega if that exceeds 1 rad/s; a closed form
-    takes the initial omega instead. `velocity` requests balls of the translational velocity (m/s),
-    `transition` balls of the transition matrix. The attitude is enclosed if the scene has one, the
-    rotational energy if it has moments. `progress` receives the completed percentage of the time,
-    100, and the time as text. `effort` is a factor on the limit of work.
+    takes the initial omega instead. `velocity` adds the translational velocity (m/s), `transition`
+    the transition matrix; the attitude is added if the scene has one, the rotational energy if it
+    has moments. `progress` receives the completed percentage of the time, 100, and the time as
+    text. `effort` is a factor on the work limit.
 
-    Raise InputError if the times are not in order, python-flint is missing, the torque is opaque,
-    the solution can't be enclosed up to the last time, or the limit is exceeded.
+    Raise InputError if `digits` is not from 1 to 1000, the times are not in order, python-flint is
+    missing, the torque is opaque, the solution can't be enclosed, or the limit is exceeded.
     """
     checked_scene(scene, True, True, True, True)
     if not 1 <= integer("digits", digits) <= MOST_DIGITS:

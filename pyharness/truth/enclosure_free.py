@@ -29,7 +29,7 @@ def enclose_free(
     """Return balls that contain omega (rad/s) without torque at each of `times` (s).
 
     With `attitude`, four more balls contain the unit quaternion from body to space, scalar first
-    and continuous in time. Their radii are at most 10**-`digits`. A radius of omega is at most
+    and continuous in time; their radii are at most 10**-`digits`. A radius of omega is at most
     10**-`digits` rad/s, times the largest initial component if that exceeds 1 rad/s. The motion
     must be bounded; an attitude needs moments. Raise InputError if 20 000 bits do not suffice.
     """
@@ -93,10 +93,10 @@ def omega_on_ellipse(axis: int, a: list[Fraction], w: list[Fraction], t: Fractio
 class Orbit:
     """A torque-free motion that is not steady, with nonzero coefficients.
 
-    Omega about the three `axes` is `sizes` (rad/s) times cn(u), sn(u) and dn(u), see DLMF Table
-    22.13.1. Here u = `start` + `rate` t, with `rate` in 1/s. `m` is k**2, with the modulus k;
-    `square` is the square of the size that multiplies dn. On the separatrix m = 1; cn and dn are
-    then sech, and sn is tanh.
+    Omega about the three `axes` is `sizes` (rad/s) times cn(u), sn(u) and dn(u), with u = `start` +
+    `rate` t and `rate` in 1/s (DLMF Table 22.13.1). `m` is k**2, with the modulus k; `square` is
+    the square of the size that multiplies dn. On the separatrix m = 1, cn = dn = sech and sn =
+    tanh.
     """
 
     def __init__(self, a: list[Fraction], w: list[Fraction]) -> None:
@@ -164,15 +164,15 @@ def carlson(x: Fraction, y: Fraction, z: Fraction) -> arb:
 class _Attitude:
     """The attitude along an orbit.
 
-    Let e be the direction of the axis of dn, and n the direction of the angular momentum L, both
-    in the body. Then n e = c dn(u) with c > 0. The attitude is the product of a constant rotation,
-    the rotation by psi about e, and the smallest rotation from n to e. T is the kinetic energy.
+    In the body, let n be the direction of the angular momentum L, and e the direction of the axis
+    of dn. Then n e = c dn(u) with c > 0. The attitude is the product of a constant rotation, the
+    rotation by psi about e, and the smallest rotation from n to e.
 
-    Euler's equations give psi' = (2 T/|L| + omega e)/(1 + n e). Like dn, psi' has the periods 2K
-    and 4iK' in complex u. Its poles, where dn(u) = -1/c, are at u = 2iK' + iy and 2iK' - iy; the
-    residues of psi'/(2 rate) are 1/2i and -1/2i, or opposite. The derivative of the phase of
-    theta4((u - iy)/2K | 2 tau), or of its conjugate, has the same periods, poles and residues, so
-    that the difference is constant.
+    Euler's equations give psi' = (2 T/|L| + omega e)/(1 + n e), with the kinetic energy T. Like dn,
+    psi' has the periods 2K and 4iK' in complex u. Its poles, where dn(u) = -1/c, are at u = 2iK' +
+    iy and 2iK' - iy; the residues of psi'/(2 rate) are 1/2i and -1/2i, or opposite. The derivative
+    of the phase of theta4((u - iy)/2K | 2 tau), or of its conjugate, has the same periods, poles
+    and residues. The difference is therefore constant.
     """
 
     def __init__(

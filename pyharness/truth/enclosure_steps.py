@@ -4,11 +4,11 @@ In each step a polynomial p approximates the solution of y' = f(t, y). Any p is 
 residual p' - f(t, p) is bounded on the whole step in ball (interval) arithmetic.
 
 The unknowns form blocks, such as omega and attitude. The norms of the blocks of y - p form the
-vector r, which obeys r' <= M r + d, where d bounds the norms of the blocks of the residual. The
-diagonal of M bounds the logarithmic norms of the diagonal blocks of the Jacobian of f near p; the
-rest of M bounds the norms of the other blocks. Since no element of M is negative, r(h) <= exp(h M)
-(r(0) + h d) after a step of length h. For one block this is theorem I.10.6 of Hairer, Norsett and
-Wanner 1993, Solving Ordinary Differential Equations I.
+vector r, which obeys r' <= M r + d, where d bounds the norms of the residual's blocks. On its
+diagonal, M bounds the logarithmic norms of the diagonal blocks of the Jacobian of f near p;
+elsewhere, the norms of the other blocks. Since no element of M is negative, r(h) <= exp(h M) (r(0)
++ h d) after a step of length h. For one block this is theorem I.10.6 of Hairer, Norsett and Wanner
+1993, Solving Ordinary Differential Equations I.
 """
 
 import math
@@ -101,7 +101,7 @@ class Equations:
 
     The unknowns are omega (rad/s), the scene's quaternion, the velocity (m/s) and, with
     `transition`, the derivatives of omega and attitude with respect to omega at time 0, row by row.
-    `blocks` are the slices of the groups that are present, `scales` the units of errors.
+    `blocks` are the slices of these groups, `scales` the units of errors.
     """
 
     def __init__(self, scene: Scene, velocity: bool, transition: bool) -> None:
@@ -353,8 +353,8 @@ class _Proof:
     def _rests(self, rates: Rates, terms: list[list[Any]], h: Fraction, count: int) -> list[Any]:
         """Return bounds on the sums of the Taylor terms of f(t, p) from number `count` on.
 
-        If a rate is at most B on a complex disc whose radius is c steps, its term k is at most
-        B c**-k at the end of the step (Cauchy's estimate). The bounds are geometric series.
+        If a rate is at most B on a complex disc whose radius is c steps, its term k is at most B
+        c**-k at the end of the step (Cauchy's estimate). The bounds are geometric series.
         """
         length = abs(ball(h))
         candidates = []

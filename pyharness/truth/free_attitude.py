@@ -1,9 +1,9 @@
 """Attitude of a torque-free body at any time in decimals, to check other methods.
 
 In each period of omega the body rotates about the angular momentum by the same angle, so that
-Taylor series integrate only one period. Near the separatrix errors of omega grow exponentially. The
-period is therefore divided into segments, each of which starts from the omega of `elliptic.py`. No
-code is shared with the closed form that this module checks.
+Taylor series integrate only one period. Near the separatrix errors of omega grow exponentially.
+Each segment of the period therefore starts from the omega of `elliptic.py`. No code is shared with
+the closed form that this module checks.
 """
 
 import decimal
@@ -30,10 +30,9 @@ _MOST_RADIANS = 1e5  # work limit of the integration; some three minutes
 def free_attitude(scene: Scene, time: float) -> Row:
     """Return the attitude of a scene without torque at `time` (s), as a unit quaternion.
 
-    The sign of the quaternion is continuous in time. The scene must have moments and an attitude.
-    On the separatrix, where omega has no period, the motion is integrated until omega is constant
-    to all digits. Raise InputError if the integration would be too long, or if the torque depends
-    on the state.
+    Its sign is continuous in time. The scene must have moments and an attitude. On the separatrix,
+    where omega has no period, the motion is integrated until omega is constant to all digits. Raise
+    InputError if the integration would be too long, or the torque depends on the state.
     """
     checked_scene(scene)
     assert scene.attitude is not None
@@ -118,7 +117,7 @@ def is_steady(scene: Scene) -> bool:
 
 
 def conjugate(q: Row) -> Row:
-    """Return the conjugate of a quaternion, scalar first."""
+    """Return the conjugate of a quaternion."""
     return [q[0], -q[1], -q[2], -q[3]]
 
 

@@ -147,7 +147,7 @@ def exact_body(scene: Scene) -> tuple[list[Fraction], list[Fraction]]:
 class _Equations:
     """Equations 13-15 of the thesis for one scene, as recurrences of Taylor terms.
 
-    The unit of time is `span`, the last time (s), the unit of omega `unit` (rad/s).
+    The units are `span`, the last time (s), and `unit` (rad/s).
     """
 
     def __init__(self, scene: Scene, span: Fraction, unit: Fraction) -> None:
@@ -188,7 +188,7 @@ class _Equations:
     def expand(self, state: Series, begin: int, length: int) -> list[Series]:
         """Return the Taylor terms of all unknowns at the end of a step.
 
-        Term k is coefficient k times power k of the step. `state` has the unknowns at the
+        Term k is coefficient k times power k of the step. `state` has the unknowns at its
         beginning; `begin` and `length` are in units of 2**-64 of the last time.
         """
 

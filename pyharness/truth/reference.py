@@ -75,10 +75,10 @@ def reference(
     A `precise` series has an error of at most 1e-25 before rounding, unless errors are amplified
     too much. Attitudes are always computed by the series.
 
-    `effort` is a factor on a work limit of some ten seconds; the first steps show whether it will
-    be exceeded. None means a limit of 100 000 steps. A torque that depends on the state must be
-    recorded; the rows end before the torque becomes singular. Raise InputError if the times are
-    not in order, a changing moment reaches 0, or the series is impossible or too long.
+    `effort` is a factor on a work limit of some ten seconds; None means a limit of 100 000 steps. A
+    torque that depends on the state must be recorded; the rows end before it becomes singular.
+    Raise InputError if the times are not in order, a changing moment reaches 0, or the series is
+    impossible or too long.
     """
     if scene.changing is not None:
         scene.changing.check(times)
@@ -152,7 +152,7 @@ def _check_torque(scene: Scene) -> None:
 def known_solution(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
     """Return omega (rad/s) of a sphere or a torque-free symmetric body in closed form, else None.
 
-    It has as many digits after the decimal point as the precision of the decimal context.
+    It has as many decimals as the precision of the decimal context.
     """
     if isinstance(scene.torque, StateTorque) or scene.changing is not None:
         return None

@@ -1,8 +1,8 @@
 """Taylor coefficients, in decimal arithmetic, of a torque that is recorded on a tape.
 
 A tape is a list of operations, whose results are in numbered slots. The coefficients are computed
-order by order, together with those of the solution, by the recurrences of Jorba and Zou 2005,
-Experimental Mathematics 14.
+order by order with those of the solution, by the recurrences of Jorba and Zou 2005, Experimental
+Mathematics 14.
 """
 
 from bisect import bisect_left, bisect_right
@@ -66,8 +66,8 @@ class TapeSeries:
     ) -> None:
         """Store the operations, with terms of sums multiplied by 1 plus or minus `change`.
 
-        A `change` shows the effect of rounding. `results` has the results of switches by slot; the
-        caller changes them.
+        A `change` shows the effect of rounding. `results` are the switches' by slot; the caller
+        changes them.
         """
         self.results = {} if results is None else results
         self._tape = tape
@@ -93,7 +93,7 @@ class TapeSeries:
     ) -> None:
         """Begin an expansion around `time` (s).
 
-        `omega` and `attitude`, which may be empty, are the Taylor coefficients of the unknowns; the
+        `omega` and `attitude`, which may be empty, are the unknowns' Taylor coefficients; the
         caller extends them. At a break of a table the later piece is expanded if `forward`, else
         the earlier.
         """
@@ -218,8 +218,8 @@ class TapeSeries:
         An exponential, or the derivative of a hyperbolic tangent, may be negligible at the
         beginning of a step and large a little later. Its argument may therefore change by at most
         half the order, unless the function remains negligible. The mean order of the terms of a
-        product, weighted by their magnitudes, is limited in the same way. A divisor must have no
-        zero in the circle around the beginning whose radius is the step.
+        product, weighted by magnitude, is limited likewise. A divisor must have no zero in the
+        circle around the beginning whose radius is the step.
         """
         for _, operation in self._live_operations():
             most = self._largest_change(operation)
@@ -268,7 +268,7 @@ class TapeSeries:
     def next_change(self, time: Decimal, forward: bool) -> Decimal | None:
         """Return the time (s) of the next change of a table after `time`, or None.
 
-        Unless `forward`, it is the last change before `time`.
+        Unless `forward`, it is the last before `time`.
         """
         place = (bisect_right if forward else bisect_left)(self._changes, time) - (not forward)
         return self._changes[place] if 0 <= place < len(self._changes) else None
@@ -276,8 +276,7 @@ class TapeSeries:
     def crosses_a_branch(self, offset: Decimal) -> bool:
         """Return whether a square root reaches 0 within `offset` (s) of the expansion's time.
 
-        Beyond a double zero its series is the negative of the root, as for sqrt(x**2), whose series
-        is x or -x.
+        Beyond a double zero the series is the negative of the root: for sqrt(x**2), it is x or -x.
         """
         for slot, operation in self._live_operations():
             if operation.kind == "sqrt":

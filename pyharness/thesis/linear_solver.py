@@ -60,7 +60,7 @@ def _factor(a: list[list[float]]) -> list[int] | None:
 
 
 def _substitute(a: list[list[float]], pivots: list[int], b: list[float]) -> list[float]:
-    """Return the solution x of A x = b from LU factors and pivot rows of `_factor`."""
+    """Return the solution x of A x = b from the results of `_factor`."""
     n = len(a)
     x = list(b)
     for i, row in enumerate(a):

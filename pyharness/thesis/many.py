@@ -252,7 +252,7 @@ def _run(
 
 
 def _pieces(n: int, steps: int, threads: int) -> Iterator[slice]:
-    """Yield the range of bodies of each kernel call: one call, or several calls for each thread."""
+    """Yield the range of bodies of each kernel call."""
     size = n
     if threads > 1:
         fair = -(-n // (_PIECES * threads))
@@ -264,7 +264,6 @@ def _pieces(n: int, steps: int, threads: int) -> Iterator[slice]:
 
 
 def _steps(at: Sequence[SupportsIndex] | None, steps: int) -> NDArray[np.int32]:
-    """Return the requested steps as an array, by default the last; raise InputError if invalid."""
     if at is None:
         return np.array([steps], dtype=np.int32)
     found = [integer("at", each) for each in number_list("at", at, "allowed: a list of steps")]

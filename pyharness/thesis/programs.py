@@ -70,7 +70,6 @@ class Program:
     def _computed(
         self, scene: Scene, listing: Listing, implementation: str, *options: Any
     ) -> Trajectory:
-        """Run the program in binary64; `options` are `lipschitz`, `may_stop` and `velocity`."""
         if implementation == "fortran":
             return compiled.run(scene, listing, *options)
         lipschitz, may_stop, _ = options

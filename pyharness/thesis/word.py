@@ -322,7 +322,7 @@ class Number:
 
     @property
     def _shadow(self) -> float:
-        """Return a zero, infinity or nan as a float, any other number as its sign, 1.0 or -1.0."""
+        """Return a zero, infinity or nan as a float, any other number as its sign."""
         if self.m:
             return 1.0 if self.m > 0 else -1.0
         return float(self.e)

@@ -201,7 +201,7 @@ class _Statement(NamedTuple):
     def _balls(
         self, any_torque: bool, effort: float
     ) -> tuple[Sequence[Balls] | None, Sequence[Balls] | None]:
-        """Return balls that contain omega and the attitude; None for what is not proved."""
+        """Return balls that contain omega and the attitude; None where nothing is proved."""
         # Imported only here, because few programs need the provers.
         from pyharness.truth.certificate import has_certificate, prove
 

@@ -206,7 +206,7 @@ class _Run:
     def _expected_excess(
         self, radius: int, source: int, middle: Sequence[int], share: float
     ) -> float:
-        """Return, by extrapolation, by how many digits the radius will be too large at the end."""
+        """Return by how many digits the radius will be too large at the end, by extrapolation."""
         amplified = self._amplified
         total = amplified[-1][1] + math.log10(radius) - math.log10(source)
         amplified.append((share, total))

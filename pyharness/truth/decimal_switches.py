@@ -122,7 +122,8 @@ class Switches:
 def _first_root(terms: Row, length: Decimal, side: int) -> Decimal | None:
     """Return the first place up to `length` where a series gets the sign opposite to `side`.
 
-    Newton's method corrects the eigenvalues, in binary64, of the polynomial's companion matrix.
+    The roots are eigenvalues of the polynomial's companion matrix in binary64, corrected by
+    Newton's method.
     """
     scaled = [each * length**k for k, each in enumerate(terms)]
     if not scaled[0]:

@@ -105,7 +105,7 @@ def largest_radius(omega: Sequence[Balls], digits: int) -> Fraction:
 
 
 def _digits(radius: Fraction) -> int:
-    """Return how many digits after the point are enough that rounding adds little to a radius."""
+    """Return the number of decimals with which rounding adds little to a radius."""
     if not radius:
         return 40
     excess = radius.denominator.bit_length() - radius.numerator.bit_length()

@@ -52,7 +52,6 @@ def enclose_free(
 
 
 def _solution(scene: Scene, attitude: bool) -> Callable[[Fraction], Balls]:
-    """Return the function of time (s) that encloses omega and attitude."""
     a, w = exact_body(scene)[1], [Fraction(x) for x in scene.omega]
     moments = scene.exact_moments if attitude else None
     begin = _unit([Fraction(x) for x in scene.attitude or ()]) if attitude else []

@@ -271,7 +271,6 @@ class _Proof:
         return found
 
     def step(self, last: Fraction) -> None:
-        """Take a step, at most to `last` (s)."""
         side = 1 if self.forward else -1
         rates = self.equations.at(self.time, self.forward)
         begin = ball(self.time)

@@ -254,7 +254,8 @@ class TapeSeries:
         return 2 * order > self._order and size > least
 
     def _largest_change(self, operation: Operation) -> Decimal | None:
-        """Return how much an operation's last operand may change in a step; None without limit."""
+        """Return the largest change of an operation's last operand in a step; None without limit.
+        """
         if operation.kind not in ("exp", "tanh", "quotient"):
             return None
         x = self._slots[operation.operands[-1]][0]

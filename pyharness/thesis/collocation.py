@@ -66,8 +66,8 @@ def interval(
 ) -> tuple[list[float], int]:
     """Return all unknowns after one step, and the error code IER of the correction.
 
-    `points` and `end` are times (s) after the start of the step. `rates` returns the right-hand
-    sides at point k (0 for the start) from k and the unknowns.
+    `points` and `end` are times (s) after its start. `rates` returns the right-hand sides at point
+    k (0 for the start) from k and the unknowns.
     """
     constant = rates(0, start)
     estimate, _ = fit(points, [constant] * len(points))
@@ -93,7 +93,7 @@ def collocation_matrix(points: Sequence[float]) -> list[list[float]]:
 def values(start: Vector, coefficients: Sequence[Vector], t: float) -> list[float]:
     """Return every unknown's polynomial x(0) + c1 t + c2 t**2 + ... at the time `t` (s).
 
-    The rounding errors depend on this order of the terms.
+    The rounding errors depend on the order of the terms.
     """
     t2 = t * t
     powers = [t, t2, t2 * t, t2 * t2, t2 * t2 * t]

@@ -1,4 +1,4 @@
-"""Runs of the compiled programs (Fortran ports) of the thesis's appendix on a scene."""
+"""Runs of the compiled programs (Fortran ports) of the thesis on a scene."""
 
 from dataclasses import replace
 from typing import Any

@@ -108,7 +108,7 @@ def run_compiled(
 
 
 def compiled_words() -> tuple[str, ...]:
-    """Return the names of the compiled programs' arithmetics; none if no program is built."""
+    """Return the names of the compiled programs' arithmetics; none without a build."""
     try:
         from pyharness import _build
     except ImportError:

@@ -76,7 +76,7 @@ def _to_places(x: Any, places: int) -> float:
 def formats_of(program: str) -> dict[str, Any]:
     """Return a program's FORMATs: ``header`` (moments, torques), ``heads`` and ``rows``.
 
-    Further keys name the cards of the FORMATs, and mark their characters as certain or conjectural.
+    Further keys name their cards, and mark their characters as certain or conjectural.
     """
     programs: list[dict[str, Any]] = facts("printer")["program"]
     return next(each for each in programs if each["name"] == program)

@@ -77,7 +77,7 @@ def prove(
     """Return balls that contain omega at `times` (s), and their certificate.
 
     A radius is at most 10**-digits rad/s, times the largest component of omega if that exceeds 1
-    rad/s. `effort` is a factor on the limit of work. Raise InputError if the scene can't have a
+    rad/s. `effort` is a factor on the work limit. Raise InputError if the scene can't have a
     certificate, omega grows without bound, or the limit is exceeded.
     """
     if not has_certificate(scene):

@@ -210,8 +210,8 @@ def _law_of(scene: Scene) -> TorqueLaw:
 def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal, leading: int = 3) -> Decimal:
     """Return the length (s), at most `rest`, of a step whose last two Taylor terms are small.
 
-    The terms are at most `tolerance` times the largest of the first `leading` unknowns, or if these
-    are 0, of their first nonzero Taylor terms.
+    They are at most `tolerance` times the largest of the first `leading` unknowns or, if these are
+    0, of their first nonzero Taylor terms.
     """
     order = len(coefficients[0]) - 1
     begun = next((j for j in range(order - 1) if _size(coefficients, j, leading)), None)

@@ -122,8 +122,7 @@ class Switches:
 def _first_root(terms: Row, length: Decimal, side: int) -> Decimal | None:
     """Return the first place up to `length` where a series gets the sign opposite to `side`.
 
-    The roots are eigenvalues of the polynomial's companion matrix in binary64, corrected by
-    Newton's method.
+    Roots are eigenvalues of the companion matrix in binary64, corrected by Newton's method.
     """
     scaled = [each * length**k for k, each in enumerate(terms)]
     if not scaled[0]:

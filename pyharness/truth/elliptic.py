@@ -112,7 +112,7 @@ def _normal(start: Row, p: Fraction, q: Fraction, time: Decimal) -> Row:
     """Return x, y, z (1/s) at `time` (s), where x' = y z, y' = -z x, z' = x y.
 
     `start` has z other than 0; p = x**2 + y**2 is not 0, and q = z**2 + y**2 is at least p. The
-    solution uses the addition theorems of sn, cn and dn.
+    addition theorems of sn, cn and dn give the solution.
     """
     x, y, z = start
     sign = -1 if z < 0 else 1

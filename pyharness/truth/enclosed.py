@@ -96,7 +96,7 @@ def rounded_up(x: Fraction) -> float:
 def largest_radius(omega: Sequence[Balls], digits: int) -> Fraction:
     """Return the largest ratio of a radius to the allowed radius.
 
-    A radius may be 10**-digits rad/s, times the largest component of omega if that exceeds 1 rad/s.
+    The latter is 10**-digits rad/s, times the largest component of omega if that exceeds 1 rad/s.
     """
     largest = Fraction(0)
     for middle, radius in omega:

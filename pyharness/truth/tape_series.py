@@ -58,7 +58,7 @@ class TapeSeries:
     """The Taylor series of a tape's operations around a time.
 
     `begin` starts an expansion, and each `next` adds a coefficient to all series. `least_order` is
-    the lowest order whose series show all products, also those whose factors are 0 at that time.
+    the lowest order whose series show all products, even if factors are 0 at that time.
     """
 
     def __init__(
@@ -238,8 +238,7 @@ class TapeSeries:
     def _is_hidden(self, power: _Power, length: Decimal) -> bool:
         """Return whether a product may matter in a step, although its computed terms do not.
 
-        The mean order of a product's terms, weighted by their magnitudes, is the sum of those of
-        its factors.
+        The mean order of its terms, weighted by magnitude, is the sum of those of its factors.
         """
         (factors, size, slots), order = power, Decimal(0)
         for slot, count in factors.items():
@@ -254,7 +253,7 @@ class TapeSeries:
         return 2 * order > self._order and size > least
 
     def _largest_change(self, operation: Operation) -> Decimal | None:
-        """Return the largest change of an operation's last operand in a step; None without limit.
+        """Return by how much an operation's last operand may change in a step; None without limit.
         """
         if operation.kind not in ("exp", "tanh", "quotient"):
             return None
@@ -289,7 +288,7 @@ class TapeSeries:
 
 
 def _powers(tape: Tape) -> tuple[list[_Power], int]:
-    """Return the products that are not part of larger ones, and the largest number of factors."""
+    """Return products of three or more factors used outside products, and the most factors."""
     factors: dict[int, Counter[int]] = {}
     numbers: dict[int, int] = {}
     scales: dict[int, float] = {}

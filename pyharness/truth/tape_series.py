@@ -253,8 +253,7 @@ class TapeSeries:
         return 2 * order > self._order and size > least
 
     def _largest_change(self, operation: Operation) -> Decimal | None:
-        """Return by how much an operation's last operand may change in a step; None without limit.
-        """
+        """Return how much an operation's last operand may change in a step; None without limit."""
         if operation.kind not in ("exp", "tanh", "quotient"):
             return None
         x = self._slots[operation.operands[-1]][0]

@@ -146,7 +146,7 @@ def _extrapolated(scene: Scene) -> Rate:
     are therefore t/3 and 2t/3 after the beginning of the step, with t = n h. Let F be the
     right-hand side of Euler's equations at w, F' its Jacobian, and Q its quadratic part. The slope
     along the first estimate is g(s) = F(w + s F) = F + s F' F + s^2 Q(F). The line through g(t/3)
-    and g(2t/3) has at s = 0 the value 2 g(t/3) - g(2t/3) = F - (2/9) t^2 Q(F).
+    and g(2t/3) is 2 g(t/3) - g(2t/3) = F - (2/9) t^2 Q(F) at s = 0.
     """
     right_hand_side = scene.right_hand_side()
     a, b, c = scene.euler_coefficients
@@ -162,9 +162,9 @@ def _extrapolated(scene: Scene) -> Rate:
 def _slow_slopes(scene: Scene) -> Rate:
     """Return the right-hand side of the Runge-Kutta program's limit, under varying torque.
 
-    Let p be the omega in U(1), at which the program evaluates the first slopes of a step. Each step
-    of size h adds (h/2) F(p) to p, and h F(p) to the printed omega, where F is the right-hand side
-    of Euler's equations. The state is p, then the printed omega.
+    Let p be the omega in U(1), at which a step's first slopes are evaluated, and F the right-hand
+    side of Euler's equations. Each step of size h adds (h/2) F(p) to p, and h F(p) to the printed
+    omega. The state is p, then the printed omega.
     """
     right_hand_side = scene.right_hand_side()
 

@@ -46,8 +46,8 @@ class Laboratory:
     `fixed` are corrected in the original programs. Errors are against the reference solution.
 
     The collocation model has n points at the times k DT/(n+1) in the step, k = 1 ... n. In the
-    original programs DT grows by the step size in every step, so that the points move out of the
-    step; the torque must then be constant.
+    original programs DT grows by the step size in every step, and the points move out of the step;
+    the torque must then be constant.
     """
 
     is_original: bool

@@ -125,7 +125,7 @@ def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:
 def assignments() -> list[Assignment]:
     """Return an assignment for each start and each case for which the thesis gives no omega(0).
 
-    Claims about a case do not depend on the start of another. If each case has a start with which
+    Claims about a case do not depend on another case's start. If each case has a start with which
     its claims hold, all claims can therefore hold at once.
     """
     found = []

@@ -1,7 +1,6 @@
 """Tests of the thesis's claims about programs and methods over several cases.
 
-Each function is the `test` of claims in `data/claims.toml`, whose `rule` describes the decision;
-`lab` runs the programs, original or corrected. For the original programs, tests of weightings other
+Arguments and verdicts are as in `verdicts`. For the original programs, tests of weightings other
 than collocation return "not testable", because the thesis prints no such program.
 """
 

@@ -1,8 +1,7 @@
 """Tests of the thesis's claims about history, theory and orders.
 
-Each function is the `test` of claims in `data/claims.toml`, whose `rule` describes the decision;
-`lab` runs the programs. An error is the largest deviation of any omega component from the reference
-solution, `limit` its allowed ratio to the largest omega.
+Arguments and verdicts are as in `verdicts`. An error is the largest deviation of any omega
+component from the reference solution, `limit` its allowed ratio to the largest omega.
 """
 
 import math

@@ -5,10 +5,9 @@ Each function is the `test` of one or more claims in `data/claims.toml`; further
 the keyword arguments. `lab` runs the programs, original or corrected; `case` is a number of Table
 1.
 
-An error is the largest deviation of any omega component from the reference solution, over the steps
-that the program ran. The amplitude is half the largest range (largest minus smallest value) of a
-component of the reference omega. A claim that fails is "not reproduced"; a test that passes
-`otherwise` calls it "false".
+Errors and ranges are defined in `rules`. The amplitude is half the largest range of a component of
+the reference omega. A claim that fails is "not reproduced"; a test that passes `otherwise` calls it
+"false".
 """
 
 from dataclasses import dataclass, replace

@@ -56,7 +56,7 @@ def request(
 
 
 def requested_scene(scene: Scene) -> dict[str, Any]:
-    """Return a scene as a dictionary, the field `scene` of a request."""
+    """Return the field `scene` of a request."""
     return {
         **scene_record(scene),
         "masses": scene.masses,

@@ -62,8 +62,8 @@ def drag(coefficients: Iterable[MatrixLike], per_axis: bool = False) -> StateTor
     """Return a drag torque that is an odd polynomial of omega.
 
     It is the sum over n = 0, 1, 2, ... of -C_n |omega|^(2n) omega. With `per_axis` it is the sum of
-    -C_n v_n, where v_n has the components omega_i^(2n+1). Quadratic drag, -k |omega| omega, is not
-    smooth at 0; away from 0, use a Python function with ``numpy.sqrt``.
+    -C_n v_n, where v_n has the components omega_i^(2n+1). Quadratic drag, -k |omega| omega, is no
+    such polynomial; if omega stays away from 0, use a Python function with ``numpy.sqrt``.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def drag(coefficients: Iterable[MatrixLike], per_axis: bool = False) -> StateTor
     Raises
     ------
     InputError
-        If `coefficients` or one of them has another form.
+        If `coefficients` has another form.
 
     References
     ----------

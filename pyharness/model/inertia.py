@@ -32,10 +32,10 @@ _MOST_ROTATIONS = 500  # about ten suffice, because the convergence is quadratic
 
 @dataclass(frozen=True, eq=False)
 class PrincipalFrame:
-    """Principal moments (kg m2) and axes of a body, as floats and fractions (30 or more digits).
+    """Principal moments (kg m2) and axes, as floats and as fractions of 30 or more digits.
 
-    The columns of `axes` form a right-handed frame, each near the body's own axis of the same
-    number. `moments_low` is the exact moments minus `moments`.
+    The columns of `axes` form a right-handed frame, each nearest to the body axis of its number.
+    `moments_low` is `exact_moments` minus `moments`, as floats.
     """
 
     moments: Triple

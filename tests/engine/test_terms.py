@@ -154,7 +154,7 @@ def test_wheels_with_a_slow_motor_have_no_cancellation() -> None:
     slow = wheels((0, 0, 0), TorqueLaw(sines=[((0, 0, 1.0), 1e-9)]))
     # The momentum is f t^2/2 to 18 digits, and the motor's torque f t.
     found = slow.at(2.0, (1.0, 1.0, 0.0), (1.0, 0.0, 0.0, 0.0))
-    assert found == pytest.approx((-2e-9, 2e-9, -2e-9), rel=1e-15)
+    assert found == pytest.approx((-2e-9, 2e-9, -2e-9), rel=1e-15, abs=0.0)
 
 
 def test_gravity_gradient_is_the_torque_of_newtons_law() -> None:

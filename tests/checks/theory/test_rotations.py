@@ -88,11 +88,11 @@ def test_growth_that_is_slow_beside_the_oscillation_is_not_lost() -> None:
     coefficients = case_scene(4).euler_coefficients
     a, b, c = coefficients
     found = rates(coefficients, (1.0, 1e-10, -1e-10))
-    assert found[0] == pytest.approx(2.0 * a * 1e-20, rel=1e-12)
-    assert found[1] == pytest.approx(1j * math.sqrt(-b * c), rel=1e-12)
+    assert found[0] == pytest.approx(2.0 * a * 1e-20, rel=1e-12, abs=0.0)
+    assert found[1] == pytest.approx(1j * math.sqrt(-b * c), rel=1e-12, abs=0.0)
     found = rates(coefficients, (1.0, 1e-10, 1e-10))
-    assert found[0].real == pytest.approx(a * 1e-20, rel=1e-12)
-    assert found[2].real == pytest.approx(-2.0 * a * 1e-20, rel=1e-12)
+    assert found[0].real == pytest.approx(a * 1e-20, rel=1e-12, abs=0.0)
+    assert found[2].real == pytest.approx(-2.0 * a * 1e-20, rel=1e-12, abs=0.0)
 
 
 @pytest.mark.parametrize("name", SCENES)

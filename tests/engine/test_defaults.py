@@ -7,7 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pyharness import Scene, TorqueLaw, compare_programs, prepare, solve, solve_many
+from pyharness import (
+    InputError,
+    Scene,
+    TorqueLaw,
+    compare_programs,
+    prepare,
+    solve,
+    solve_many,
+)
 from pyharness.checks.compare.batch import Solver
 from pyharness.checks.scenes.random_scenes import draw
 from pyharness.cli.main import main
@@ -100,3 +108,11 @@ def test_help_names_the_default(capsys: pytest.CaptureFixture[str]) -> None:
     for verb in ("run", "plan", "compare"):
         assert main(["help", verb]) == 0
         assert "method's own" in " ".join(capsys.readouterr().out.split())
+
+
+def test_more_times_than_the_memory_can_hold_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pyharness.engine.solve.most_steps", lambda: 3)
+    scene = Scene("", (1, 0, 0), moments=(1, 2, 3))
+    assert len(solve(scene, [1, 2, 3]).time) == 3
+    with pytest.raises(InputError, match="times: more than 3 times"):
+        solve(scene, [1, 2, 3, 4])

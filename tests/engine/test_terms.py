@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from pyharness import Scene, StateTorque, TorqueLaw, principal, torques
 from pyharness.engine import field_terms, table_terms, terms
 from pyharness.engine.recorded import slopes_of
+from pyharness.model.scene_file import scene_text
 from pyharness.model.trajectory import Array
 from pyharness.torques import (
     attitude_control,
@@ -148,6 +149,12 @@ def test_a_term_equals_its_formula(name: str) -> None:
         # The negative of a quaternion is the same attitude.
         assert torque.at(t, omega, -attitude) == torque.at(t, omega, attitude)
     assert torque.needs_attitude is not any(each in name for each in IN_BODY)
+
+
+def test_the_file_of_wheels_has_the_motor_that_was_given() -> None:
+    for motor in (None, V):
+        text = scene_text(Scene("", (1, 0, 0), moments=MOMENTS, torque=wheels(H, motor)))
+        assert ("motor" in text) == (motor is not None)
 
 
 def test_wheels_with_a_slow_motor_have_no_cancellation() -> None:

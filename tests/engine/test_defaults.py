@@ -7,15 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pyharness import (
-    InputError,
-    Scene,
-    TorqueLaw,
-    compare_programs,
-    prepare,
-    solve,
-    solve_many,
-)
+from pyharness import InputError, Scene, TorqueLaw, compare_programs, prepare, solve, solve_many
 from pyharness.checks.compare.batch import Solver
 from pyharness.checks.scenes.random_scenes import draw
 from pyharness.cli.main import main

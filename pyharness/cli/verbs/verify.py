@@ -119,7 +119,9 @@ def run(options: argparse.Namespace) -> int:
                 "there are no stored trajectories (golden) here; give --record DIR, or run in a "
                 "source checkout"
             )
-        raise InputError(f"--only {options.only}: there is no such check; allowed: {', '.join(KINDS)}")
+        raise InputError(
+            f"--only {options.only}: there is no such check; allowed: {', '.join(KINDS)}"
+        )
     drawn = samples(checks, ROUNDING) if options.draws is not None else []
     more = [*drawn, *references(checks)]
     text = summary([*_title(chosen), *_unjudged(chosen, checks)], checks, more=more)

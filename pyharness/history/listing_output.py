@@ -41,7 +41,7 @@ def fits(
 
     Pages have the same form if the moments and torques in their headings and the numbers of columns
     agree. Our runs have as many steps as in the text of the thesis or, if the page is longer, as on
-    the cards. Raise InputError if no page of ours has the form.
+    the cards. Raise InputError if none of our pages has the form.
     """
     found: list[Fit] = []
     listings = {program: listings_of(program) for program in programs}

@@ -133,7 +133,7 @@ def _over(finding: Finding, load: Workload, peer: str) -> float | None:
 
 
 def _preparing(finding: Finding, load: Workload, method: str) -> float | None:
-    """Return a method's time (s) to prepare for a scene's shortest end time, or None."""
+    """Return how long a method prepares for a scene's shortest end time (s); None if unknown."""
     first = next(each for each in finding.workloads if each.label == load.label)
     times = [row.preparing for row in _rows(finding, first, method)]
     return (times[0] if method == OURS else statistics.median(times)) if times else None

@@ -184,8 +184,8 @@ class _Run(Run):
     @np.errstate(over="ignore", invalid="ignore")
     def ahead(self) -> _Ahead:
         """Integrate with few digits; return the quantities that determine the local tolerance."""
-        # The absolute tolerance is relative to an estimate of the largest |omega|, which may be far
-        # too large for a body at rest.
+        # The absolute tolerance is relative to an estimate of the largest |omega|. For a body at
+        # rest, the first estimate may be far too large.
         scale = max(map(abs, self.scene.omega)) or self._scale_by_torque()
         if scale == 0.0:
             return _Ahead(0.0, 0.0, 1.0)
@@ -197,8 +197,8 @@ class _Run(Run):
                 break
             scale = largest
         if coarse.status != 0:
-            # Omega grows without bound, or its phase has no correct digit left: no tolerance can be
-            # met until the end, and phase and amplification do not count.
+            # Omega grows without bound, or its phase has no correct digit left. No tolerance can be
+            # met at the end; phase and amplification do not count.
             return _Ahead(max(scale, self._scale_by_torque()), 0.0, 1.0)
         length = abs(float(coarse.t[-1]) * self.unit)
         count = math.ceil(_NODES_PER_RADIAN * 2.0 * min(1e9, self.rate * largest * length))
@@ -208,7 +208,7 @@ class _Run(Run):
         largest = max(largest, float(sizes.max()))
         radians, phases = self.rate * length * float(np.mean(sizes)), 0.0
         for push, frequency in _pushes(self.scene):
-            # The phase of a wave is limited to the omega that it can add, over `largest`.
+            # A wave adds its phase, but at most the omega that it can cause, over `largest`.
             phases += min(frequency * length, push * length / largest if largest > 0.0 else 0.0)
         turned = 0.0
         if self.scene.attitude is not None:

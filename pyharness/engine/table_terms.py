@@ -143,7 +143,7 @@ def _ascending(where: str, times: Any) -> Array:
 
 
 def _as_array(values: Any) -> Any:
-    """Return a DataFrame or Series as an array; iterating it would yield column names."""
+    """Return a DataFrame, whose iterator yields column names, or a Series as an array."""
     return values.to_numpy() if hasattr(values, "to_numpy") else values
 
 

@@ -160,7 +160,7 @@ class Convergence:
 
     @property
     def is_first(self) -> bool:
-        """Return whether the order is about 1, over the last pair and over several steps."""
+        """Return whether the order is about 1 over the last two settings, and over several."""
         if self.order is None:
             return False
         far = _power(self.errors[-_SEVERAL] / max(self.errors[-1], _LEAST),

@@ -260,10 +260,10 @@ def _share(error: Fraction, bound: Fraction) -> float:
 
 
 def _pivoting(matrix: Fractions, order: Sequence[int], sizes: Fractions) -> tuple[float, float]:
-    """Return the largest relative shortfall of a pivot from the best candidate, and its bound.
+    """Return the largest relative shortfall of a pivot, and the largest that rounding can cause.
 
-    The pivots are from exact elimination in the solver's `order`. The bound is for rounding,
-    computed from `sizes`, abs(L) abs(U).
+    The shortfall is that from the best candidate, in exact elimination in the solver's `order`.
+    `sizes` is abs(L) abs(U).
     """
     shortfall, allowed = Fraction(0), Fraction(0)
     scale = 1 / abs(matrix).max(axis=1)

@@ -125,6 +125,7 @@ def test_a_body_at_rest_and_the_state_at_time_zero_remain(name: str) -> None:
         for law in (torque, TorqueLaw()):
             scene = Scene("", omega, _MOMENTS, torque=law, attitude=attitude)
             found = solve(scene, times, name.lower(), 1e-8, attitude=True)
+            assert found.has_all_rows
             np.testing.assert_array_equal(found.omega, [omega] * len(times))
             np.testing.assert_array_equal(found.attitude, [attitude] * len(times))
 

@@ -458,8 +458,8 @@ def test_a_scene_file_has_states(tmp_path: Any) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("rate =", "rates =", "unknown key"),
-        ('rate = "k*w3 - 0.1*sin(t)"', "", "rate is missing"),
+        ("rate =", "rates =", r"\[states.wheel\]: unknown key"),
+        ('rate = "k*w3 - 0.1*sin(t)"', "", r"\[states.wheel\]: rate is missing"),
         ("[states.wheel]", "[states.w1]", "another meaning"),
         ("[states.wheel]", "[states.k]", "another meaning"),
         ("expression = [", "constant = [1.0]  # [", "states without expression"),

@@ -61,11 +61,10 @@ _EFFORT = (
 EFFORT = {"--effort F": _EFFORT.format(" (30 for a program of the thesis)")}
 EFFORT_WITHOUT_PROGRAMS = {"--effort F": _EFFORT.format("")}
 STRICT = {
-    "--strict": "Exit with status 1 also if amplified rounding errors may exceed the tolerance, or "
-    "a method of --method ends before the last time, even if the true solution does too. The "
-    "status is always 1 if the Fortran and Python versions of a program differ, a corrected "
-    "program misses its order of convergence, or a method of --method misses its tolerance or ends "
-    "before the true solution does."
+    "--strict": "The exit status is 1 if the Fortran and Python versions of a program differ, a "
+    "corrected program misses its order of convergence, or a method of --method misses its "
+    "tolerance or ends before the true solution does. With this option it is also 1 if amplified "
+    "rounding errors may exceed the tolerance, or a method ends before the last time."
 }
 ALSO = {
     "--also FILE,...": "Write the result to these files too, each in the format of its ending: "

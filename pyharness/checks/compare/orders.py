@@ -64,7 +64,7 @@ class Order:
         return self.state in ("as due", "rounding", "misses")
 
     def __str__(self) -> str:
-        """Return the measured order as text, or why it is undecided."""
+        """Return the measured order as text, or why there is none."""
         if self.value is not None:
             return f"order {self.value:.2f}"
         return {

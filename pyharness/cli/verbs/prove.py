@@ -27,8 +27,7 @@ OPTIONS = {
     "too; needs the package python-flint.",
     "--certificate FILE": "Write the steps of the proof to this file (JSON), a certificate for "
     "--check. Only for torques that depend on time alone; not with --velocity or --transition.",
-    "--check FILE,...": "Verify the certificates in these files instead of proving anything; needs "
-    "no third-party library.",
+    "--check FILE,...": "Verify the certificates in these files; needs no third-party library.",
     **shared.EFFORT_WITHOUT_PROGRAMS,
     **shared.outputs(plot=""),
 }

@@ -35,8 +35,8 @@ class LeavesError(Exception):
     """The reason why leaves can't be compiled or loaded, in one line."""
 
 
-# RuntimeError: no home folder is known. ValueError: a quotation mark in CC is not closed.
-_FAILURES = (LeavesError, RuntimeError, ValueError)
+# RuntimeError: no home folder is known.
+_FAILURES = (LeavesError, RuntimeError)
 
 
 def folder() -> Path:
@@ -108,7 +108,10 @@ def compiler() -> tuple[str, ...]:
     from shutil import which
 
     for command in filter(None, (os.environ.get("CC"), "cc", "gcc", "clang")):
-        program, *arguments = shlex.split(command) or [""]
+        try:
+            program, *arguments = shlex.split(command) or [""]
+        except ValueError as error:
+            raise LeavesError(f"CC is {command!r}: {error}") from None
         if found := which(program):
             return (found, *arguments)
     raise LeavesError("no C compiler is found: install one, or name it with CC=...")

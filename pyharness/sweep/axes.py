@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from pyharness.engine.parameters import INERTIA_ELEMENTS
 from pyharness.model.errors import InputError, kind_of, unknown
+from pyharness.model.scene import most_steps
 from pyharness.model.scene_file import check_keys
 from pyharness.model.values import finite, integer
 
@@ -88,7 +89,14 @@ NUMBERS = {
     "t_end": Field("s", "time of the end"),
     "tolerance": Field("1", "tolerance", "above 0, to 1", _from_zero_to_one, looped=True),
     "step_size": Field("s", "step", *_ABOVE_ZERO, looped=True),
-    "steps": Field("1", "steps", "1 and above", lambda v: v >= 1.0, looped=True, whole=True),
+    "steps": Field(
+        "1",
+        "steps",
+        "1 to what fits in this machine's memory",
+        lambda v: 1.0 <= v <= most_steps(),
+        looped=True,
+        whole=True,
+    ),
     "lipschitz": Field("1/s", "constant of the stop test", *_FROM_ZERO, looped=True),
 }
 _POLAR = ("omega.magnitude", "tilt", "azimuth", "height", "longitude")

@@ -443,6 +443,7 @@ def test_without_a_working_compiler_the_interpreter_solves(
     assert leaf_cache.about_leaves()["bytes"] == 0
     solver = prepare(scene_of(simple), compiled=True)
     assert str(solver.leaves).startswith("interpreter: ")
+    assert ("CC is" in str(solver.leaves)) == (name == "with an open quotation")
     assert "\n" not in str(solver.leaves)
     assert solver((0.3, 0.2, 0.9), 1.0) == pytest.approx(solve(solver.scene, 1.0).omega[0])
     assert not [each for each in folder.glob("*") if not each.name.endswith(".so")]

@@ -181,6 +181,7 @@ REFUSED = {
     f"{CASE}[solve]\nt_end = 1\n{axis('t_end', [2.0])}": "[solve] t_end: it is given here",
     f"{CASE}[solve]\nmethod = 'rk4'\n{axis('tolerance', [0.1])}": "rk4 has a fixed step and no",
     f"{CASE}{axis('steps', [2.5])}": "(steps): 2.5; allowed: whole numbers",
+    f"{CASE}{axis('steps', [1e12])}": "(steps): 1e+12; allowed: 1 to what fits in",
     f"{CASE}[solve]\nmethod = 3\n{OMEGA}": "[solve] method is a whole number; it must be text",
     f"{CASE}[solve]\nprogram = 'two-term'\nlipschitz = -1\n{OMEGA}": "[solve] lipschitz is -1",
     f"reductions = [3]\n{CASE}{OMEGA}": "reductions: allowed: names, and tables",

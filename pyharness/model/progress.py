@@ -97,7 +97,6 @@ def for_each_piece(
         ends = [n * piece // count for piece in range(count + 1)]
         pieces = [slice(first, last) for first, last in itertools.pairwise(ends)]
     if threads == 1 or len(pieces) < 2:
-        # Only the main thread, usually this one, receives signals.
         for piece in pieces:
             work(piece, given_up)
             count_done(piece.stop - piece.start)

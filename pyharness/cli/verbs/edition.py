@@ -9,7 +9,7 @@ FORMATS = ("table", "json")
 OPTIONS = {
     "--out DIR": "Write the web pages to this folder, which is created if missing; the first page "
     "is index.html.",
-    "--data DIR": "Instead of web pages, write the data to this folder, as CSV, JSON, TEI (XML) "
+    "--data DIR": "Write the data to this folder, as CSV, JSON, TEI (XML) "
     "and text: cards (program lines), notes on them, verdicts on the thesis, figures, runs, and "
     "the pages that the programs print.",
     "--docs DIR": "With --out, folder of the documents from which pages are made (default: docs of "

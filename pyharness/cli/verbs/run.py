@@ -36,7 +36,7 @@ OPTIONS = {
     "--word W": f"Floating-point arithmetic of the program: {', '.join(WORD_NAMES)} (default "
     f"{WORD_NAMES[0]}). cdc48 is the arithmetic of CDC computers, which truncates results; "
     f"cdc48-rounded rounds them. The Fortran programs support only {', '.join(COMPILED_WORDS)}.",
-    "--method M": "Solve the scene by this method instead of a program: auto (default with "
+    "--method M": "Solve the scene by this method: auto (default with "
     "--scene), taylor, closed-form, dop853 or another of docs/reference/methods.md.",
     **shared.LISTING,
     "--times T1,T2,...": "Times of the results, in s, positive or negative, in increasing or "

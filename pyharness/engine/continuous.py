@@ -10,7 +10,7 @@ from pyharness.engine import dense
 from pyharness.engine.closed_form import period_of
 from pyharness.engine.event_fits import Solution
 from pyharness.engine.event_functions import EventFunction
-from pyharness.engine.events import found_events, no_events
+from pyharness.engine.events import FoundEvents, found_events, no_events
 from pyharness.engine.periodic_events import PERIODS, are_of_omega
 from pyharness.engine.registry import METHODS
 from pyharness.engine.sides import row_names
@@ -39,8 +39,8 @@ def with_events(
     rows: dense.Rows,
     method: str,
     tolerance: float,
-) -> Trajectory:
-    """Return a trajectory with its events, and without rows beyond a terminal event.
+) -> tuple[Trajectory, FoundEvents]:
+    """Return a trajectory without rows beyond a terminal event, and the events.
 
     `ends` are the first and last requested times (s); `rows` is as in `solution_of`.
     """
@@ -70,7 +70,7 @@ def with_events(
     if found.sol is not None:
         low, high = max(sol.t_min, events.first), min(sol.t_max, events.last)
         cut["sol"] = replace(sol, t_min=low, t_max=high)
-    return replace(found, **cut, t_events=events.times, y_events=events.states)
+    return replace(found, **cut, t_events=events.times, y_events=events.states), events
 
 
 def _first_periods(

@@ -6,14 +6,16 @@ of omega neither overflow nor underflow.
 
 import itertools
 import math
-from collections.abc import Iterable
-from dataclasses import replace
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from pyharness.engine.continuous import solution_of, with_events, with_events_reversed
-from pyharness.engine.event_functions import event_functions
+from pyharness.engine.event_functions import EventFunction, event_functions
+from pyharness.engine.events import FoundEvents
 from pyharness.engine.parameter_sensitivity import checked_names, sensitivities_at
 from pyharness.engine.registry import (
     METHODS,
@@ -51,6 +53,9 @@ from pyharness.model.values import (
 from pyharness.model.waves import with_merged_waves
 
 _OF_DIFFERENCES = 1e-13  # tolerance of solutions whose differences are derivatives
+# Radians until the first time at which a terminal event is expected, and for SciPy's methods, which
+# are slow; and the ratio of such times.
+_PHASES, _LONGER = (200.0, 10.0), 4.0
 
 
 @with_hints
@@ -170,52 +175,117 @@ def solve(
     if method != "reference" and isinstance(scene.torque, TorqueLaw):
         scene = with_merged_waves(scene)
     effort = checked_effort(effort)
-    below = [t for t in values if t < 0.0]
-    # Methods take times on one side of 0, in order away from 0.
-    sides = (below[::-1], values[len(below) :])
-    needs_steps = dense_output or functions is not None
-    more = (True,) if chosen.gives_steps and needs_steps else ()
-    parts = [integrate(chosen, scene, each, tolerance, effort, *more) for each in sides if each]
-    parts = [
-        with_reason(scene, part, each[-1]) if part.ended == "overflow" else part
-        for part, each in zip(parts, filter(None, sides), strict=True)
-    ]
-    if below:
-        parts[0] = in_reverse(parts[0])
-    found = parts[0] if len(parts) == 1 else joined(*parts)
-    reported = None if chosen.is_fixed_step else tolerance
-    sol = found.sol if needs_steps else None
-    if axes is not None:
-        turned_to = partial(states_in_scene_axes, axes=axes, own=7 if attitude else 3)
-        sol, found = transformed_steps(sol, turned_to), in_scene_axes(found, axes)
-    if sol is not None:
-        sol = replace(sol, rates=partial(rates_of, given))
-    found = replace(
-        found, moments=moments, tolerance=reported, scene=given, sol=sol if dense_output else None
-    )
-    if found.ended == "unchecked" and needs_steps:
-        raise InputError(
-            f"dense output and events of {method} need the series of a recorded torque, which ends "
-            "before the last time; allowed: a smooth torque, or opaque(function)"
-        )
-    if found.reason is not None:
-        found = replace(found, reason=with_text(found.reason, given))
-    rows = partial(_more_rows, given, method, effort, found.attitude is not None)
-    if needs_steps and sol is None:
-        sol = solution_of(given, found, rows, method, tolerance)
-        found = replace(found, sol=sol) if dense_output else found
-    if functions is not None:
-        assert sol is not None
-        ends = values[0], values[-1]
-        found = with_events(given, found, sol, functions, ends, rows, method, tolerance)
-        if turned or (len(values) == 1 and values[0] < 0.0):
-            found = with_events_reversed(found)
+    call = _Call(given, scene, moments, axes, method, tolerance, effort, dense_output, functions)
+    found = _to_terminal_events(call, values)
+    if functions is not None and (turned or (len(values) == 1 and values[0] < 0.0)):
+        found = with_events_reversed(found)
     found = in_reverse(found) if turned else found
     if names is not None:
         states = partial(_states_of_changed, found.time, effort, found.attitude is not None)
         slopes = sensitivities_at(given, found, names, effort, states)
         found = replace(found, sensitivities=slopes)
     return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Call:
+    """The checked arguments of `solve`; `given` is the scene, and `scene` has principal `axes`."""
+
+    given: Scene
+    scene: Scene
+    moments: Any
+    axes: Array | None
+    method: str
+    tolerance: float
+    effort: float
+    dense_output: bool
+    functions: list[EventFunction] | None
+
+    def trajectory(self, values: list[float]) -> tuple[Trajectory, FoundEvents | None]:
+        """Return the trajectory at ascending times (s), and its events if there are functions."""
+        given, scene, method, tolerance = self.given, self.scene, self.method, self.tolerance
+        chosen = METHODS[method]
+        below = [t for t in values if t < 0.0]
+        # Methods take times on one side of 0, in order away from 0.
+        sides = (below[::-1], values[len(below) :])
+        needs_steps = self.dense_output or self.functions is not None
+        more = (True,) if chosen.gives_steps and needs_steps else ()
+        parts = [
+            integrate(chosen, scene, each, tolerance, self.effort, *more) for each in sides if each
+        ]
+        parts = [
+            with_reason(scene, part, each[-1]) if part.ended == "overflow" else part
+            for part, each in zip(parts, filter(None, sides), strict=True)
+        ]
+        if below:
+            parts[0] = in_reverse(parts[0])
+        found = parts[0] if len(parts) == 1 else joined(*parts)
+        sol = found.sol if needs_steps else None
+        if self.axes is not None:
+            own = 7 if found.attitude is not None else 3
+            turned_to = partial(states_in_scene_axes, axes=self.axes, own=own)
+            sol, found = transformed_steps(sol, turned_to), in_scene_axes(found, self.axes)
+        if sol is not None:
+            sol = replace(sol, rates=partial(rates_of, given))
+        found = replace(
+            found,
+            moments=self.moments,
+            tolerance=None if chosen.is_fixed_step else tolerance,
+            scene=given,
+            sol=sol if self.dense_output else None,
+        )
+        if found.ended == "unchecked" and needs_steps:
+            raise InputError(
+                f"dense output and events of {method} need the series of a recorded torque, which "
+                "ends before the last time; allowed: a smooth torque, or opaque(function)"
+            )
+        if found.reason is not None:
+            found = replace(found, reason=with_text(found.reason, given))
+        rows = partial(_more_rows, given, method, self.effort, found.attitude is not None)
+        if needs_steps and sol is None:
+            sol = solution_of(given, found, rows, method, tolerance)
+            found = replace(found, sol=sol) if self.dense_output else found
+        if self.functions is None:
+            return found, None
+        assert sol is not None
+        ends = values[0], values[-1]
+        return with_events(given, found, sol, self.functions, ends, rows, method, tolerance)
+
+
+def _to_terminal_events(call: _Call, values: list[float]) -> Trajectory:
+    """Return the trajectory at ascending times (s), computed little further than needed.
+
+    With terminal events, the motion is first computed to a time at which they may have occurred,
+    then to longer and longer times.
+    """
+    spent, low, high = 0, values[0], values[-1]
+    for end in _trial_ends(call, max(-low, high)):
+        some = [t for t in values if -end < t < end]
+        some = [*([-end] if low <= -end else []), *some, *([end] if high >= end else [])]
+        found, events = call.trajectory(some)
+        assert events is not None
+        spent += found.evaluations
+        # What happens at an end of the computed motion may differ from what happens within.
+        if (low > -end or -end < events.first) and (high < end or events.last < end):
+            return replace(found, evaluations=spent)
+    found, _ = call.trajectory(values)
+    return replace(found, evaluations=spent + found.evaluations) if spent else found
+
+
+def _trial_ends(call: _Call, last: float) -> Iterator[float]:
+    """Yield times (s), well before the `last`, to which the motion is computed on trial."""
+    is_terminal = any(g.limit < math.inf for g in call.functions or ())
+    if not is_terminal or METHODS[call.method].is_fixed_step:
+        return
+    scene = call.given
+    attitude = () if call.scene.attitude is None else scene.attitude or IDENTITY
+    state = np.array([[*scene.omega, *attitude, *(each.start for each in scene.states)]])
+    largest = np.abs(rates_of(scene, np.zeros(1), state)[0, :3]).max()
+    fastest = max(*map(abs, scene.omega), math.sqrt(largest))
+    end = _PHASES[call.method in SCIPY_METHODS] / fastest if fastest > 0.0 else math.inf
+    while _LONGER * end <= last:
+        yield end
+        end *= _LONGER
 
 
 def _more_rows(

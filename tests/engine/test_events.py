@@ -284,6 +284,33 @@ def test_each_side_of_0_has_its_terminal_event() -> None:
     np.testing.assert_array_equal(events_of(descending)[1][0], states[::-1])
 
 
+@pytest.mark.parametrize(("method", "trials"), [("auto", [200.0, 800.0]), ("lsoda", [10.0, 40.0])])
+def test_motion_is_computed_little_beyond_a_terminal_event(
+    method: str, trials: list[float]
+) -> None:
+    damped = Scene("at 1 rad/s", (0.3, 0.2, 1.0), moments=(1.0, 2.0, 2.5), torque=damping(1e-3))
+    late = 0.4 * trials[-1]
+    found = solve(damped, [1.0, 2.0 * late, 1e9], method, 1e-7,
+                  events=with_attributes(lambda t, omega: t - late, True))  # fmt: skip
+    spent = [solve(damped, end, method, 1e-7, events=second).evaluations for end in trials]
+    assert events_of(found)[0][0].tolist() == pytest.approx([late], abs=0.0, rel=1e-14)
+    assert (found.ended, found.time.tolist()) == ("event", [1.0])
+    assert found.evaluations == pytest.approx(sum(spent), rel=0.02)
+
+
+def test_terminal_events_at_the_end_of_a_trial_and_on_both_sides() -> None:
+    body = Scene("at 1 rad/s", (0.3, 0.2, 1.0), moments=(1.0, 2.0, 2.5))
+    for direction in (-1, 0, 1):
+        event = with_attributes(lambda t, omega: abs(t) - 200.0, True, direction)
+        found = solve(body, [100.0, 300.0, 900.0], events=event)
+        assert events_of(found)[0][0].tolist() == ([] if direction < 0 else [200.0])
+        assert found.time.tolist() == ([100.0, 300.0, 900.0] if direction < 0 else [100.0])
+    event = with_attributes(lambda t, omega: (t + 300.0) * (t - 30.0), True)
+    found = solve(body, [-1e7, -40.0, 40.0, 1e7], events=event)
+    assert events_of(found)[0][0].tolist() == pytest.approx([-300.0, 30.0])
+    assert found.time.tolist() == [-40.0]
+
+
 def test_no_events_without_a_request() -> None:
     found = solve(BODY, 1.0)
     assert found.t_events is None

@@ -61,10 +61,10 @@ _EFFORT = (
 EFFORT = {"--effort F": _EFFORT.format(" (30 for a program of the thesis)")}
 EFFORT_WITHOUT_PROGRAMS = {"--effort F": _EFFORT.format("")}
 STRICT = {
-    "--strict": "The exit status is 1 if the Fortran and Python versions of a program differ, a "
-    "corrected program misses its order of convergence, or a method of --method misses its "
-    "tolerance or ends before the true solution does. With this option it is also 1 if amplified "
-    "rounding errors may exceed the tolerance, or a method ends before the last time."
+    "--strict": "Exit with status 1 also if amplified rounding errors may exceed the tolerance, or "
+    "a method ends before the last time. Without this option the status is 1 if the Fortran and "
+    "Python versions of a program differ, a corrected program misses its order of convergence, or "
+    "a method of --method misses its tolerance or ends before the true solution does."
 }
 ALSO = {
     "--also FILE,...": "Write the result to these files too, each in the format of its ending: "
@@ -161,8 +161,9 @@ def chosen_names(text: str | None, what: str, allowed: Sequence[str]) -> list[st
 def chosen_scene(options: argparse.Namespace, **allowed: bool) -> Scene:
     """Return the scene of --case or --scene, changed by --omega, --step-size and --steps.
 
-    Warn of impossible moments, and of a normalised attitude. Raise InputError unless exactly one of
-    --case and --scene is given, and if `checked_scene` with the flags `allowed` refuses the scene.
+    Warn of impossible moments of inertia, and of a normalised attitude. Raise InputError unless
+    exactly one of --case and --scene is given, and if `checked_scene` with the flags `allowed`
+    refuses the scene.
     """
     if (options.case is None) == (options.scene is None):
         raise InputError("give either --case N (1 to 7) or --scene FILE")
@@ -203,7 +204,7 @@ def chosen_programs(options: argparse.Namespace) -> tuple[str, ...]:
 def chosen_listing(options: argparse.Namespace) -> Listing:
     """Return the listing that --listing, --fix, --keep, --reading and --conjecture describe.
 
-    Warn of readings and conjectures without effect.
+    A listing is a version of a program. Warn of readings and conjectures without effect.
     """
     chosen_programs(options)
     listing = subset(options.program, options.listing, **changes_of(options))
@@ -232,7 +233,7 @@ def changes_of(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def tell_inactive(options: argparse.Namespace, listings: Iterable[Listing]) -> None:
-    """Warn of each requested reading or conjecture that no listing uses."""
+    """Warn of requested readings of doubtful lines, and conjectures, that no listing uses."""
     asked = {*names(options.reading), *names(options.conjecture)} - {"none"}
     active = {name for listing in listings for name in listing.active}
     for name in sorted(asked - active - set(names(options.fix))):
@@ -248,7 +249,7 @@ def listing_text(listing: Listing) -> str:
 
 
 def chosen_stops(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the arguments `lipschitz` (limit of the stop test, 1/s) and `may_stop`."""
+    """Return a run's arguments `lipschitz` (limit of the stop test, 1/s) and `may_stop`."""
     if options.program not in (None, "runge-kutta"):
         refuse(options, f"--program {options.program}", ("lipschitz", "no_stop"))
     if options.no_stop:
@@ -318,7 +319,7 @@ def whole_up_to(most: int, text: str | None, option: str, default: int) -> int:
 def chosen_count(text: str | None, option: str, default: int, least: int, cost: Cost) -> int:
     """Return an option's number of draws, from `least` to `cost.most`, or the default.
 
-    Raise InputError for other numbers. Print a forecast if they take more than a minute.
+    Raise InputError for other numbers. Print a forecast if the draws take more than a minute.
     """
     if text is None:
         return default

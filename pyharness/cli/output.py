@@ -79,7 +79,7 @@ def check_tree(path: str, mark: str, option: str, kind: str = "edition") -> None
 def check_replaceable(path: str, made: Callable[[Path], set[str]], option: str) -> None:
     """Raise InputError unless `write_tree` may replace the folder, which may be missing or empty.
 
-    `made` returns the paths of the files in a folder that the verb made.
+    If it has files, `made(folder)` must contain their paths, as those of files that the verb wrote.
     """
     check_folder(path, (), option)
     folder = Path(os.path.realpath(path))

@@ -224,7 +224,7 @@ def _terms(options: argparse.Namespace) -> int:
     loads = term_loads.term_loads(scenes)
     # The first solver imports modules, whose time belongs to no preparation.
     methods[0].prepare(scenes[0].scene)(1.0, 1e-9).run()
-    # All solvers run on one core, because other load hardly affects processor time.
+    # All solvers run on one core and are timed in processor time, which other load hardly affects.
     single = measure(loads, contenders, shared.progress, process_time)
     packages = {each.package for each in contenders}
     bodies = term_loads.term_bodies(scenes, options.seed, n)

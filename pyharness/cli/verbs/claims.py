@@ -28,7 +28,7 @@ OPTIONS = {
     "hold.",
     "--atlas STORE": "Show from which initial angular velocities the claims hold. STORE is the "
     "folder in which `pyharness sweep` stored the results; needs --sweep.",
-    "--sweep FILE.toml": "Sweep file of the results in STORE; needs --atlas.",
+    "--sweep FILE.toml": "Sweep file from which STORE was computed; needs --atlas.",
     **shared.outputs(plot="the counts of --evidence or the map of --atlas"),
 }
 GROUPS = {"instead of all verdicts": "explain assignments evidence atlas sweep"}

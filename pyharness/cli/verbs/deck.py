@@ -23,7 +23,7 @@ OPTIONS = {
     f"{' or '.join(SYSTEMS)} (default nos).",
     "--round": "With --dialect ftn, let FTN round results instead of truncating them.",
     "--terms N": "With --program four-term, write a deck for collocation with N terms, 3 or 5. The "
-    "thesis prints none; ours is a conjecture derived from the four-term deck.",
+    "thesis prints neither deck; ours are conjectures derived from the four-term deck.",
     **shared.outputs(FORMATS, plot=""),
 }
 USAGE = "--program P"

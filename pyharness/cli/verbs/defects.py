@@ -8,9 +8,9 @@ from pyharness.model.report import Report
 
 FORMATS = ("table", "json")
 OPTIONS = {
-    "name NAME": "Entry to show with its effect in every case: its name or its card (numbered "
-    "line of a program), as in stage-base, 1660 or two-term:1660. By default, list the defects "
-    "that change numbers.",
+    "name NAME": "Entry to show with its effect in every case of the thesis: its name or its card "
+    "(numbered line of a program), as in stage-base, 1660 or two-term:1660. By default, list the "
+    "defects that change numbers.",
     "--all": "List all entries, also those that change no number (JSON always has all); not with "
     "NAME.",
     "--kind K": "List only entries of this kind: defect (fault of the author of the programs), "

@@ -16,7 +16,7 @@ OPTIONS = {
     "1 (default: the method's own, 1e-9 for auto).",
     "--velocity": "Plan the computation of the translational velocity too.",
     "--times T1,T2,...": "Times of the results, in s (default: the end of the scene's last step). "
-    "The plan includes intermediate output if there are several.",
+    "With several times, the plan includes intermediate output.",
     **shared.outputs(plot=""),
 }
 USAGE = shared.ONE_SCENE

@@ -14,7 +14,7 @@ from pyharness.truth.enclosure import MOST_DIGITS, enclose
 from pyharness.truth.enclosure_report import certificates_report, enclosure_report
 
 _DIGITS = 25
-_MARK = FORMAT.rpartition("-")[0].encode()  # also of other versions of the format
+_MARK = FORMAT.rpartition("-")[0].encode()  # in certificates of every version
 OPTIONS = {
     **shared.SCENE,
     "--times T1,T2,...": "Times of the results, in s, all positive or all negative (the first may "

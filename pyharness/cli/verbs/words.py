@@ -27,7 +27,7 @@ EXAMPLE = "words --case 2 --program runge-kutta"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the programs' errors in other floating-point formats.
+    """Print the programs' errors in CDC arithmetic or other precisions.
 
     With --vectors, check our emulation of CDC arithmetic against given operations and results, and
     return 1 if one fails.

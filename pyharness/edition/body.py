@@ -30,9 +30,9 @@ print(found.attitude.round(6))
 """The program shown on the page, which solves Case 4 of the thesis."""
 
 AGREEMENT = 2e-15
-"""The largest difference between the page's closed form and the Fortran method.
+"""The largest difference between the closed forms of the page's script and in Fortran.
 
-It bounds each component of the attitude, and the error of omega relative to its largest component.
+It bounds the difference of each attitude component, and of omega relative to its largest component.
 """
 
 SPEEDS = (0.1, 0.25, 0.5, 1, 2, 10, 100, 1000)

@@ -181,7 +181,7 @@ def _descriptions() -> dict[str, dict[str, str]]:
 KEPT = tuple(map(described, ("crate", "mark", "manifest")))
 """The files of the package that describe its other files."""
 CRATE, PACKAGE_MARK, MANIFEST = (each.path for each in KEPT)
-"""Their paths. `PACKAGE_MARK` marks a folder as a data package, and lists its files."""
+"""The paths of `KEPT`. `PACKAGE_MARK` marks a folder as a data package, and lists its files."""
 _VERSION = "https://w3id.org/ro/crate/1.1"
 _LICENCE = "The licence of the edition; the file LICENSE has its text."
 _DATA = "Software Heritage identifier of the edition's data"

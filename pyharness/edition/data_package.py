@@ -154,7 +154,10 @@ def run_parts() -> Iterator[Part]:
 
 @cache
 def _listings() -> dict[tuple[str, str], Listing]:
-    """Return the listings by program and name; those with one defect are in apparatus order."""
+    """Return the listings (program versions) by program and name.
+
+    Those with one defect have the order of the apparatus, the list of defects.
+    """
     found = {}
     for program in PROGRAMS:
         found[program, "original"] = Listing.original(program)
@@ -229,7 +232,7 @@ def machine_parts() -> Iterator[Part]:
 
 
 def outcomes_table() -> str:
-    """Return a Markdown table of the conclusion from each outcome of a job."""
+    """Return a Markdown table of the conclusion from each outcome of a run on the machine."""
     rows = [[each["seen"], each["learned"], each["open"]] for each in facts("machine")["outcome"]]
     return table("outcome | what would be learned | what remains open", rows).rstrip()
 

@@ -36,7 +36,7 @@ _ORDER = (
 class Run(NamedTuple):
     """Successive characters of a card or of its line in the scan.
 
-    If card and scan differ here, `entry` is the identifier of the apparatus entry on it.
+    If card and scan differ here, `entry` identifies the note on the difference.
     """
 
     text: str
@@ -218,7 +218,7 @@ def _scan(card: Card) -> list[Run] | None:
 
 
 def _with_blanks(runs: Sequence[Run], line: str) -> list[Run]:
-    """Return runs with the blanks of `line`, which has the same characters."""
+    """Return runs with the blanks of `line`, whose other characters are the same."""
     found, at = [], 0
     for run in runs:
         begin, missing = at, len(run.text)

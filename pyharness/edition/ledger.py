@@ -59,7 +59,7 @@ class Formula(NamedTuple):
 
 
 def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
-    """Return the numbers of claims about results, original and corrected, by verdict."""
+    """Return, by verdict, the counts of claims on results of original and corrected programs."""
     results = [each for each in judged if each.claim["kind"] == "result"]
     pairs = [(each.original.verdict, each.corrected.verdict) for each in results]
     original, corrected = map(Counter, zip(*pairs, strict=True))
@@ -172,7 +172,7 @@ def formulas() -> dict[str, list[Formula]]:
 
 
 def draw_figures(figures: Mapping[str, FigureFinding]) -> dict[str, bytes]:
-    """Return the figures as SVG and CSV files, and both sets of Figure 7 in one, also as PNG."""
+    """Return figures as SVG and CSV, and original and corrected Figure 7 in one, also as PNG."""
     together = together_picture(figures["figure-07"], figures["figure-07-corrected"])
     files = saved(together, "figure-07-together.svg", "preview.png")
     for stem, each in figures.items():
@@ -204,7 +204,7 @@ def printed_figures(
 def apparatus() -> dict[str, list[tuple[dict[str, Any], Markup]]]:
     """Return each apparatus entry with its report as HTML, by the programs of its cards.
 
-    The report of an entry with a switch includes its effect in every case.
+    The report of an entry that can be switched off includes its effect in every case.
     """
     found: dict[str, list[tuple[dict[str, Any], Markup]]] = {name: [] for name in PROGRAMS}
     found |= {"several programs": [], "no card": []}

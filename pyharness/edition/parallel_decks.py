@@ -36,7 +36,7 @@ class _Part(NamedTuple):
 
 
 class Cell(NamedTuple):
-    """A card in an aligned row; the `entry` of a run that differs is the kind of difference."""
+    """A card in an aligned row, in pieces; `entry` of a piece is its kind of difference, if any."""
 
     card: Card
     runs: list[Run]
@@ -50,7 +50,7 @@ class AlignedRow(NamedTuple):
 
 
 class Operation(NamedTuple):
-    """An operation: its row of the collation, and the aligned cards."""
+    """An operation of the programs: its row of the collation, and the aligned cards."""
 
     row: collation.Row
     aligned: list[AlignedRow]
@@ -139,7 +139,7 @@ def _split_card(card: Card) -> list[_Part]:
 
 
 def _runs(text: str, parts: Sequence[_Part], marks: dict[int, str]) -> list[Run]:
-    """Return a card's text as runs, without leading blanks; `marks` has kinds by column."""
+    """Return a card's text in pieces without leading blanks; `marks` has differences by column."""
     found, done = [], 0
     for part in parts:
         if part.column in marks:

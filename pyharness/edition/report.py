@@ -30,7 +30,7 @@ def check_libraries() -> None:
 
 
 def listed(content: Mapping[str, bytes]) -> dict[str, Any]:
-    """Return a record: `build` has versions and compiler, `files` the size (bytes) of each."""
+    """Return a record: `build` has versions and compiler, `files` the size (bytes) of each file."""
     return {"build": build_record(), "files": {name: len(each) for name, each in content.items()}}
 
 

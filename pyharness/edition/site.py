@@ -72,7 +72,8 @@ class Page(NamedTuple):
 def build_site(progress: Progress = no_progress, docs: Path | None = None) -> dict[str, bytes]:
     """Return all files of the site, content by path.
 
-    `progress` is as in `data_package`; `docs` is by default the folder of the source checkout.
+    `progress` is as in `data_package`; `docs` is by default the folder `docs` of the source
+    checkout.
     """
     check_publishable()
     docs = docs or documents.documents_folder()

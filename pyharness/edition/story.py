@@ -138,7 +138,7 @@ def context() -> dict[str, Any]:
 def _run(
     case: int, program: str, listing: str = "original", without: Names = (), may_stop: bool = True
 ) -> Trajectory:
-    """Return the run of a Python port with `listing`, without the defects in `without`."""
+    """Return a run of a Python port, corrected or original but for the defects in `without`."""
     active = set(switches(program)) - set(without) if listing == "original" else set()
     return run_program(case_scene(case), Listing(program, active), "python", may_stop=may_stop)
 
@@ -157,7 +157,7 @@ def _largest_error(case: int, program: str, listing: str) -> float:
 
 
 def _ratios(case: int) -> dict[str, float]:
-    """Return each corrected collocation program's error over that of Runge-Kutta."""
+    """Return each corrected collocation program's error over the Runge-Kutta program's."""
     errors = {name: _largest_error(case, name, "corrected") for name in PROGRAMS}
     least = errors.pop("runge-kutta")
     return {name: error / least for name, error in errors.items()}

@@ -31,9 +31,9 @@ CHOICES = {
 class Field:
     """A number of a scene or solver that an axis may vary.
 
-    `allowed` describes the values that `takes` accepts. If `looped`, all scenes of a batch must
-    share the value, except step size and Lipschitz constant of the thesis's programs. If `whole`,
-    values are rounded to integers.
+    `allowed` describes the values that `takes` accepts. If `looped`, all scenes of a batch (solved
+    in one call) must share the value, except step size and Lipschitz constant of the thesis's
+    programs. If `whole`, values are rounded to integers.
     """
 
     units: str
@@ -230,7 +230,7 @@ def check_name(what: str, name: object, allowed: Iterable[str], where: str = "")
 
 
 def axis_of(table: object, number: int) -> Axis:
-    """Return the axis of `table`, the [[axis]] `number` (from 1); raise InputError if invalid."""
+    """Return the axis in `table`, the sweep file's [[axis]] `number`; raise InputError if wrong."""
     where = f"[[axis]] {number}"
     if not isinstance(table, dict):
         raise InputError(f"{where} is {kind_of(table)}; it must be a table [[axis]]")

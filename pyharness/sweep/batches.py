@@ -40,9 +40,9 @@ def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
 
 
 def solve_points(sweep: Sweep, where: list[Indices]) -> Arrays:
-    """Return the reductions of the scenes at `where`, an array of indices for each dimension.
+    """Return reductions of the scenes at `where`, an array of indices for each dimension.
 
-    The first dimension of each reduction runs over the scenes.
+    The first dimension of each reduction (stored quantity) runs over the scenes.
     """
     n = len(where[0])
     found = {asked.name: empty(asked, n) for asked in sweep.reductions}
@@ -53,14 +53,14 @@ def solve_points(sweep: Sweep, where: list[Indices]) -> Arrays:
 
 
 def leaves_of_sweep(sweep: Sweep) -> str | None:
-    """Return what computed the Taylor terms of the first scene, as `Ensemble.leaves`."""
+    """Return the origin of the code for the first scene's Taylor terms, as `Ensemble.leaves`."""
     first = [np.zeros(1, dtype=np.intp) for _ in sweep.shape]
     ((_, batch),) = batches(sweep, first)
     return batch.leaves
 
 
 def listing_of(program: str, listing: str, reading: str) -> Listing:
-    """Return the listing that a sweep's `listing` and `reading` describe.
+    """Return the version of a program that a sweep's `listing` and `reading` describe.
 
     `listing` is ``original``, ``corrected``, ``fix:`` followed by the only defects to correct, or
     ``keep:`` followed by the only defects to keep. `reading` is ``adopted`` (our reading of every
@@ -84,7 +84,7 @@ def looped_fields(sweep: Sweep) -> list[str]:
 
 
 def batches(sweep: Sweep, where: list[Indices]) -> Iterator[tuple[Indices, Batch]]:
-    """Yield the batches of the scenes that `where` selects, each with its positions in `where`."""
+    """Yield batches, solved in one call, of the scenes in `where`, after their positions in it."""
     columns = value_columns(sweep, where)
     looped = looped_fields(sweep)
     for members, values in groups([columns[name] for name in looped], len(where[0])):
@@ -142,7 +142,7 @@ def _components(
 
 
 def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
-    """Return "moments", "inertia" or "coefficients", and their n values (kg m2 or 1) or None."""
+    """Return "moments", "inertia" or "coefficients", and n values (kg m2 or 1); None if equal."""
     if scene.coefficients is not None:
         return "coefficients", _components("body.coefficients", scene.coefficients, own, n)
     if scene.inertia is not None:
@@ -267,7 +267,7 @@ def with_numbers(
 ) -> Scene:
     """Return the scene with other `constants` of its torque's expressions, and another body.
 
-    `values` are its moments, inertia or coefficients, or None for the scene's own.
+    `values` are the body's moments, inertia or coefficients, or None for the scene's own.
     """
     data: dict[str, Any] = tomllib.loads(scene_text(scene))
     if constants:

@@ -40,7 +40,7 @@ class Engine(NamedTuple):
     """A started executor.
 
     `computed` takes a sweep and the numbers of the chunks to compute. It yields the number of each
-    completed chunk, and an array for each reduction.
+    completed chunk, and an array for each stored quantity.
     """
 
     workers: int

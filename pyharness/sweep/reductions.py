@@ -48,7 +48,7 @@ class Reduction:
 
     @property
     def fill(self) -> Any:
-        """Return the value of scenes without one: NaN, or -1 in an integer array."""
+        """Return the value stored for scenes without result: NaN, or -1 in an integer array."""
         return np.nan if self.dtype == "f8" else -1
 
 
@@ -287,14 +287,14 @@ def needs_attitudes(asked: Iterable[ReductionSpec]) -> bool:
 
 
 def empty(asked: ReductionSpec, n: int) -> Found:
-    """Return missing values for n scenes, shape (n,) or (n, components)."""
+    """Return an array of missing values for n scenes, shape (n,) or (n, components)."""
     reduction = REDUCTIONS[asked.reduction]
     shape = (n, len(reduction.labels)) if reduction.labels else (n,)
     return np.full(shape, reduction.fill, dtype=reduction.dtype)
 
 
 def reduced(asked: ReductionSpec, batch: Batch) -> Found:
-    """Return a reduction of a batch: a value or a row of components for each scene."""
+    """Return a stored quantity of a batch: a value or a row of components for each scene."""
     given = {**dict(asked.parameters), "function": asked.function}
     # Infinities and NaN are valid results.
     with np.errstate(all="ignore"):

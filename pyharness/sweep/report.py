@@ -51,9 +51,9 @@ class Found(NamedTuple):
 
 
 def summary(store: Store, asked: ReductionSpec) -> tuple[list[Found], Counter[int]]:
-    """Return the statistics of a reduction's components, and the counts of its codes of outcomes.
+    """Return statistics of a stored quantity's components, and counts of its codes of outcomes.
 
-    One of the two is empty: a reduction yields numbers or codes.
+    One of the two is empty: a quantity consists of numbers or codes.
     """
     reduction = REDUCTIONS[asked.reduction]
     labels = reduction.labels or ("",)
@@ -145,7 +145,7 @@ Scale = tuple[float, float, bool]
 
 
 def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
-    """Return the reduction `name`, by default the first whose values are numbers.
+    """Return the stored quantity `name`, by default the first whose values are numbers.
 
     If all have codes of outcomes, the default is the first. Raise InputError for an unknown name.
     """
@@ -157,10 +157,10 @@ def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
 
 
 def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
-    """Return the picture of a reduction; its form depends on the dimensions with several numbers.
+    """Return the picture of a stored quantity over the dimensions with several numbers.
 
-    If two or more are not random, it is a map over the last two of these; if one, a line, or dots
-    at listed values; if none, dots over a random dimension.
+    With two or more that are not random, it is a map over the last two of these; with one, a line,
+    or dots at listed values; with none, dots over a random dimension.
     """
     from matplotlib.figure import Figure
 

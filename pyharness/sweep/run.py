@@ -128,7 +128,7 @@ def seconds_per_scene(sweep: Sweep) -> float:
 
 
 def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
-    """Return the indices of sampled scenes, changed so that many share a batch.
+    """Return the indices of sampled scenes, changed so that many share a batch (one call).
 
     Along dimensions whose value all scenes of a batch share, only five distinct indices remain, or
     more if a chunk has small batches. Batches are then about as large as in a chunk.

@@ -72,7 +72,7 @@ def check_files(
 
 
 def read_bounded(folder: Path, name: str, limit: int) -> bytes:
-    """Return a file's content; raise DamageError if missing, irregular, or above `limit` bytes."""
+    """Return a file's content; raise DamageError if missing, not regular or above `limit` bytes."""
     with _opened(folder, name, limit) as handle, open(handle, "rb", closefd=False) as file:
         return file.read(limit)
 

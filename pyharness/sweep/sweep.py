@@ -24,7 +24,7 @@ Indices = NDArray[np.int64]
 class ReductionSpec:
     """A requested reduction: its array's `name`, its key in `REDUCTIONS`, and its parameters.
 
-    For `claim`, `function` returns for each scene of a batch whether the claim holds.
+    For the reduction `claim`, `function` returns for each scene of a batch whether a claim holds.
     """
 
     name: str
@@ -137,7 +137,8 @@ def value_columns(sweep: Sweep, where: list[Indices]) -> dict[str, NDArray[Any]]
 def groups(columns: list[NDArray[Any]], n: int) -> list[tuple[Indices, tuple[Any, ...]]]:
     """Return the groups of indices 0 to n - 1 with equal values in all columns.
 
-    Each has its indices, ascending, and its value in each column. Without columns there is one.
+    Each has its indices, ascending, and its value in each column. Without columns there is one
+    group.
     """
     if not columns:
         return [(np.arange(n), ())]

@@ -37,7 +37,7 @@ def _text(report: Report) -> str:
 
 
 def _lines(told: str | Field | Table) -> list[str]:
-    """Return the lines of a part: a Line is not wrapped, a Field begins with its label."""
+    """Return the lines of a report's part: a Line is not wrapped, a Field begins with its label."""
     if isinstance(told, Line):
         return [told]
     if isinstance(told, Table):
@@ -111,7 +111,7 @@ def _block(columns: Sequence[Column], cells: Sequence[Sequence[str]]) -> list[st
 
 
 def csv_text(table: Table) -> str:
-    """Return a table as CSV; the first line has the heads."""
+    """Return a table as CSV; the first line has the column heads."""
     import csv
 
     buffer = io.StringIO()

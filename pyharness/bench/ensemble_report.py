@@ -36,7 +36,7 @@ def ensemble_report(found: Ensembles, packages: Iterable[str], command: str) -> 
 
 
 def ours_over(rows: Sequence[Rate], row: Rate) -> float | None:
-    """Return our fastest speed with as many threads over the speed in `row`; None without ours."""
+    """Return our fastest speed, with equal threads, over the speed in `row`; None without ours."""
     rates = [each.rate for each in rows if each.method in _STYLES and each.threads == row.threads]
     return max(rates) / row.rate if rates else None
 

@@ -62,7 +62,7 @@ def peers() -> list[SceneContender]:
 def heyoka_maker(
     scene: Scene, formula: Formula | None = None, *, variational: bool = False
 ) -> Maker:
-    """Return a maker of heyoka integrations, with one compiled integrator for each tolerance.
+    """Return a function that prepares heyoka integrations, compiled once for each tolerance.
 
     `formula` is as in `heyoka_equations`; `variational` adds the derivatives of the solution with
     respect to the initial state.
@@ -166,7 +166,7 @@ def heyoka_equations(scene: Scene, formula: Formula | None = None) -> list[tuple
     """Return pairs (unknown, derivative) for omega and, if the scene has one, the attitude.
 
     A torque that depends on the state is computed by `formula`, or else from its tape (the recorded
-    operations). Raise InputError if it is opaque, or has a table or a floor.
+    operations). Raise InputError if the torque is not recorded, or has a table or a floor function.
     """
     import heyoka
 
@@ -216,7 +216,7 @@ def heyoka_functions() -> Functions[Any]:
 
 
 def numba_fixed(method: str, scene: Scene) -> Maker:
-    """Return a maker of numba integrations by "rk4" or "dop8" (the method of order 8 in DOP853)."""
+    """Return a function that prepares numba runs by "rk4" or "dop8" (order 8, in DOP853)."""
     import numba
 
     formula: Tableau = RK4

@@ -124,7 +124,7 @@ def _data(finding: Finding) -> Table:
 
 
 def savings_report(found: Sequence[Saving]) -> Report:
-    """Return the report of run times with and without each part."""
+    """Return the report of run times with and without each computation that can be omitted."""
     time = digits(".3g", 1e6)
     columns = (
         *words("skipped where"), Column("us with it", time, unit="s", full=time),

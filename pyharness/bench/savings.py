@@ -21,7 +21,7 @@ _SECONDS = 2e-3  # duration (s) of a batch
 
 @dataclass(frozen=True)
 class Saving:
-    """Median run times (s) with and without a part that a plan can omit."""
+    """Median run times (s) with and without a computation that a plan can omit."""
 
     part: str  # as the plan names it
     where: str  # name of the scene or program
@@ -35,10 +35,10 @@ class Saving:
 
 
 def savings(t_end: float = 3.0, tolerance: float = 1e-9) -> list[Saving]:
-    """Return the run times with and without each part that can be omitted.
+    """Return the run times with and without each computation that can be omitted.
 
-    The parts are the integration (replaced by a closed form), the time dependence of the torque,
-    dense output, the velocity, and the imports of SciPy and of the reference.
+    These are the integration (replaced by a closed form), the time dependence of the torque, dense
+    output, the velocity, and the imports of SciPy and of the reference.
     """
     constant = case_scene(5)
     times = [t_end * k / 100.0 for k in range(1, 101)]
@@ -79,5 +79,5 @@ def _python(code: str) -> None:
 def measured_saving(
     part: str, where: str, with_it: Callable[[], object], without: Callable[[], object]
 ) -> Saving:
-    """Return the run times of calls with and without a part."""
+    """Return the run times of calls with and without the computation `part`."""
     return Saving(part, where, *seconds([with_it, without], _SECONDS, _BATCHES))

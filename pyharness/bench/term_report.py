@@ -102,7 +102,6 @@ def _summary(
 
 
 def _ratios(finding: Finding, load: Workload) -> list[float | None]:
-    """Return heyoka's run time over ours at each target error, or None."""
     times = {each.method: each.seconds for each in scores(finding, load, TARGETS)}
     nowhere = (None,) * len(TARGETS)
     pairs = zip(times.get(HEYOKA, nowhere), times.get(OURS, nowhere), strict=True)
@@ -124,7 +123,6 @@ def _rows(finding: Finding, load: Workload, method: str) -> list[Row]:
 
 
 def _over(finding: Finding, load: Workload, peer: str) -> float | None:
-    """Return a peer's run time over ours at `ONE_TOLERANCE`, or None."""
     times = []
     for rows in (_rows(finding, load, name) for name in (peer, OURS)):
         times.append(next((x.seconds for x in rows if x.setting == ONE_TOLERANCE), None))

@@ -152,6 +152,5 @@ def _show_warning(*arguments: Any, **more: Any) -> None:
 
 
 def _report_unraisable(hook: Callable[[Any], Any], unraisable: Any) -> None:
-    """Call the hook for unraisable exceptions, except KeyboardInterrupt after Ctrl-C."""
     if not (came() and issubclass(unraisable.exc_type, KeyboardInterrupt)):
         hook(unraisable)

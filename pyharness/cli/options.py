@@ -202,9 +202,9 @@ def chosen_programs(options: argparse.Namespace) -> tuple[str, ...]:
 
 
 def chosen_listing(options: argparse.Namespace) -> Listing:
-    """Return the listing that --listing, --fix, --keep, --reading and --conjecture describe.
+    """Return the program version of --listing, --fix, --keep, --reading and --conjecture.
 
-    A listing is a version of a program. Warn of readings and conjectures without effect.
+    Warn of readings and conjectures without effect.
     """
     chosen_programs(options)
     listing = subset(options.program, options.listing, **changes_of(options))
@@ -359,10 +359,7 @@ def also_files(options: argparse.Namespace) -> dict[str, str]:
 
 
 def check_outputs(options: argparse.Namespace) -> None:
-    """Raise InputError if an output can't be written, or is an input or another output.
-
-    Verbs call it before any computation.
-    """
+    """Raise InputError if an output can't be written, or is an input or another output."""
     also = also_files(options)
     for path in also:
         check_writable(path, "--also")

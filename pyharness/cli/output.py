@@ -86,7 +86,6 @@ def check_replaceable(path: str, made: Callable[[Path], set[str]], option: str) 
     new, _ = _beside(folder)
     try:
         reason = _why_not_anew(folder, made)
-        # Permissions alone do not show whether a folder can be made.
         if not reason:
             new.mkdir()
             try:

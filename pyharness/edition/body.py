@@ -123,7 +123,6 @@ def _picture(scene: Scene) -> Picture:
 
 
 def _draw_polhode(axes: Any, moments: Array, found: Trajectory) -> None:
-    """Draw the path of omega on the energy ellipsoid, in body axes."""
     size = np.sqrt(moments @ np.square(found.omega[0]) / moments)
     u, v = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 33), np.linspace(0.0, np.pi, 17))
     ball = np.cos(u) * np.sin(v), np.sin(u) * np.sin(v), np.cos(v)

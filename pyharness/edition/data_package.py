@@ -154,10 +154,7 @@ def run_parts() -> Iterator[Part]:
 
 @cache
 def _listings() -> dict[tuple[str, str], Listing]:
-    """Return the listings (program versions) by program and name.
-
-    Those with one defect have the order of the apparatus, the list of defects.
-    """
+    """Return program versions by program and name; those with one defect are in apparatus order."""
     found = {}
     for program in PROGRAMS:
         found[program, "original"] = Listing.original(program)

@@ -157,14 +157,12 @@ def _largest_error(case: int, program: str, listing: str) -> float:
 
 
 def _ratios(case: int) -> dict[str, float]:
-    """Return each corrected collocation program's error over the Runge-Kutta program's."""
     errors = {name: _largest_error(case, name, "corrected") for name in PROGRAMS}
     least = errors.pop("runge-kutta")
     return {name: error / least for name, error in errors.items()}
 
 
 def _span(case: int) -> Range:
-    """Return an axis range for a case's true omega1 (rad/s)."""
     values = [case_scene(case).omega[0], *case_truth(case).omega[:, 0]]
     low, high = min(values), max(values)
     margin = 0.25 * (high - low)
@@ -188,7 +186,6 @@ def _chart_of_case(
 
 
 def _marks(chart: Chart, runs: Mapping[str, Trajectory]) -> list[Curve]:
-    """Return marks on the curves of omega1, at different steps on each."""
     return [
         _curve(chart, name, run.time[first::15].tolist(), run.omega[first::15, 0].tolist())
         for first, (name, run) in zip((7, 4, 12), runs.items(), strict=True)

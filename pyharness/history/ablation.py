@@ -54,10 +54,10 @@ class Effect:
 
 @dataclass(frozen=True)
 class CaseEffects:
-    """The outcomes of four listings of a program in one case, which show the effect of one entry.
+    """The outcomes of four versions of a program in one case, which show one entry's effect.
 
-    `corrected_alone` is the original with only this entry corrected, `kept_alone` the corrected
-    listing with only this entry kept.
+    `corrected_alone` is the original with only this entry (such as a defect) corrected,
+    `kept_alone` the corrected listing with only this entry kept.
     """
 
     program: str
@@ -78,7 +78,7 @@ def entries(kind: str | None = None) -> list[dict[str, Any]]:
 
 
 def entry(name: str) -> dict[str, Any]:
-    """Return the apparatus entry `name`; raise InputError if there is none."""
+    """Return the entry `name` on the programs' text; raise InputError if there is none."""
     by_name = {each["id"]: each for each in entries()}
     if name not in by_name:
         raise unknown("entry", name, list(by_name))
@@ -86,7 +86,7 @@ def entry(name: str) -> dict[str, Any]:
 
 
 def effect(scene: Scene, listing: Listing, truth: Reference, effort: float = 1.0) -> Effect:
-    """Return the outcome of a listing on a scene, with errors against `truth`."""
+    """Return the outcome of a program version on a scene, with errors against `truth`."""
     run = run_program(scene, listing, effort=effort)
     return Effect(listing, *_errors(scene, run, truth), run.steps, run.ended, run.stop)
 
@@ -104,10 +104,11 @@ def case_truth(case: int) -> Reference:
 
 
 def effects_of(name: str) -> Iterator[CaseEffects]:
-    """Yield the effect of an apparatus entry in each of its programs and every case.
+    """Yield the effect of an entry, such as a defect, in each of its programs and every case.
 
-    For a reading or a conjecture, `original` and `corrected_alone` are the original listing with
-    and without it, `kept_alone` and `corrected` the corrected listing.
+    For a reading of a doubtful line, or a conjecture on a missing one, `original` and
+    `corrected_alone` are the original listing with and without it, `kept_alone` and `corrected` the
+    corrected listing.
     """
     known = entry(name)
     for program in known["programs"]:
@@ -124,9 +125,9 @@ def lattice(
 ) -> list[Effect]:
     """Return a program's outcomes with every subset of its defects, the largest error first.
 
-    The `readings` and, under a varying torque, the conjectures are varied too. Outcomes are sorted
-    by the errors over the steps that all runs completed. A reading has no effect if a defect in the
-    same statement is corrected.
+    The `readings` of doubtful lines and, under a varying torque, conjectures on missing lines vary
+    too. Outcomes are sorted by the errors over the steps that all runs completed. A reading has no
+    effect if a defect in the same statement is corrected.
     """
     check_steps(scene, program, "fortran", effort)
     truth = reference(scene, scene.times(), velocity=True, effort=effort)
@@ -143,7 +144,7 @@ def lattice(
 
 
 def switched(scene: Scene, program: str) -> tuple[str, ...]:
-    """Return a program's defects and, under a varying torque, its conjectures."""
+    """Return a program's defects and, under a varying torque, conjectures on missing lines."""
     return switches(program) if scene.torque.varies else names_of("defect", program)
 
 
@@ -183,7 +184,7 @@ def apparatus_report(entries: Sequence[dict[str, Any]], are_all_shown: bool = Tr
 def entry_report(
     entry: dict[str, Any], effects: Sequence[CaseEffects], names: Sequence[str] = FIELDS
 ) -> Report:
-    """Return the report of an entry: the fields `names`, and a table of any `effects`."""
+    """Return the report of an apparatus entry: the fields `names`, and a table of any `effects`."""
     cards = "; ".join(f"{program} {cards}" for program, cards in entry["cards"].items())
     what = {each["siglum"]: each["what"] for each in facts("cards/scan")["ground"]}
     grounds = "; ".join(f"{siglum}, {what[siglum]}" for siglum in entry["grounds"])
@@ -232,7 +233,7 @@ def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
 
 
 def lattice_report(scene: Scene, found: Mapping[str, Sequence[Effect]]) -> Report:
-    """Return the report on every subset of defects, named by letters."""
+    """Return the report on every subset of a program's defects, which letters denote."""
     text: list[Section] = []
     rows = []
     for program, effects in found.items():

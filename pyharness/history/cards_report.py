@@ -194,7 +194,7 @@ def collation_report(found: Sequence[Row]) -> Report:
 
 
 def origins_report(found: Sequence[Disagreement], mistakes: Sequence[str]) -> Report:
-    """Return the report of disagreements, their origins, and mistakes in the table."""
+    """Return the report of disagreements, their origins, and mistakes in our table of them."""
     rows, full = [], []
     for each in found:
         having = "".join(_SHORT[program] for program in each.cards) or "-"

@@ -56,9 +56,9 @@ class Member:
     """A weighted residual method of the thesis.
 
     The weight functions of least squares are i t**(i-1), the derivatives of the residual by ci for
-    constant f (eq. 25). `terms` is n. `points`, for collocation only, are fractions of the step:
-    "thesis" for k/(n+1), k = 1 to n; "gauss" for the Gauss-Legendre points; or n different numbers
-    from 0 to 1.
+    constant f (eq. 25). `terms` is the number n of coefficients ci. `points`, for collocation only,
+    are fractions of the step: "thesis" for k/(n+1), k = 1 to n; "gauss" for the Gauss-Legendre
+    points; or n different numbers from 0 to 1.
     """
 
     weighting: str = "collocation"
@@ -195,7 +195,7 @@ def integrate(scene: Scene, members: Sequence[Member]) -> Array:
 
 
 def _stages(matrix: Array, rates: Array) -> Array:
-    """Return the products of `_sums` three times as fast, from matrices (i, j, members)."""
+    """Return matrices (i, j, members) times rates, three times as fast as `_sums`."""
     side_by_side = np.ascontiguousarray(rates.transpose(1, 2, 0))
     total: Array = matrix[:, 0, None] * side_by_side[0]
     product = np.empty_like(total)
@@ -363,7 +363,7 @@ def _finding(found: Sequence[OrderFinding]) -> list[str]:
 
 
 def verdict(found: Sequence[OrderFinding]) -> list[str]:
-    """Return a sentence for each order below the derived one, else one for all."""
+    """Return a sentence for each order below the derived one, else one sentence for all orders."""
     unexpected = _unexpected(found)
     if unexpected:
         return [f"UNEXPECTED: {each}" for each in unexpected]

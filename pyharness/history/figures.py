@@ -85,7 +85,7 @@ class FigurePlan:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """The run of one listing, drawn as a curve."""
+    """The run of one version of a program, drawn as a curve."""
 
     listing: Listing
     trajectory: Trajectory

@@ -81,7 +81,7 @@ def listings_of(program: str) -> dict[str, Listing]:
 
 @cache
 def our_page(listing: Listing, case: int, steps: int, word: str) -> str:
-    """Return the page that a listing prints in a case, in the arithmetic `word`."""
+    """Return the page that a program version prints in a case, in the arithmetic `word`."""
     scene = replace(case_scene(case), steps=steps)
     return page(scene, listing.program, run_program(scene, listing, "python", word=word))
 

@@ -88,7 +88,7 @@ def rows_of_form(
 
 
 def compared_steps(rows: int, steps: int, card_steps: int) -> int:
-    """Return the steps of our run: those of the text or, if the page has more, of the cards."""
+    """Return our number of steps: the thesis text's or, if the page has more rows, the cards'."""
     return card_steps if rows > steps else steps
 
 
@@ -106,7 +106,7 @@ def compare_rows(
 
 
 def stored_fits(lines: Sequence[Sequence[str]], folder: Path) -> list[Fit]:
-    """Return the comparisons of a page with pages of the same form in `folder`, nearest first."""
+    """Compare a page with those of equal heading and width in `folder`; return nearest first."""
     found = []
     with open(folder / PAGES, newline="", encoding="ascii") as file:
         for each in csv.DictReader(file):

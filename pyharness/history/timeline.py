@@ -60,8 +60,8 @@ def _in_words(month: str) -> str:
 class Revision(NamedTuple):
     """A change of the edition's text: the cards and the apparatus.
 
-    `digest` identifies the text after the change; it is empty if the cards were not yet data.
-    `cards` has the numbers of changed cards by program, as in ``750-770, 800``.
+    `digest` identifies the text after the change; it is empty for changes before the cards were
+    data files. `cards` has the numbers of changed cards by program, as in ``750-770, 800``.
     """
 
     date: str

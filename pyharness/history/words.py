@@ -80,7 +80,7 @@ class WordRun(NamedTuple):
 
 @dataclass(frozen=True)
 class WordCell:
-    """The runs of one listing on one case, in several arithmetics."""
+    """The runs of one program version on one case, in several arithmetics."""
 
     double: WordRun
     widest: WordRun | None  # 113 bits; not computed for a verdict
@@ -91,7 +91,7 @@ class WordCell:
         return next((run for run in self.runs if (run.p, run.rule) == (p, rule)), None)
 
     def settled(self, rule: str, same: Sequence[WordRun]) -> int | None:
-        """Return the least p from which on all runs with this `rule` are in `same`, or None."""
+        """Return the least precision from which on all runs with `rule` are in `same`, or None."""
         of_rule = sorted((r for r in self.runs if r.rule == rule), key=lambda run: -run.p)
         return min((run.p for run in takewhile(same.__contains__, of_rule)), default=None)
 

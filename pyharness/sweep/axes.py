@@ -230,7 +230,7 @@ def check_name(what: str, name: object, allowed: Iterable[str], where: str = "")
 
 
 def axis_of(table: object, number: int) -> Axis:
-    """Return the axis in `table`, the sweep file's [[axis]] `number`; raise InputError if wrong."""
+    """Return the axis in `table`, a file's [[axis]] `number` (from 1); raise InputError if bad."""
     where = f"[[axis]] {number}"
     if not isinstance(table, dict):
         raise InputError(f"{where} is {kind_of(table)}; it must be a table [[axis]]")

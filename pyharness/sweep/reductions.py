@@ -48,7 +48,7 @@ class Reduction:
 
     @property
     def fill(self) -> Any:
-        """Return the value stored for scenes without result: NaN, or -1 in an integer array."""
+        """Return the value for scenes without result: NaN, or -1 in an integer array."""
         return np.nan if self.dtype == "f8" else -1
 
 
@@ -287,7 +287,7 @@ def needs_attitudes(asked: Iterable[ReductionSpec]) -> bool:
 
 
 def empty(asked: ReductionSpec, n: int) -> Found:
-    """Return an array of missing values for n scenes, shape (n,) or (n, components)."""
+    """Return missing values for n scenes, shape (n,) or (n, components)."""
     reduction = REDUCTIONS[asked.reduction]
     shape = (n, len(reduction.labels)) if reduction.labels else (n,)
     return np.full(shape, reduction.fill, dtype=reduction.dtype)

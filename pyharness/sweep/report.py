@@ -53,7 +53,7 @@ class Found(NamedTuple):
 def summary(store: Store, asked: ReductionSpec) -> tuple[list[Found], Counter[int]]:
     """Return statistics of a stored quantity's components, and counts of its codes of outcomes.
 
-    One of the two is empty: a quantity consists of numbers or codes.
+    One of the two is empty.
     """
     reduction = REDUCTIONS[asked.reduction]
     labels = reduction.labels or ("",)

@@ -37,7 +37,6 @@ def _cell(tag: str, text: str, left: bool, link: str | None = None) -> str:
 
 
 def _write_section(section: Section) -> Iterator[str]:
-    """Yield the HTML of a section: successive Lines as one `pre`, successive Fields as one `dl`."""
     grouped: Any = groupby(section, type)
     for kind, parts in grouped:
         if kind is Line:

@@ -29,8 +29,7 @@ EXAMPLE = "words --case 2 --program runge-kutta"
 def run(options: argparse.Namespace) -> int:
     """Print the programs' errors in CDC arithmetic or other precisions.
 
-    With --vectors, check our emulation of CDC arithmetic against given operations and results, and
-    return 1 if one fails.
+    With --vectors, check our emulation of CDC arithmetic; return 1 if an operation fails.
     """
     if options.vectors is not None:
         shared.refuse(options, "--vectors", ("case", "program", "lengths", "all", "plot"))

@@ -44,10 +44,10 @@ _OMEGA = tuple(Column(f"omega{k}", digits(".3g"), unit="rad/s") for k in (1, 2, 
 
 @dataclass(frozen=True, eq=False)
 class Atlas:
-    """The verdict codes of each claim over a grid of starts, readings and numbers of steps.
+    """The verdict codes of claims over a grid of starts, readings and numbers of steps.
 
-    The axes of `codes` are reading, number of steps, magnitude of omega(0) (rad/s), height (omega3
-    over the magnitude) and longitude (rad).
+    The axes of `codes` are reading of doubtful lines, number of steps, magnitude of omega(0)
+    (rad/s), height (omega3 over the magnitude) and longitude (rad).
     """
 
     codes: Mapping[str, Codes]
@@ -58,7 +58,7 @@ class Atlas:
     longitudes: Array
 
     def score(self, reading: int = 0, steps: int = 0) -> Array:
-        """Return the points of each start, summed over the claims; the arguments are indices."""
+        """Return each start's sum of points, 1 or 1/2 for a claim; the arguments are indices."""
         return sum_of_points([codes[reading, steps] for codes in self.codes.values()])
 
     def none_fails(self, reading: int = 0, steps: int = 0) -> NDArray[np.bool_]:
@@ -90,7 +90,7 @@ def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Array]) -> Atlas:
 
 
 def sum_of_points(codes: Sequence[Codes]) -> Array:
-    """Return the points of each start, summed over several claims."""
+    """Return the sum of the claims' points (1, or 1/2 if in part) for each initial omega."""
     return np.asarray(sum(_POINTS[each] for each in codes))
 
 
@@ -101,7 +101,7 @@ def shares(codes: Codes) -> tuple[float, float, float]:
 
 
 def bits(codes: Codes) -> float:
-    """Return the entropy (bits) of the verdict on a claim over the starts."""
+    """Return the entropy (bits) of the verdict on a claim over the initial omegas."""
     parts = np.array([(codes == code).mean() for code in _CODES])
     parts = parts[parts > 0.0]
     return float(-(parts * np.log2(parts)).sum()) + 0.0
@@ -118,7 +118,7 @@ def about(names: Sequence[str]) -> dict[int, list[str]]:
 
 
 def shown_starts(names: Sequence[str]) -> dict[Triple, dict[str, int]]:
-    """Return the original programs' verdict codes, by claim, for each of `starts`."""
+    """Return the original programs' verdict codes, by claim, for each initial omega of `starts`."""
     given = starts()
     bench = Starts(Laboratory(True, Assumptions()), np.array(given))
     found = {name: judged(claim(name), bench, len(given)) for name in names}

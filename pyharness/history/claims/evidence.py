@@ -82,7 +82,7 @@ class Combination:
 
 
 def evidence() -> Iterator[Combination]:
-    """Yield every combination with its verdicts on the testable claims."""
+    """Yield every combination of assumptions with its verdicts on the testable claims."""
     scored = {entry["id"]: entry for entry in claims() if entry["kind"] in KINDS}
     for chosen in combinations():
         found = {name: _verdict(name, _relevant(entry, chosen)) for name, entry in scored.items()}
@@ -91,7 +91,7 @@ def evidence() -> Iterator[Combination]:
 
 
 def combinations() -> list[Assumptions]:
-    """Return every combination; start None stands for the adopted omega(0)."""
+    """Return all combinations of assumptions; start None stands for the adopted omega(0)."""
     # The last name varies fastest.
     readings, conjectures = (
         list(subsets(names_of(kind)[::-1])) for kind in ("reading", "conjecture")

@@ -26,8 +26,9 @@ class Assumptions:
     """One value for each choice that the thesis leaves open.
 
     `start` is omega(0) (rad/s) in the cases for which the thesis gives none; None selects the
-    values in `cases.toml`. `readings` are alternatives to this edition's readings. `conjectures`
-    None selects those of the original listing. `word` is the floating-point arithmetic.
+    values in `cases.toml`. `readings` are alternatives to our readings of doubtful lines.
+    `conjectures` on missing lines are by default those of the original listing. `word` is the
+    floating-point arithmetic.
     """
 
     start: Triple | None = None
@@ -86,7 +87,7 @@ class Laboratory:
         return _truth(self.scene(case))
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
-        """Return the run of a program on a case, at the undivided steps."""
+        """Return a program's run on a case, at the steps before their division into `parts`."""
         run = self.run(program, case, may_stop, parts)
         reached = run.omega[parts - 1 :: parts]
         omega = np.full((self.assumptions.steps, 3), np.nan)

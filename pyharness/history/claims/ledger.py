@@ -22,7 +22,7 @@ from pyharness.thesis.programs import BINARY64
 
 @dataclass(frozen=True)
 class Survival:
-    """The verdicts with one assumption changed; `survives` if they equal the adopted verdicts."""
+    """The verdicts on a claim with one assumption changed; `survives` if both are unchanged."""
 
     assumption: str
     original: str
@@ -123,7 +123,7 @@ def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:
 
 
 def assignments() -> list[Assignment]:
-    """Return an assignment for each start and each case for which the thesis gives no omega(0).
+    """Return the verdicts from each start in each case for which the thesis gives no omega(0).
 
     Claims about a case do not depend on another case's start. If each case has a start with which
     its claims hold, all claims can therefore hold at once.

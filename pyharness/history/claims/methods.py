@@ -29,7 +29,8 @@ _OTHERS = WEIGHTINGS[1:]
 def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Judged:
     """Judge the claim that collocation is superior to Runge-Kutta.
 
-    Errors are compared over the steps that all programs ran. The cases in `shown` only add numbers.
+    Errors are compared over the steps that all programs ran. The cases in `shown` add only numbers,
+    no wins.
     """
     numbers, wins = {}, 0
     for case in (*cases, *shown):
@@ -177,8 +178,8 @@ def execution_time(
 ) -> Judged:
     """Judge the claim that collocation takes about twice the time of Runge-Kutta.
 
-    The operations of a step, on the cards and in our LEQT1F, are weighted by `unit_times`. They are
-    counted as written, and with repeated terms counted once.
+    The operations of a step, on the cards and in our LEQT1F (linear solver), are weighted by
+    `unit_times`. They are counted as written, and with repeated terms counted once.
     """
     listings = {program: lab.listing(program) for program in PROGRAMS}
     counts = {name: operations_per_step(each) for name, each in listings.items()}
@@ -212,7 +213,7 @@ def complexity(lab: Laboratory, factors: Sequence[float]) -> Judged:
     """Judge the claim that the three programs have about the same number of cards.
 
     The verdict is "undecided" if it depends on which of `factors` is the threshold, or on whether
-    our LEQT1F counts.
+    our linear solver LEQT1F counts.
     """
     cards = {each: deck_text(lab.listing(each)).count("\n") for each in PROGRAMS}
     numbers = {f"{program}: cards": float(n) for program, n in cards.items()}
@@ -255,7 +256,8 @@ def computer_error(
 
     Rounding error (rad/s) is measured in two ways. The first is the error in Case 1 with decreasing
     steps, because every method solves this case exactly except for rounding. The second is the
-    difference between runs of the methods of section IV.2 in binary64 and in `words`.
+    difference between runs of the methods of section IV.2 in binary64 and in the arithmetics
+    `words`.
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})

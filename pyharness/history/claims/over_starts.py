@@ -92,7 +92,7 @@ class Starts:
 
 
 JUDGED = tuple(entry["id"] for entry in claims() if entry["test"] in vars(rules))
-"""The claims with a rule for many starts."""
+"""The claims with a rule for many initial omegas."""
 
 
 def codes(identity: str, batch: Batch) -> NDArray[np.int8]:

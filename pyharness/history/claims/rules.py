@@ -30,7 +30,7 @@ Flags = NDArray[np.bool_]
 
 
 class Runs(NamedTuple):
-    """The runs of a program on one case; `omega` (rad/s) is NaN where a run has no row."""
+    """The runs of a program on one case; `omega` (rad/s) is NaN at steps without result."""
 
     omega: Array
     steps: NDArray[Any]

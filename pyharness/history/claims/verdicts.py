@@ -74,7 +74,7 @@ def omega3_varies(lab: Laboratory, case: int, limit: float) -> Judged:
 def no_deviation(lab: Laboratory, case: int, limit: float) -> Judged:
     """Judge the claim that all three programs coincide with the known solution of a case.
 
-    The numbers include the steps of Runge-Kutta from each initial omega in `starts`.
+    The numbers include the count of Runge-Kutta steps from each initial omega in `starts`.
     """
     found = judged(rules.no_deviation(lab, case, limit))
     for start in starts():

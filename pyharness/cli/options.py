@@ -78,7 +78,7 @@ _WORTH_SAYING = 60.0  # run time (s) above which a forecast is printed
 
 
 class Cost(NamedTuple):
-    """Time and memory of a random draw, on a processor core of 2026, and the most draws."""
+    """Time and memory of a random draw on a processor core of 2026, and a limit."""
 
     what: str  # plural noun for the draws, as in "random scenes"
     seconds: float  # run time (s) of a draw

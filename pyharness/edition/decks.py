@@ -44,7 +44,7 @@ class Run(NamedTuple):
 
 
 class Note(NamedTuple):
-    """A numbered entry of the apparatus, with the cards of one program to which it applies.
+    """A numbered note (apparatus entry), with the cards of one program to which it applies.
 
     `cards` is a text, as in ``860-910, 1040-1090``.
     """
@@ -119,7 +119,7 @@ def sheets(program: str) -> list[Sheet]:
 
 
 def notes(program: str) -> list[Note]:
-    """Return a program's apparatus entries by kind; within it by size of effect, then by card."""
+    """Return a program's notes by kind; within a kind by size of effect, then by card."""
     having = [each for each in entries() if each["cards"].get(program)]
 
     def place(entry: dict[str, Any]) -> tuple[float, ...]:
@@ -180,7 +180,7 @@ def card_views(program: str) -> list[CardView]:
 
 
 def kinds_of(views: Iterable[CardView]) -> dict[str, int]:
-    """Return the number of cards with an entry of each kind, by precedence."""
+    """Return the number of cards with a note of each kind, by precedence."""
     counts = Counter(kind for view in views for kind in view.kinds)
     return {kind: counts[kind] for kind in _ORDER if counts[kind]}
 

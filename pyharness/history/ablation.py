@@ -69,7 +69,7 @@ class CaseEffects:
 
 
 def entries(kind: str | None = None) -> list[dict[str, Any]]:
-    """Return the apparatus entries of one kind, or all; raise InputError for an unknown kind."""
+    """Return the entries (notes) of one kind, or all; raise InputError for an unknown kind."""
     everything: list[dict[str, Any]] = facts("apparatus")["entry"]
     kinds = sorted({entry["kind"] for entry in everything})
     if kind is not None and kind not in kinds:
@@ -78,7 +78,7 @@ def entries(kind: str | None = None) -> list[dict[str, Any]]:
 
 
 def entry(name: str) -> dict[str, Any]:
-    """Return the entry `name` on the programs' text; raise InputError if there is none."""
+    """Return the entry (note) `name` on the programs; raise InputError if there is none."""
     by_name = {each["id"]: each for each in entries()}
     if name not in by_name:
         raise unknown("entry", name, list(by_name))
@@ -154,7 +154,7 @@ def _size(found: Effect) -> list[float]:
 
 
 def apparatus_report(entries: Sequence[dict[str, Any]], are_all_shown: bool = True) -> Report:
-    """Return the report of the critical apparatus, a line for each entry.
+    """Return the report of the notes on the programs' text, a line for each.
 
     Unless `are_all_shown`, the text has only the defects that change numbers.
     """

@@ -33,7 +33,7 @@ HALF = 48  # width, in characters, of each of two texts side by side
 def cards_report(
     cards: Sequence[Card], title: str = "cards", only_contents: bool = False
 ) -> Report:
-    """Return the report of `cards`, each with its lines and apparatus entries.
+    """Return the report of `cards`, each with its lines and notes.
 
     With `only_contents` the text has a table of contents instead.
     """
@@ -111,7 +111,7 @@ def scan_report(
 
 
 def classes_report() -> Report:
-    """Return the report of the numbers of apparatus entries and their cards, by kind."""
+    """Return the report of the numbers of notes and their cards, by kind."""
     entries = facts("apparatus")["entry"]
     cards = [card for program in PROGRAMS for card in deck(program).cards.values()]
     entries_of = Counter(each.entry for card in cards for each in card.differences)

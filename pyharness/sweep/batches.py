@@ -76,7 +76,7 @@ def listing_of(program: str, listing: str, reading: str) -> Listing:
 
 
 def looped_fields(sweep: Sweep) -> list[str]:
-    """Return the varied fields that must be equal in all scenes of a batch."""
+    """Return the varied fields that must be equal in all scenes of a batch (one call)."""
     of_arrays = () if sweep.solver.program is None else OF_PROGRAMS
     own = ("body.",) if follows_body(sweep.scene) else ()
     names = [axis.field for axis in sweep.axes if axis.field not in of_arrays]

@@ -134,7 +134,7 @@ def start_text(start: Triple) -> str:
 
 
 def distance(first: Array, second: Array) -> float:
-    """Return the largest difference (rad/s) of any omega component over the rows that both have."""
+    """Return the largest difference (rad/s) of any omega component over the steps in both."""
     n = min(len(first), len(second))
     with np.errstate(all="ignore"):
         return float(np.abs(first[:n] - second[:n]).max(initial=0.0))

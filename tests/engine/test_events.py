@@ -348,6 +348,7 @@ def test_tilt_is_the_angle_of_the_rotation_matrix(axis: int) -> None:
     unit = np.eye(3)[axis - 1]
     turned = unit + 2.0 * np.cross(q, np.cross(q, unit) + q0[:, None] * unit)
     np.testing.assert_allclose(turned @ toward / np.linalg.norm(toward), math.cos(angle), atol=1e-9)
+    assert str(tilt(axis, toward, 0.0)).startswith(f"Event(name='tilt({axis}, ")
 
 
 def test_extrema_are_those_of_the_rows() -> None:

@@ -160,6 +160,9 @@ def test_files_keep_functions_expressions_and_tables(
         found.save(tmp_path / "rows.npz")
         again = load(tmp_path / "rows.npz")
         assert again.scene == scene
+        assert again.scene.changing is not None
+        has_text = scene.changing.values() is not None  # type: ignore[union-attr]
+        assert (again.scene.changing.phrase == "a recorded function of t") != has_text
         assert (again.angular_momentum() == found.angular_momentum()).all()
         assert (solve(again.scene, 2.0).omega == solve(scene, 2.0).omega).all()
     for scene in scenes[:2]:

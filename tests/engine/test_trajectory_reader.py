@@ -63,7 +63,8 @@ def prepared(attitude: bool) -> Trajectory:
 
 
 def two_functions(t: Any, omega: Any) -> Any:
-    return [omega[1] / (2.0 + t * t), np.exp(-t) + np.cos(omega[2]), np.sqrt(1.0 + omega[0] ** 2)]
+    angle = np.arctan2(omega[1], 2.0 + t * t) + np.arcsin(0.1 * np.sin(t))
+    return [angle, np.exp(-t) + np.log(2.0 + np.cos(omega[2])), np.sqrt(1.0 + omega[0] ** 2)]
 
 
 def impossible() -> Trajectory:

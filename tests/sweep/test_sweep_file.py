@@ -59,6 +59,9 @@ def test_height_and_longitude_go_over_the_sphere(tmp_path: Path) -> None:
     ((_, batch),) = batches(sweep, every(sweep))
     wanted = [[0.0, 0.0, -10.0], [0.0, 0.0, -10.0], [8.0, 0.0, 6.0], [0.0, 8.0, 6.0]]
     assert np.abs(batch.omega0 - wanted).max() < 1e-14
+    alone = read_sweep(written(tmp_path, text(axes[1], axes[2])))
+    ((_, batch),) = batches(alone, every(alone))
+    assert np.abs(batch.omega0 - [[10.0, 0.0, 0.0], [0.0, 10.0, 0.0]]).max() < 1e-14
 
 
 def test_sample_reaches_the_ends_of_any_grid(tmp_path: Path) -> None:

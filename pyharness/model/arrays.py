@@ -1,7 +1,7 @@
 """Checks of a user's arrays for many bodies: shape, type, values and number of rows.
 
-An array has one row per body, or one row for all. Functions with an argument `where` or `name`
-raise InputError, which begins with it.
+An array has one row per body, or one row for all. Each InputError begins with the argument `where`
+or `name`.
 """
 
 from collections.abc import Callable, Mapping
@@ -29,8 +29,8 @@ FROM_ZERO: Rule = (lambda x: x >= 0.0, "a number from 0")
 def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = None) -> Array:
     """Return user values as a float array of rows; a single row is allowed.
 
-    `shape` is the shape of a row, in which a letter, such as "k", is any length. `rule` tests each
-    number.
+    `shape` is the shape of a row, in which a letter, such as "k", stands for any length. `rule`
+    tests each number.
     """
     if type(values) is float and not shape and rule is None:
         return np.array([values])
@@ -50,7 +50,7 @@ def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = N
 
 def numbers_of(where: str, values: object) -> Array:
     """Return real numbers of any type and shape as float64."""
-    if type(values) is not np.ndarray and unit_of(values):  # NumPy would drop it
+    if type(values) is not np.ndarray and unit_of(values):  # NumPy would drop the unit
         number(where, values)
     try:
         found = np.asarray(values)

@@ -31,7 +31,7 @@ def open_starts() -> dict[int, str]:
 def assumed(scene: Scene, listings: Iterable[Listing] = ()) -> list[dict[str, Any]]:
     """Return the assumptions on which the numbers of a case and its runs of `listings` depend.
 
-    A scene that is no case, and a user's value, depend on none.
+    Scenes outside the thesis, and values that a user changed, depend on none.
     """
     among = list(listings)
     return [each for each in assumptions() if _is_made(each, scene, among)]
@@ -82,7 +82,7 @@ def assumption_records(runs: Runs) -> list[dict[str, Any]]:
 
 
 def claim_records() -> list[dict[str, Any]]:
-    """Return the assumptions on which claims alone depend, for JSON."""
+    """Return the assumptions on which only verdicts on claims depend, for JSON."""
     return [_record(each, each["what"]) for each in assumptions() if each["on"] == "claim"]
 
 

@@ -1,7 +1,7 @@
 """Attitudes as unit quaternions from body to space, scalar first, with Hamilton's product.
 
 A vector v about the body axes has the components q v q* along the axes of space, with the conjugate
-q*. The kinematic equation is q' = q (0, omega)/2. Each InputError begins with `where`.
+q*. The kinematic equation is q' = q (0, omega)/2. Each InputError begins with the argument `where`.
 """
 
 import math
@@ -168,7 +168,7 @@ def quaternions_of_axes(axes: Array) -> Array:
 
 def rotated(vectors: Array, matrix: Array) -> Array:
     """Return one or n matrices, (3, 3), times one or n vectors, (3,)."""
-    # In this order, the sums have the same bits for any n, and as in C.
+    # In this order, the sums have the same bits for any n, and in C.
     x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
     return np.stack(
         [(x * matrix[..., i, 0] + y * matrix[..., i, 1]) + z * matrix[..., i, 2] for i in range(3)],
@@ -177,7 +177,7 @@ def rotated(vectors: Array, matrix: Array) -> Array:
 
 
 def turned_back(attitudes: Array, turn: Any) -> Array:
-    """Return a body's attitudes from those of axes rotated in it by the quaternion `turn`."""
+    """Return a body's attitudes from those of axes that the quaternion `turn` rotates in it."""
     w, x, y, z = np.moveaxis(np.asarray(turn), -1, 0)
     first, *rest = np.moveaxis(attitudes, -1, 0)
     parts: Any = product((first, rest[0], rest[1], rest[2]), (w, -x, -y, -z))

@@ -70,7 +70,7 @@ class _Motion(NamedTuple):
 
 
 def check_animation(path: object, moments: Triple | Changing | None) -> str:
-    """Return `path` as text; raise InputError unless it can show a brick with `moments`."""
+    """Return `path` as text; raise InputError if no brick with `moments` can be shown there."""
     if not isinstance(path, (str, os.PathLike)):
         raise InputError(f"animate: {kind_of(path)}; allowed: a path, as text or a Path")
     name = os.fsdecode(path)

@@ -1,4 +1,4 @@
-"""The basis of a limit: proved, derived or measured, with its source."""
+"""The basis of a check's limit: proved, derived or measured, with its source."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ MARKS = {
 
 @dataclass(frozen=True)
 class Basis:
-    """The basis of a limit.
+    """The basis of a check's limit.
 
     `mark`, a key of `MARKS`, classifies the weakest part of the argument. `limit` states the limit;
     `source` names the theorem, derivation or command, in Markdown.

@@ -22,7 +22,7 @@ _MATRICES = f"allowed: a list of 1 to {_MOST} matrices, each of three rows of th
 
 
 class Changing:
-    """The base class of changing inertias; its methods are those of polynomials."""
+    """The base class of inertias that change with time; its methods are for polynomials."""
 
     if TYPE_CHECKING:
 
@@ -125,7 +125,7 @@ class ChangingMoments(Changing):
     ------
     InputError
         If `polynomials` are not three lists of finite numbers, a moment is not above 0 at time 0,
-        or the lists are the rows of a symmetric matrix, which belongs to `inertia`.
+        or the lists are the rows of a symmetric matrix, which `Scene` takes as `inertia`.
 
     Examples
     --------

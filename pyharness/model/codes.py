@@ -11,11 +11,11 @@ class Statuses:
     STOPPED = 1  # the Lipschitz test ended the run
     OVERFLOW = 2  # an angular velocity overflowed
     REFUSED = 3  # the method does not apply to the input, for example to these coefficients
-    GAVE_UP = 4  # work limit exceeded, or no digit of the phase is left
+    GAVE_UP = 4  # work limit exceeded, or no correct digit of the phase is left
     INTERRUPTED = 5  # the user interrupted it; a Python exception is set
     SENSITIVE = 6  # all rows are present, but the amplified rounding error exceeds the tolerance
-    UNCHECKED = 7  # all rows are present, but SciPy may have passed a short change of the torque
-    SINGULAR = 8  # the torque is undefined at the end, although neither it nor omega is infinite
+    UNCHECKED = 7  # all rows are present; SciPy may have stepped over a short change of the torque
+    SINGULAR = 8  # the torque is undefined at the last time; neither it nor omega is infinite
     SLIDING = 9  # a switch of the torque would change back and forth without end
 
 
@@ -79,27 +79,27 @@ class Blocks:
 
 
 class Storage:
-    """Lengths of arrays in which kernels keep series and their values."""
+    """Lengths of kernels' arrays for Taylor series of slots (variables), and their values."""
 
-    SERIES_LENGTH = 40  # terms of a slot
-    LANE_TERMS = 28  # terms of a slot of many bodies
+    SERIES_LENGTH = 40  # terms of a slot's series
+    LANE_TERMS = 28  # the same, for many bodies at once
     PERTURBATION_LENGTH = 29  # terms of a perturbation
     MOST_UNKNOWNS = 15
-    AT_ONCE = 16  # nodes of a step but the first, which are evaluated together
+    AT_ONCE = 16  # nodes of a step, without the first, that are evaluated together
 
 
 class Operations:
     """The integers of the operations of a tape."""
 
-    LINEAR = 1  # a constant plus a sum of coefficients times slots
+    LINEAR = 1  # a constant plus a linear combination of operands
     PRODUCT = 2
     QUOTIENT = 3
     SQRT = 4
-    EXP = 5  # slots: the exponential, and the weighted terms of its argument
-    SINE_COSINE = 6  # slots: the sine, the cosine, and the weighted terms of their argument
+    EXP = 5  # results: the exponential, and the weighted terms of its argument
+    SINE_COSINE = 6  # results: the sine, the cosine, and the weighted terms of their argument
     TABLE = 7  # cubic polynomials of time between breakpoints
-    TANH = 8  # slots: the function, its derivative, and the weighted terms of its argument
-    # The second operand is the derivative. Slots: the function, the weighted terms of the argument.
+    TANH = 8  # results: the function, its derivative, and the weighted terms of its argument
+    # The second operand is the derivative. Results: the function, weighted terms of the argument.
     LOG = 9
     ATAN = 10
     ASIN = 11

@@ -396,8 +396,8 @@ class Conversions:
         """Write the trajectory with its scene to a file, from which `pyharness.load` restores it.
 
         Numbers are restored bit for bit. The format is that of `numpy.savez`, with an array for
-        each attribute that is an array. The array `scene` is the text of a scene file; `header`, in
-        JSON, has the other attributes and the operations of a recorded torque.
+        each array attribute. The array `scene` is the text of a scene file; `header`, in JSON, has
+        the other attributes and the operations of a recorded torque.
 
         Parameters
         ----------
@@ -407,8 +407,8 @@ class Conversions:
         Raises
         ------
         InputError
-            If the file can't be written or has a text file's ending, the torque is opaque, or a
-            program in another arithmetic than binary64 computed the trajectory.
+            If the file can't be written or has a text file's ending, the torque is not recorded,
+            or a program in another arithmetic than binary64 computed the trajectory.
 
         Examples
         --------

@@ -89,8 +89,8 @@ def sizes_of(largest: Array, n_own: int) -> Array:
     """Return the sizes to which errors are relative, from the largest values of m unknowns.
 
     `largest` and the result have the shape (..., m). The size is the largest component for omega, 1
-    for the quaternion, and the value itself for the last `n_own` unknowns, the own states. A size
-    of 0 becomes 1.
+    for the quaternion, and the value itself for the last `n_own` unknowns, which the user added. A
+    size of 0 becomes 1.
     """
     sizes = np.ones_like(largest)
     sizes[..., :3] = largest[..., :3].max(axis=-1, keepdims=True)
@@ -106,7 +106,7 @@ class DenseOutput:
     Attributes
     ----------
     t_min, t_max : float
-        The times (s) between which it can be evaluated.
+        The times (s) between which the solution can be evaluated.
     states, rates : callable
         `states` is a function of times (s) that returns a row for each time: omega (rad/s), the
         attitude if requested, and the own states. `rates` is a function of times and such rows; it
@@ -157,8 +157,8 @@ class DenseOutput:
         Parameters
         ----------
         t : float or array_like, shape (n,)
-            Times (s), as in a call of the object. Where a table of the torque changes, the
-            derivative just after the change is returned.
+            Times (s), as in a call of the object. Where a tabulated torque jumps, the derivative
+            just after the jump is returned.
 
         Returns
         -------

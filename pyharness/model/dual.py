@@ -21,7 +21,7 @@ class Dual:
         self.value, self.slopes = value, slopes
 
     def chained(self, value: Any, slope: Any) -> "Dual":
-        """Return the function of this number with the given value and derivative `slope`."""
+        """Return a function of this number as a dual number, from its value and derivative."""
         return Dual(value, [slope * each for each in self.slopes])
 
     def __add__(self, other: Any) -> "Dual":

@@ -47,10 +47,10 @@ class Ensemble(BatchResult):
         The values and names of the scene's own states (`Scene.states`).
     times : ndarray, shape (m,), or None
         The times (s) of all bodies' results. Each array of results then has a second axis of length
-        m; `omega` has the shape (n, m, 3).
+        m.
     leaves : str or None
-        Whether the series of a recorded torque were ``compiled`` for bodies side by side, or
-        computed by an ``interpreter``, with the reason if `compiled` was requested.
+        Whether compiled code (``compiled``) or an ``interpreter`` computed the Taylor series of a
+        recorded torque, with the reason if `compiled` was requested in vain.
 
     Examples
     --------
@@ -307,7 +307,7 @@ class Ensemble(BatchResult):
         return Ensemble(**load_ensemble(path))
 
     def estimates_of(self, piece: slice) -> Array:
-        """Return the estimates of m bodies, shape (2, m), or (2, 0) if not requested."""
+        """Return the estimates of the m bodies in `piece`, (2, m), or (2, 0) if not requested."""
         return _NO_ESTIMATES if self.estimates is None else self.estimates[piece].T
 
 

@@ -1,7 +1,6 @@
 """Elementary functions of floats and of the numbers of `pyharness.thesis.word`.
 
-Functions of floats are the C library's. The other numbers, in formats other than binary64, have
-correctly rounded functions.
+Functions of floats are the C library's; functions of the other numbers are correctly rounded.
 """
 
 import math

@@ -1,9 +1,9 @@
 """Principal moments and principal axes of full inertia matrices.
 
 Symmetric matrices are diagonalised in integers, because in binary64 a small eigenvalue would have
-few correct digits. The elements are integer multiples of a power of 2, the unit; the absolute
-determinant of a regular matrix is at least its cube. This bounds the smallest absolute eigenvalue
-from below, which determines how many bits are enough.
+few correct digits. The elements are integer multiples of a power of 2, u; the absolute determinant
+of a regular matrix is at least u**3. This bounds the smallest absolute eigenvalue from below, which
+determines how many bits are enough.
 """
 
 import math
@@ -34,8 +34,8 @@ _MOST_ROTATIONS = 500  # about ten suffice, because the convergence is quadratic
 class PrincipalFrame:
     """Principal moments (kg m2) and axes, as floats and as fractions of 30 or more digits.
 
-    The columns of `axes` form a right-handed frame, each nearest to the body axis of its number.
-    `moments_low` is `exact_moments` minus `moments`, as floats.
+    The columns of `axes` form a right-handed frame, each nearest to the body axis of the same
+    number. `moments_low` is `exact_moments` minus `moments`, as floats.
     """
 
     moments: Triple
@@ -134,7 +134,7 @@ def diagonalised(
     exponent = min((_last_bit(x) for row in matrix for x in row if x), default=0)
     whole = [[int(Fraction(x) / Fraction(2) ** exponent) for x in row] for row in matrix]
     size = max(abs(x) for row in whole for x in row).bit_length()
-    # The determinant is at least 1 in this unit, and the other eigenvalues are below 3 * 2**size.
+    # The determinant is at least 1 in this unit, and the larger eigenvalues are below 3 * 2**size.
     fraction = 2 * size + 4 + _BITS
     bits = size + fraction
     a = [[x << fraction for x in row] for row in whole]

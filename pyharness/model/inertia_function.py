@@ -81,11 +81,11 @@ class InertiaFunction(Changing):
 
     @cached_property
     def span(self) -> tuple[float, float]:
-        """Infinite, because a moment that reaches 0 ends the integration as a singularity."""
+        """Infinite ends, because a moment that reaches 0 ends the integration as a singularity."""
         return -np.inf, np.inf
 
     def check(self, times: Iterable[float]) -> None:
-        """Raise InputError if a moment is not above 0 at one of 1001 times from 0 to each time."""
+        """Raise InputError unless moments are above 0 at 1001 times from 0 to each of `times`."""
         for end in times:
             if not (end and np.isfinite(end)):
                 continue
@@ -157,7 +157,7 @@ def inertia_of_texts(place: str, values: Any) -> InertiaFunction:
 def inertia_of_tables(
     place: str, tables: Iterable[Table], written: tuple[Any, ...]
 ) -> InertiaFunction:
-    """Return the inertia with `tables` of time as elements; scene files have `written`."""
+    """Return the inertia with `tables` of time as elements; `written` is for scene files."""
     recorder = Recorder(place=f"[body] {place}")
     time, *_ = recorder.inputs()
     values = [value_of_table(without_equal_constants(each), time) for each in tables]
@@ -165,7 +165,7 @@ def inertia_of_tables(
 
 
 def checked_function(found: InertiaFunction) -> InertiaFunction:
-    """Return an inertia; raise InputError if it jumps, or is no inertia at time 0."""
+    """Return an inertia; raise InputError if it jumps, or is not positive definite at time 0."""
     # Imported only here, because most scenes need no exact numbers.
     from pyharness.model.inertia import checked_inertia
 

@@ -157,7 +157,8 @@ def subset(
         The name of the program.
     base : {"original", "corrected"}, optional
         The listing to start from. The default is `corrected` if `keep` has names and `fix` has
-        none, else `original`. In a corrected base only `keep` activates a reading or conjecture.
+        none, else `original`. With a corrected base, only `keep` activates readings and
+        conjectures.
     fix, keep : iterable of str
         Names of any kind: `fix` corrects them, `keep` leaves them active.
     readings : iterable of str

@@ -57,8 +57,6 @@ def _install() -> None:
 
 
 class _Replaced:
-    """A replacement of a function, for symbols."""
-
     def __init__(self, original: Callable[..., Any], function: Callable[..., Any]) -> None:
         self._original, self._function = original, function
         # Modules that are imported meanwhile read its name and signature.
@@ -143,7 +141,6 @@ def _viewed(found: Any) -> Any:
 
 
 def _by_element(function: Callable[..., Any], count: int) -> Callable[..., Any]:
-    """Return `function` for arrays, by element, and for scalars."""
     loop = np.frompyfunc(function, count, 1)
 
     def called(*given: Any) -> Any:

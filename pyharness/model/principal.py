@@ -60,8 +60,8 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
         The same problem with `moments`; its attitude, if any, describes the principal axes. A
         torque about the axes of space is unchanged; the result then always has an attitude.
     axes : ndarray, shape (3, 3)
-        The principal axes as columns, in components about the body's own axes. They form a
-        right-handed frame; each axis is near the body's own axis of the same number.
+        The principal axes as columns, in components about the body axes. They form a right-handed
+        frame; each axis is near the body axis of the same number.
 
     Raises
     ------
@@ -106,7 +106,7 @@ def _fields(scene: Scene) -> dict[str, Any]:
 
 
 def in_scene_axes(found: Trajectory, axes: Array) -> Trajectory:
-    """Return a trajectory transformed from principal `axes` (columns) to the body's own."""
+    """Return a trajectory transformed from principal `axes` (columns) to the body axes."""
     attitude = found.attitude
     if attitude is not None:
         attitude = _attitude_in_scene_axes(attitude, axes)
@@ -114,9 +114,9 @@ def in_scene_axes(found: Trajectory, axes: Array) -> Trajectory:
 
 
 def states_in_scene_axes(states: Array, axes: Array, own: int) -> Array:
-    """Return rows of states, transformed from principal `axes` (columns) to the body's own.
+    """Return rows of states, transformed from principal `axes` (columns) to the body axes.
 
-    Columns from `own` on, the own states, are unchanged.
+    Columns from `own` on, states that the user added, are unchanged.
     """
     turned, rest = states[:, 3:own], states[:, own:]
     if own > 3:

@@ -82,7 +82,7 @@ def for_each_piece(
     threads: int,
     pieces: Sequence[slice] | None = None,
 ) -> None:
-    """Call ``work(piece, given_up)`` in threads for ranges of n bodies, by default equal.
+    """Call ``work(piece, given_up)`` in threads for `pieces` of n bodies, by default equal ranges.
 
     After an exception, for example Ctrl-C, `given_up[0]` is 1; kernels poll it, and then return.
     """

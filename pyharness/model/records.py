@@ -15,7 +15,8 @@ from pyharness.model.trajectory import Trajectory
 def scene_record(scene: Scene) -> dict[str, Any]:
     """Return a scene for JSON, with the keys of a scene file and "case".
 
-    If the torque is a function, "torque" has the number of recorded operations, or "opaque".
+    If the torque is a function, "torque" has the number of recorded operations, or "opaque" if it
+    has none.
     """
     body, values = body_of(scene)
     return {

@@ -1,6 +1,6 @@
 """Recurrences, slopes and rounding errors of recorded operations, as C.
 
-Users: the interpreter (by fortran/make_cases.py) and `pyharness.engine.leaves`.
+fortran/make_cases.py writes them for the interpreter, `pyharness.engine.leaves` for compiled code.
 """
 
 from typing import NamedTuple
@@ -9,20 +9,20 @@ from pyharness.model.codes import Operations
 
 
 class Operation(NamedTuple):
-    """The recurrence and the slopes of an operation, as C.
+    """The recurrence of an operation's Taylor series, and its partial derivatives (slopes), as C.
 
-    The letters o, p and q stand for the slots of its results, x and y for those of its operands.
-    For each slot, such as o, t_o is term k of the series (l_o if known before), b_o term k - 1, z_o
-    term 0, f_o term 1, and m_o the value at a node. i is 1/k. s0 and s1 are sums of products of
-    terms 1 to k - 1 of the slots in `pairs`. To its own rounding error, a result adds those of the
-    operands times the absolute slopes.
+    The letters o, p and q stand for results, x and y for operands. For each letter, such as o, t_o
+    is term k of the series (l_o of a table, known before), b_o term k - 1, z_o term 0, f_o term 1,
+    and m_o the value at a node. i is 1/k. s0 and s1 are sums of products of terms 1 to k - 1 of the
+    series in `pairs`. To its own rounding error, a result adds those of the operands times the
+    absolute slopes.
     """
 
     series: tuple[str, ...]
     pairs: tuple[str, ...] = ()
-    value: str = ""  # of slot o at a node; without it the series is summed
-    slopes: tuple[str, ...] = ()  # of slot o by x and by y
-    second: str = ""  # slope of slot p by x, if another operation may read that slot
+    value: str = ""  # of o at a node; if empty, the series is summed
+    slopes: tuple[str, ...] = ()  # of o by x and by y
+    second: str = ""  # slope of p by x, if another operation may read p
     first: str = ""  # z_o, if not as m_o; without both the interpreter computes it
     rounding: str = "2.0*size(z_o)"  # own, in units
 

@@ -1,7 +1,7 @@
 """Reports: the results of a subcommand as data, which `pyharness.views` renders.
 
 The types are named tuples, because dataclasses would take five times as long to create at every
-start of the program.
+start.
 """
 
 import math

@@ -1,6 +1,6 @@
 """Scenes of the cases of Table 1 of the thesis, and the text of scene files (TOML).
 
-`pyharness.engine.scene_reader` reads these files. Each InputError begins with `where`.
+`pyharness.engine.scene_reader` reads these files. Messages begin with the argument `where`.
 """
 
 import os
@@ -36,7 +36,7 @@ def case_scene(number: SupportsIndex) -> Scene:
     Parameters
     ----------
     number : int
-        The number of the case, 1 to 7.
+        The case, 1 to 7.
 
     Returns
     -------
@@ -103,8 +103,8 @@ def toml_of(content: bytes, where: str) -> dict[str, Any]:
 def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
     """Return the text of a scene file, from which `read_scene` restores the scene bit for bit.
 
-    Masses, forces and case are not written. Raise InputError for an opaque torque, a torque
-    recorded from Python, more than 50 [[torque.terms]], or more than 1 000 000 bytes.
+    Masses, forces and case are not written. Raise InputError for a torque or inertia given as a
+    Python function, more than 50 [[torque.terms]], or more than 1 000 000 bytes.
     """
     import json
 

@@ -38,7 +38,7 @@ class StateTorque:
     Attributes
     ----------
     tape : Tape or None
-        The recorded operations; None for an opaque torque.
+        The recorded operations; None for an opaque torque, which is not recorded.
     function : callable or None
         The function that an opaque torque calls, else None.
     needs_attitude : bool
@@ -177,7 +177,7 @@ def of_law(law: TorqueLaw) -> StateTorque:
 def turned_law(law: TorqueLaw, time: Symbol, attitude: Any) -> Array:
     """Return the components about the body axes of a law about the axes of space.
 
-    Laws with equally many frequencies have the same operations, and share compiled leaves.
+    Laws with equally many frequencies have the same operations, and share compiled code.
     """
     angles = [frequency * time for _, frequency in (*law.sines, *law.cosines)]
     terms = [time, *(wave(each) for each in angles for wave in (np.sin, np.cos))]
@@ -188,8 +188,7 @@ def turned_law(law: TorqueLaw, time: Symbol, attitude: Any) -> Array:
 def recorded(function: Function, states: Sequence[str] = ()) -> StateTorque:
     """Return the torque that a user's function computes, recorded with symbols.
 
-    Use it for a function that is one of several summands; a scene's only torque can be passed to
-    `Scene` directly.
+    Use it for one of several summands; a scene's only torque can be passed to `Scene` directly.
 
     Parameters
     ----------
@@ -295,7 +294,7 @@ def count_arguments(function: Function, where: str, allowed: str) -> int:
 def opaque(function: Any) -> StateTorque:
     """Return a torque that is evaluated by calling a Python function.
 
-    Only SciPy's methods can solve a scene with such a torque.
+    Only SciPy's methods can use it.
 
     Parameters
     ----------
@@ -306,7 +305,7 @@ def opaque(function: Any) -> StateTorque:
     Returns
     -------
     StateTorque
-        The torque, for the argument `torque` of `Scene`.
+        The torque, for a `Scene`.
 
     Raises
     ------
@@ -331,7 +330,7 @@ def is_opaque(torque: object) -> bool:
 
 
 def has_switches(torque: object) -> bool:
-    """Return whether a torque is recorded and has switches."""
+    """Return whether a torque is recorded and has operations that jump."""
     return isinstance(torque, StateTorque) and bool(torque.tape and torque.tape.n_switches)
 
 

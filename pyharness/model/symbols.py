@@ -367,7 +367,7 @@ class Symbol:
         return 2.0 * (self > 0.0) - 1.0
 
     def with_terms_of(self, others: "Iterable[Symbol]") -> "Symbol":
-        """Record this sum plus 0 times the terms of `others`; 0 stays 0."""
+        """Record this sum plus 0 times the terms of `others`, unless this symbol is 0."""
         if not (self._terms or self._constant):
             return self
         terms = {slot: 0.0 for each in others for slot in each._terms} | self._terms
@@ -379,7 +379,7 @@ class Symbol:
         return not self._constant and self._terms == {TIME: 1.0}
 
     def of_table(self, table: Table) -> "Symbol":
-        """Return a table at this symbol; raise InputError unless it is the time."""
+        """Return a table's value at this symbol; raise InputError unless that is the time."""
         if not self.is_time():
             raise InputError(
                 f"{self.recorder.place}: a table of a variable other than time can't be recorded"
@@ -494,7 +494,7 @@ def _line() -> str:
 
 
 def recorded_twice(record: Callable[[Recorder], Tape], recorder: Callable[[], Recorder]) -> Tape:
-    """Return the tape of a user's function; raise InputError if a second one differs."""
+    """Return the tape of a user's function; raise InputError if a second recording differs."""
     first, again = record(recorder()), recorder()
     if record(again) != first:
         raise again.impure()
@@ -507,7 +507,7 @@ def _selected(condition: Any, x: Any, y: Any) -> Any:
 
 
 def _combined(linear: Linear, values: Sequence[Any]) -> Any:
-    """Return a linear combination of symbols and numbers, with terms of factor 0."""
+    """Return a linear combination of symbols and numbers, including terms of factor 0."""
     terms: dict[int, float] = {}
     constant, recorder = 0.0, None
     for slot, factor in linear.terms:

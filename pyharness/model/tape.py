@@ -120,7 +120,7 @@ class Tape:
 
     @property
     def breaks(self) -> list[float]:
-        """The times (s) at which a table changes, in ascending order."""
+        """The times (s) between two pieces of a table, in ascending order."""
         tables = [each.table for each in self.operations if each.table is not None]
         # The first piece also holds before its break.
         times = [table.breaks[1:] for table in tables]

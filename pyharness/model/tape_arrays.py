@@ -26,7 +26,7 @@ def without_equal_constants(table: Table) -> Table:
 
 
 def value_of_table(table: Table, time: Any) -> Any:
-    """Return a table at a symbol of time; a number for a constant table."""
+    """Return a table's value at a symbol of time; a number for a constant table."""
     return time.of_table(table) if len(table.breaks) > 1 else float(table.pieces[0, 0])
 
 

@@ -165,7 +165,7 @@ def law_value(law: TorqueLaw, time: Any) -> Array:
 
 
 def law_integral(law: TorqueLaw, time: Any) -> Array:
-    """Return the components of the integral of a law from time 0."""
+    """Return the components of the integral of a law from 0 to `time`."""
     square = time * time
     found: list[Any] = [
         c * time + 0.5 * r * square for c, r in zip(law.constant, law.rate, strict=True)
@@ -201,6 +201,6 @@ def to_body(vector: Any, attitude: Any) -> Array:
 
 
 def body_torque(law: TorqueLaw, time: Any, attitude: Any) -> Array:
-    """Return the components of a law about the body axes."""
+    """Return the components about the body axes of a torque law."""
     value = law_value(law, time)
     return to_body(value, attitude) if law.in_space else value

@@ -94,7 +94,7 @@ class Trajectory(Conversions):
         The true times, s.
     recorded_time : ndarray, shape (n,)
         The variable TIME that a program of the thesis prints, s, which a defect may falsify; for
-        methods, `time`.
+        other results, `time`.
     omega : ndarray, shape (n, 3)
         Angular velocity about the body axes, rad/s.
     velocity : ndarray, shape (n, 3), or None
@@ -133,7 +133,7 @@ class Trajectory(Conversions):
         Time, recorded time, omega and velocity of a program in another arithmetic than binary64;
         the other attributes have the nearest floats.
     tolerance : float or None
-        None for methods with a fixed step.
+        The tolerance; None for methods with a fixed step.
     scene : Scene or None
         The scene, if `solve` returned the trajectory.
     sol : DenseOutput or None

@@ -2,8 +2,8 @@
 
 The archive has an array for each attribute, the text `scene` of a scene file, and `header` with
 everything else in JSON, such as a tape (recorded torque). In a tape, a linear combination is a list
-of its constant and of pairs of slot and coefficient. An operation is a list of its kind and its
-operands, its linear combination, or the breaks and pieces of its table.
+of its constant and of pairs of slot (input or result) and coefficient. An operation is a list of
+its kind and its operands, its linear combination, or the breaks and pieces of its table.
 """
 
 import json

@@ -1,6 +1,6 @@
 """Checks of user input, and conversions to plain Python numbers.
 
-A function with an argument `where` raises InputError, beginning with it, for any other value.
+A function with an argument `where` raises InputError, which begins with `where`, for other values.
 """
 
 import itertools
@@ -74,7 +74,7 @@ def is_no_number(value: object) -> bool:
 
 
 def parsed_float(text: str) -> float:
-    """Return the number in `text`; raise ValueError for other text, also with underscores."""
+    """Return the number in `text`; raise ValueError for other text, such as 1_000."""
     return float(_read_text(text))
 
 

@@ -130,7 +130,7 @@ class System:
         return total
 
     def growth(self, series: Sequence[Sequence[int]], tube: int, h: int) -> int:
-        """Return a bound on h mu, where the Jacobian is d(omega')/d(omega), times UNIT."""
+        """Return a bound on h times the logarithmic norm of d(omega')/d(omega), times UNIT."""
         growth = 0
         for factor, each, scale in zip(self.factors, series, self.scales, strict=False):
             # The mean is a sharper bound, but for a small factor not worth its time.
@@ -142,7 +142,7 @@ class System:
     def radii(
         self, radius: int, wave_radius: int, expansion: Expansion, tube: int, h: int
     ) -> tuple[int, int]:
-        """Return the radii of omega and of the waves for a step, or raise NotProvedError."""
+        """Return error bounds of omega and of the waves in a step, or raise NotProvedError."""
         series, residuals, wave_residual = expansion
         growth = self.growth(series, tube, h)
         if growth > 2 * UNIT:

@@ -1,7 +1,6 @@
-"""Omega, velocity and attitude by Taylor series of equations 13-15 in decimal arithmetic.
+"""Omega, velocity and attitude by Taylor series of equations 13-15 of the thesis, in decimals.
 
-In `taylor_series` and `_Equations`, `coefficients` are A, B and C; in all other functions, the
-Taylor coefficients of each unknown.
+Except in `taylor_series` and `_Equations`, `coefficients` are Taylor coefficients.
 """
 
 from collections.abc import Callable, Sequence
@@ -48,10 +47,10 @@ def taylor_series(
     """Return a row of omega (rad/s), velocity (m/s) and attitude at each of `times` (s).
 
     The rows end where omega grows without bound or the torque is singular. Quaternions keep the
-    norm of the scene's quaternion. `order` is the degree of the series, which high powers in the
-    torque may increase; `tolerance` is local and relative. `effort` is a factor on a work limit of
-    some ten seconds; None means 100 000 steps, fewer if the torque depends on the state. `start`
-    replaces the scene's initial state.
+    norm of the scene's quaternion. `coefficients` are A, B and C; `order` is the degree of the
+    series, which high powers in the torque may increase; `tolerance` is local and relative.
+    `effort` is a factor on a work limit of some ten seconds; None means 100 000 steps, fewer if the
+    torque depends on the state. `start` replaces the scene's initial state.
     """
     equations, limit = _Equations(scene, coefficients, velocity), _Limit(scene, effort)
     tape = equations.tape
@@ -280,7 +279,7 @@ class _Equations:
 
     `velocity` adds dV/dt = F/m - omega x V, with force F and mass m; an attitude adds dq/dt =
     q (0, omega)/2. For a changing inertia I and a torque N the equations are (I omega)' = N - omega
-    x (I omega), without `coefficients`.
+    x (I omega), without `coefficients` (A, B, C).
     """
 
     def __init__(
@@ -307,7 +306,7 @@ class _Equations:
     def expand(self, time: Decimal, state: Row, order: int, forward: bool) -> list[Row]:
         """Return the Taylor coefficients 0 to `order` of all unknowns around `time` (s).
 
-        If a table changes then, they hold after `time` if `forward`, else before it.
+        At a break of a table, they hold after `time` if `forward`, else before it.
         """
         series = [[x] for x in state]
         torque = self._torque_series(time, order, series, forward)

@@ -39,7 +39,7 @@ class Switches:
         for slot, is_floor, x in self._tape.operands_of_switches():
             level = x[0].to_integral_value() if is_floor else Decimal(0)
             if abs(x[0] - level) <= _ZERO * (1 + abs(x[0])):
-                # Its derivative decides; an operand that stays on the level has NumPy's result.
+                # The operand's derivative decides; if the operand stays on the level, NumPy does.
                 known = self._levels.get(slot)
                 value = level if is_floor else Decimal(0)
                 if slot in self.results and known is not None:
@@ -58,7 +58,7 @@ class Switches:
     def turns(self, time: Decimal, length: Decimal) -> bool:
         """Change the result of an operand that moves to the other side of its level.
 
-        Return whether a result was changed. Raise TimedError if the operand does so with either
+        Return whether a result was changed. Raise TimedError if the operand moves so with either
         result.
         """
         for slot, is_floor, x in self._tape.operands_of_switches():
@@ -80,7 +80,7 @@ class Switches:
         return False
 
     def end(self, length: Decimal) -> Decimal:
-        """Return the step (s), shortened until operands' series converge, or to the first root."""
+        """Return the step (s), shortened until operands' series converge, or to the first jump."""
         while any(self._is_unresolved(x, length) for *_, x in self._tape.operands_of_switches()):
             length *= Decimal("0.75")
         roots = []
@@ -104,7 +104,7 @@ class Switches:
         return first.copy_sign(length)
 
     def step(self, is_whole: bool) -> None:
-        """Change the results at the end of a step that was not shortened."""
+        """Change the results that jump at the end of a step, if it `is_whole` (not shortened)."""
         self._levels = {}
         if is_whole:
             for slot, level in self._next.items():

@@ -1,8 +1,7 @@
-"""Torque-free motion by Jacobi's elliptic functions in decimals, to check other methods.
+"""Torque-free motion by Jacobi's elliptic functions in decimals.
 
 Unlike a Taylor series, they lose no digits with time, and flips (sign changes of omega near the
-separatrix) take no more work. The module uses Landen's transformation, and shares no code with the
-closed form that it checks.
+separatrix) take no more work. The module shares no code with the closed form that it checks.
 """
 
 import decimal

@@ -46,7 +46,7 @@ def enclose(
     text. `effort` is a factor on the work limit.
 
     Raise InputError if `digits` is not from 1 to 1000, the times are not in order, python-flint is
-    missing, the torque is opaque, the solution can't be enclosed, or the limit is exceeded.
+    missing, the torque isn't recorded, the solution can't be enclosed, or the limit is exceeded.
     """
     checked_scene(scene, True, True, True, True)
     if not 1 <= integer("digits", digits) <= MOST_DIGITS:

@@ -150,7 +150,7 @@ class Orbit:
 
 
 def integer_near(x: arb) -> int:
-    """Return an integer near the middle of `x`; with any integer the reduction is exact."""
+    """Return an integer near the middle of `x`; reduction by any number of periods is exact."""
     mantissa, exponent = map(int, x.mid().man_exp())
     return round(mantissa * Fraction(2) ** exponent)
 
@@ -164,8 +164,8 @@ class _Attitude:
     """The attitude along an orbit.
 
     In the body, let n be the direction of the angular momentum L, and e the direction of the axis
-    of dn. Then n e = c dn(u) with c > 0. The attitude is the product of a constant rotation, the
-    rotation by psi about e, and the smallest rotation from n to e.
+    of dn. Their scalar product n e is c dn(u) with c > 0. The attitude is the product of a constant
+    rotation, the rotation by psi about e, and the smallest rotation from n to e.
 
     Euler's equations give psi' = (2 T/|L| + omega e)/(1 + n e), with the kinetic energy T. Like dn,
     psi' has the periods 2K and 4iK' in complex u. Its poles, where dn(u) = -1/c, are at u = 2iK' +

@@ -62,8 +62,8 @@ def enclose_steps(
 ) -> Enclosure:
     """Return balls that contain the solution of a scene at `times` (s).
 
-    The arguments are those of `enclosure.enclose`. Raise InputError if the torque is opaque, or no
-    enclosure is found within the limit of steps.
+    The arguments are those of `enclosure.enclose`. Raise InputError if the torque isn't recorded,
+    or no enclosure is found within the limit of steps.
     """
     limit = _MOST_STEPS * checked_effort(effort)
     wanted = float(digits + 2)
@@ -376,7 +376,7 @@ class _Proof:
         return min(candidates, key=lambda rests: sum(map(float, rests)))
 
     def _growth(self, rates: Rates, time: Any, inputs: list[Any]) -> Any:
-        """Return the matrix M of the module's docstring (1/s)."""
+        """Return the matrix M (1/s): norms and logarithmic norms of the Jacobian's blocks."""
         count = len(inputs)
         unit = [[arb(int(i == j)) for j in range(count)] for i in range(count)]
         found = rates(time, [Dual(x, row) for x, row in zip(inputs, unit, strict=True)])

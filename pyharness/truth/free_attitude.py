@@ -1,4 +1,4 @@
-"""Attitude of a torque-free body at any time in decimals, to check other methods.
+"""Attitude of a torque-free body at any time in decimals.
 
 In each period of omega the body rotates about the angular momentum by the same angle, so that
 Taylor series integrate only one period. Near the separatrix errors of omega grow exponentially.
@@ -103,7 +103,6 @@ def _settling_time(scene: Scene, rate: Decimal) -> Decimal:
 
 
 def _rotated(q: Row, omega: Row, time: Decimal) -> Row:
-    """Return the attitude `q` after `time` (s) with constant `omega` (rad/s)."""
     speed = sum((w * w for w in omega), Decimal(0)).sqrt()
     sine, cosine = sine_cosine(speed * time / 2)
     across = [w * sine / speed for w in omega] if speed else omega
@@ -122,7 +121,7 @@ def conjugate(q: Row) -> Row:
 
 
 def _followed(scene: Scene, times: Row, rate: Decimal) -> list[Row]:
-    """Return the attitude at each of `times` (s), away from 0; raise InputError above the limit."""
+    """Return the attitude at each of `times` (s), in order away from 0, or raise InputError."""
     angle = max(map(abs, scene.omega)) * float(abs(times[-1]))
     if angle > _MOST_RADIANS:
         raise InputError(

@@ -44,7 +44,7 @@ _Sum = tuple[Decimal, list[tuple[Decimal, int]]]
 
 
 def series_products(tape: Tape) -> int:
-    """Return the number of products of two series in each order of a tape.
+    """Return how many products of two series a tape takes in each order.
 
     A sine with its cosine, and a tanh with its derivative, take two; a table takes none.
     """
@@ -58,7 +58,7 @@ class TapeSeries:
     """The Taylor series of a tape's operations around a time.
 
     `begin` starts an expansion, and each `next` adds a coefficient to all series. `least_order` is
-    the lowest order whose series show all products, even if factors are 0 at that time.
+    the lowest order that loses no product whose factors are 0 at that time.
     """
 
     def __init__(
@@ -66,8 +66,8 @@ class TapeSeries:
     ) -> None:
         """Store the operations, with terms of sums multiplied by 1 plus or minus `change`.
 
-        A `change` shows the effect of rounding. `results` are the switches' by slot; the caller
-        changes them.
+        A `change` shows the effect of rounding. `results` has the results of switches by slot,
+        which the caller changes.
         """
         self.results = {} if results is None else results
         self._tape = tape
@@ -287,7 +287,7 @@ class TapeSeries:
 
 
 def _powers(tape: Tape) -> tuple[list[_Power], int]:
-    """Return products of three or more factors used outside products, and the most factors."""
+    """Return products of three or more factors, used outside products, and the most factors."""
     factors: dict[int, Counter[int]] = {}
     numbers: dict[int, int] = {}
     scales: dict[int, float] = {}

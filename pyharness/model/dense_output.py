@@ -142,7 +142,8 @@ class DenseOutput:
         Returns
         -------
         ndarray, shape (m,) or (m, n)
-            Omega (rad/s); the unit quaternion, scalar first, if requested; and the own states.
+            Omega (rad/s); the unit quaternion, scalar first, if requested; and the own states
+            (`Scene.states`).
 
         Raises
         ------
@@ -157,13 +158,14 @@ class DenseOutput:
         Parameters
         ----------
         t : float or array_like, shape (n,)
-            Times (s), as in a call of the object. Where a tabulated torque jumps, the derivative
-            just after the jump is returned.
+            Times (s). Where a tabulated torque jumps, the derivative just after the jump is
+            returned.
 
         Returns
         -------
         ndarray, shape (m,) or (m, n)
-            The derivatives: of omega in rad/s2, of the quaternion in 1/s, and of own states.
+            The derivatives: of omega in rad/s2, of the quaternion in 1/s, and of own states
+            (`Scene.states`).
 
         Raises
         ------

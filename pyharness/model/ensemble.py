@@ -163,7 +163,7 @@ class Ensemble(BatchResult):
         pandas.DataFrame
             Its index is `body`, from 0, or `body` and `time` (s). Its columns are `omega1` to
             `omega3` (rad/s), `ended`, and, if present, `q0` to `q3`, `error`, `growth`, and the
-            own states by name. ``attrs["units"]`` has the units.
+            own states (`Scene.states`) by name. ``attrs["units"]`` has the units.
 
         Raises
         ------
@@ -204,7 +204,7 @@ class Ensemble(BatchResult):
         xarray.Dataset
             Its variables are `omega` (dimensions `body`, `time` if there are `times`, and `axis`),
             `ended`, and, if present, `attitude` (with the dimension `component` in place of
-            `axis`), `error`, `growth` and own states.
+            `axis`), `error`, `growth` and own states (`Scene.states`).
 
         Raises
         ------

@@ -1,6 +1,6 @@
 """Elementary functions of floats and of the numbers of `pyharness.thesis.word`.
 
-Functions of floats are the C library's; functions of the other numbers are correctly rounded.
+Functions of floats are the C library's; those of numbers in other formats are correctly rounded.
 """
 
 import math

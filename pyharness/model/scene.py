@@ -425,7 +425,7 @@ def checked_scene(
     """Return `scene`; raise InputError unless it is a Scene that the flags allow.
 
     They allow a full inertia matrix (`any_axes`), a torque about the axes of space (`any_torque`)
-    or dependent on the state (`any_state`), a changing inertia, and own states.
+    or dependent on the state (`any_state`), a changing inertia, and own states (`Scene.states`).
     """
     if isinstance(scene, Scene):
         if scene.states and not states:

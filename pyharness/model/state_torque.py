@@ -151,7 +151,7 @@ class StateTorque:
 
 
 def torque_of(tape: Tape, time: Any, omega: Any, attitude: Any, *own: Any) -> Array:
-    """Return the outputs of a tape for symbols as its inputs: torque, and rates of own states."""
+    """Return the outputs of a tape for symbols as its inputs: torque, rates of `Scene.states`."""
     return np.array(evaluate(tape, [time, *omega, *attitude, *own], SYMBOLS), dtype=object)
 
 
@@ -283,7 +283,7 @@ def _listed(names: Iterable[str]) -> str:
 
 
 def count_arguments(function: Function, where: str, allowed: str) -> int:
-    """Return the number of arguments of a function of own states: 3, or 4 with the attitude."""
+    """Return the number of arguments of a function of `Scene.states`: 3, or 4 with the attitude."""
     parameters = _parameters(function, where, f"allowed: {allowed}")
     count = sum(each.kind in _POSITIONAL for each in parameters)
     if count not in (3, 4):

@@ -175,7 +175,7 @@ class Trajectory(Conversions):
     def y(self) -> Array:
         """The state at each time in columns, shape (m, n).
 
-        It is omega (rad/s), the quaternion if requested, and the own states.
+        It is omega (rad/s), the quaternion if requested, and the own states (`Scene.states`).
         """
         parts = [each.T for each in (self.omega, self.attitude, self.own) if each is not None]
         return np.concatenate(parts) if len(parts) > 1 else parts[0]

@@ -94,7 +94,7 @@ def bound_of(
 ) -> ErrorBound:
     """Return the error bound of the reference `known` of a scene.
 
-    If `before_rounding`, the bound is for omega plus `remainder`, which rounding removed. The other
+    If `before_rounding`, the bound is for omega plus `remainder`, which rounding removed. Other
     options are those of `error_bound`.
     """
     exact = before_rounding and known.remainder is not None

@@ -4,6 +4,7 @@ Taylor series begin a step where a table changes, and are as accurate as for a s
 """
 
 import math
+import warnings
 from collections.abc import Iterable, Sequence
 from itertools import islice
 from typing import Any
@@ -296,7 +297,9 @@ def _piecewise(times: Array, values: Array, interpolation: str, where: str) -> T
             from scipy.interpolate import CubicSpline
 
             try:
-                pieces = CubicSpline(times, values).c[::-1].T
+                # Distances that differ much cause a warning, and hardly an error.
+                with warnings.catch_warnings(action="ignore"):
+                    pieces = CubicSpline(times, values).c[::-1].T
             except (ValueError, ArithmeticError, np.linalg.LinAlgError):
                 pieces[:] = np.nan
     if not np.isfinite(pieces).all():

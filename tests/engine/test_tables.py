@@ -78,6 +78,11 @@ def test_cubic_table_of_few_times_is_the_polynomial_through_them(count: int) -> 
         assert at(torque, t) == pytest.approx(wanted, rel=1e-11, abs=1e-11)
 
 
+def test_cubic_table_of_distant_times_is_its_parabola() -> None:
+    torque = table([0.0, 1.0, 1e20], [(0, 0, 0), (1, 0, 0), (0, 0, 1)], "cubic")
+    assert at(torque, 0.5) == pytest.approx([0.5, 0.0, 0.0], abs=1e-19)
+
+
 def test_pulses_act_from_their_start_until_their_end() -> None:
     for t in [*np.linspace(-2.0, 4.0, 97), -1e9, 1e9]:
         wanted = np.zeros(3)

@@ -7,9 +7,9 @@ of omega neither overflow nor underflow.
 import itertools
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -176,9 +176,12 @@ def solve(
         scene = with_merged_waves(scene)
     effort = checked_effort(effort)
     call = _Call(given, scene, moments, axes, method, tolerance, effort, dense_output, functions)
-    found = _to_terminal_events(call, values)
-    if functions is not None and (turned or (len(values) == 1 and values[0] < 0.0)):
-        found = with_events_reversed(found)
+    if functions is None:
+        found, _ = call.trajectory(values)
+    else:
+        found = _to_terminal_events(call, values)
+        if turned or (len(values) == 1 and values[0] < 0.0):
+            found = with_events_reversed(found)
     found = in_reverse(found) if turned else found
     if names is not None:
         states = partial(_states_of_changed, found.time, effort, found.attitude is not None)
@@ -187,8 +190,7 @@ def solve(
     return found
 
 
-@dataclass(frozen=True, eq=False)
-class _Call:
+class _Call(NamedTuple):
     """The checked arguments of `solve`; `given` is the scene, and `scene` has principal `axes`."""
 
     given: Scene
@@ -253,11 +255,7 @@ class _Call:
 
 
 def _to_terminal_events(call: _Call, values: list[float]) -> Trajectory:
-    """Return the trajectory at ascending times (s), computed little further than needed.
-
-    With terminal events, the motion is first computed to a time at which they may have occurred,
-    then to longer and longer times.
-    """
+    """Return the trajectory at ascending times (s), computed little beyond a terminal event."""
     spent, low, high = 0, values[0], values[-1]
     for end in _trial_ends(call, max(-low, high)):
         some = [t for t in values if -end < t < end]

@@ -281,7 +281,7 @@ def _trial_ends(call: _Call, last: float) -> Iterator[float]:
     largest = np.abs(rates_of(scene, np.zeros(1), state)[0, :3]).max()
     fastest = max(*map(abs, scene.omega), math.sqrt(largest))
     end = _PHASES[call.method in SCIPY_METHODS] / fastest if fastest > 0.0 else math.inf
-    while _LONGER * end <= last:
+    while 0.0 < _LONGER * end <= last:
         yield end
         end *= _LONGER
 

@@ -267,7 +267,7 @@ def _to_terminal_events(call: _Call, values: list[float]) -> Trajectory:
         if (low > -end or -end < events.first) and (high < end or events.last < end):
             return replace(found, evaluations=spent)
     found, _ = call.trajectory(values)
-    return replace(found, evaluations=spent + found.evaluations) if spent else found
+    return replace(found, evaluations=spent + found.evaluations)
 
 
 def _trial_ends(call: _Call, last: float) -> Iterator[float]:
@@ -278,8 +278,11 @@ def _trial_ends(call: _Call, last: float) -> Iterator[float]:
     scene = call.given
     attitude = () if call.scene.attitude is None else scene.attitude or IDENTITY
     state = np.array([[*scene.omega, *attitude, *(each.start for each in scene.states)]])
-    largest = np.abs(rates_of(scene, np.zeros(1), state)[0, :3]).max()
-    fastest = max(*map(abs, scene.omega), math.sqrt(largest))
+    try:
+        slopes = np.abs(rates_of(scene, np.zeros(1), state)[0, :3])
+    except Exception:  # what an opaque torque raises is told by the integration
+        return
+    fastest = max(*map(abs, scene.omega), math.sqrt(slopes.max()))
     end = _PHASES[call.method in SCIPY_METHODS] / fastest if fastest > 0.0 else math.inf
     while 0.0 < _LONGER * end <= last:
         yield end

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pyharness import Scene, TorqueLaw, case_scene, load, solve
+from pyharness import InputError, Scene, TorqueLaw, case_scene, load, solve
 from pyharness.engine.event_fits import Solution
 from pyharness.engine.event_functions import event_functions
 from pyharness.events import Event, crosses, extremum, flip, rest, tilt
@@ -309,6 +309,16 @@ def test_terminal_events_at_the_end_of_a_trial_and_on_both_sides() -> None:
     found = solve(body, [-1e7, -40.0, 40.0, 1e7], events=event)
     assert events_of(found)[0][0].tolist() == pytest.approx([-300.0, 30.0])
     assert found.time.tolist() == [-40.0]
+
+
+def test_a_torque_without_a_value_at_time_0_is_told_as_without_events() -> None:
+    event = crosses(2, 0.0, terminal=True)
+    inverse = Scene(
+        "1/t", (1.0, 0.2, 0.1), moments=(1, 2, 2.5), torque=lambda t, w: (1.0 / t, 0, 0)
+    )
+    assert solve(inverse, 1e4, events=event).ended == "overflow"
+    with pytest.raises(InputError, match="the function raised ZeroDivisionError at t = 0 s"):
+        solve(replace(inverse, torque=opaque(lambda t, w: (1.0 / t, 0, 0))), 1e4, events=event)
 
 
 def test_no_events_without_a_request() -> None:

@@ -242,6 +242,9 @@ def test_json_has_the_documented_fields(
 def test_schema_describes_each_field_of_each_verb() -> None:
     Draft202012Validator.check_schema(SCHEMA)
     assert {f"verb-{verb}" for verb in VERBS} <= set(SCHEMA["$defs"])
+    # Without a fragment, the file describes the output of any command.
+    each = [name for name in SCHEMA["$defs"] if name.startswith("verb-")]
+    assert [one["$ref"] for one in SCHEMA["anyOf"]] == [f"#/$defs/{name}" for name in each]
     for name, each in SCHEMA["$defs"].items():
         assert each["description"], name
         for path, meaning in fields(SCHEMA, each, name):
@@ -259,6 +262,8 @@ def test_a_field_that_is_not_documented_is_found(printed: Printed) -> None:
     record = json.loads(printed("doctor --format json"))
     for changed in (record | {"more": 1}, record | {"missing": None}, {"schema": 1}):
         assert not Draft202012Validator(schema_of("doctor")).is_valid(changed)
+    for changed, is_valid in ((record, True), ({}, False), (record | {"more": 1}, False)):
+        assert Draft202012Validator(SCHEMA).is_valid(changed) == is_valid
 
 
 def write_anew() -> None:

@@ -142,7 +142,7 @@ def _attitude(initial: dict[str, Any]) -> Any:
         return initial.get("attitude")
     if given != ["angles_deg", "sequence"]:
         raise InputError(
-            f"[initial]: {' and '.join(given)}; allowed: attitude, or angles_deg with a sequence"
+            f"[initial]: {' and '.join(given)}; allowed: attitude, or both angles_deg and sequence"
         )
     return of_angles("[initial] angles_deg", initial["angles_deg"], initial["sequence"])
 
@@ -156,10 +156,10 @@ def _torque(
     if not (rates or any(key in given for key in _TEXTS)):
         first = law_of_table(given)
     elif "expression" not in given:
-        what = "states" if rates else "constants"
+        what = "a scene with [states]" if rates else "constants"
         raise InputError(
-            f"[torque]: {what} without expression; give an expression, a list of three texts, or "
-            "constant, three numbers"
+            f"[torque]: expression is missing, which {what} must have; give three texts, as in "
+            "expression = ['0', '0', '-0.4*w3']"
         )
     elif others := [key for key in given if key not in _TEXTS]:
         raise InputError(

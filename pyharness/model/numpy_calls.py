@@ -275,7 +275,13 @@ def called_once(
     for with_targets in (False, True):
         try:
             with replaced_functions(with_targets):
-                return list(function(*given))
+                found = function(*given)
+                if found is None or isinstance(found, (Symbol, float, int)):
+                    what = "nothing" if found is None else "one number"
+                    raise InputError(
+                        f"{recorder.place}: the function returned {what}; allowed: {allowed}"
+                    )
+                return list(found)
         except InputError:
             if with_targets or not recorder.was_converted:
                 raise

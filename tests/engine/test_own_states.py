@@ -462,7 +462,7 @@ def test_a_scene_file_has_states(tmp_path: Any) -> None:
         ('rate = "k*w3 - 0.1*sin(t)"', "", r"\[states.wheel\]: rate is missing"),
         ("[states.wheel]", "[states.w1]", "another meaning"),
         ("[states.wheel]", "[states.k]", "another meaning"),
-        ("expression = [", "constant = [1.0]  # [", "states without expression"),
+        ("expression = [", "constant = [1.0]  # [", "expression is missing, which a scene with"),
         ('rate = "k', 'rate = "u', "'u'"),
         ("scale = 2.0", "scale = -2.0", "from 0 on"),
     ],

@@ -136,6 +136,9 @@ def test_torque_that_accepts_numbers_only_is_told_of_opaque() -> None:
 
     with pytest.raises(InputError, match=r"the function raised IndexError"):
         Scene(**BODY, torque=mistaken)
+    for returned, what in ((None, "nothing"), (2.0, "one number")):
+        with pytest.raises(InputError, match=f"the function returned {what}; allowed: a function"):
+            Scene(**BODY, torque=lambda t, omega, returned=returned: returned)
 
 
 def test_several_times_for_many_bodies_are_told_of_their_argument() -> None:

@@ -56,7 +56,7 @@ _LARGEST_PHASE = 1e15  # rad
 
 
 class Done(NamedTuple):
-    """A completed macro-step; a point is (p1, p2, p3, t), as in `Coordinates`."""
+    """A completed macro-step; a point is (p1, p2, p3, t): slow coordinates of omega, and time."""
 
     start: Array  # shape (4,); the point at the start of the step
     by_omega: Array  # shape (8, 3, 3); d(p1, p2, p3)/d(omega) at the start, for eight angles psi
@@ -99,10 +99,10 @@ def averaged(
 ) -> Trajectory:
     """Return the trajectory of a scene with a weak torque at `times` (s), by averaging.
 
-    `steps` of the result counts macro-steps, and `error` is the difference from a solution with
-    more nodes and a higher order of averaging. A recorded torque must be a sum of polynomials in
-    omega and time, multiplied by sines and cosines of time; a macro-step might miss changes of
-    another torque.
+    `steps` of the result counts macro-steps, of 100 revolutions or more; `error` is the difference
+    from a solution with more nodes and a higher order of averaging. A recorded torque must be a sum
+    of polynomials in omega and time, multiplied by sines and cosines of time; a macro-step might
+    miss changes of another torque.
 
     Raise InputError if the torque has another form, is opaque, depends on the attitude, is not
     weak, or may be in resonance; if the torque-free omega is near the separatrix, or does not
@@ -274,7 +274,7 @@ class _Run:
         )
 
     def _angles(self, modulus: float) -> int:
-        """Return the number of nodes in psi for a squared modulus; raise TimedError near 1."""
+        """Return the number of angles for a squared elliptic modulus; raise TimedError near 1."""
         # The oscillation is analytic up to this distance from the real axis of the angle.
         width = math.acosh(1.0 / math.sqrt(min(1.0, max(modulus, 1e-4))))
         if width * _MOST_ANGLES < _DIGITS:

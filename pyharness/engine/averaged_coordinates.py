@@ -36,7 +36,10 @@ Torque = Callable[[Array, list[Array]], list[Array] | Array]
 
 
 class Coordinates(NamedTuple):
-    """The constants of the coordinates about one axis. A point is (p1, p2, p3, t), with t in s."""
+    """The constants of coordinates of omega. A point is (p1, p2, p3, t), with t in s.
+
+    x + i y = (p1 + i p2) exp(i psi) and w_a^2 = p3 + k y^2.
+    """
 
     axes: tuple[int, int, int]  # b, c, a
     on_b: float  # x over w_b
@@ -116,7 +119,7 @@ class Coordinates(NamedTuple):
     def slopes(
         self, point: Array, time: Array, cosine: Array, sine: Array, torque: Torque, mean: float
     ) -> Array:
-        """Return d/dpsi of a point, with `mean` (s/rad) subtracted from dt/dpsi."""
+        """Return d/dpsi of a point (p1, p2, p3, t), with `mean` (s/rad) subtracted from dt/dpsi."""
         omega, y, fast = self.omega(point, cosine, sine)
         pace = 1.0 / (self.rate * fast)
         torques = torque(time, omega)
@@ -131,7 +134,7 @@ class Coordinates(NamedTuple):
 
 
 def torque_of(scene: Scene) -> tuple[Torque, bool]:
-    """Return the torque over the moments as a function, and whether it may depend on time."""
+    """Return torque over moment of inertia as a function, and whether it may depend on time."""
     given = scene.torque
     if isinstance(given, StateTorque):
         tape = given.tape
@@ -165,7 +168,7 @@ def torque_of(scene: Scene) -> tuple[Torque, bool]:
 
 
 class _Slot(NamedTuple):
-    """The dependence of a slot of a tape on omega and time."""
+    """The dependence of a slot (value) of a tape on omega and time."""
 
     degree: float = 0.0  # of the polynomial factor; infinite if another factor is no wave
     fastest: float = 0.0  # highest frequency of the waves, rad/s

@@ -120,9 +120,9 @@ class NotResolvedError(Exception):
 class MacroStep:
     """The solution over one macro-step.
 
-    `stroboscopic`, shape (4, nodes), has V at the nodes; its times lack the part that is
-    proportional to psi. `error` is the measured error of V, and `modulus` the largest squared
-    elliptic modulus.
+    `stroboscopic`, shape (4, nodes), has V, the solution at psi = 0, at the nodes; its times lack
+    the part proportional to psi. `error` is the measured error of V, and `modulus` the largest
+    squared elliptic modulus.
     """
 
     def __init__(
@@ -187,7 +187,7 @@ class MacroStep:
             raise NotResolvedError
 
     def _slopes(self, point: Array, fast: Fast, slow: Slow | None = None) -> Array:
-        """Return d/dpsi of points on a grid of nodes and angles, (4, nodes, angles)."""
+        """Return d/dpsi of points on a grid of nodes and angles psi, (4, nodes, angles)."""
         nodes = (slow or self._slow).nodes[: point.shape[-2], None]
         time = self._start_time + (self._pace * self.length) * nodes + point[3]
         self.evaluations += point[0].size // point.shape[-1] * len(fast.angles)
@@ -196,7 +196,7 @@ class MacroStep:
         )
 
     def _residual(self, mean: Array, waves: Array, slow: Slow, fast: Fast) -> tuple[Array, Array]:
-        """Return the residual of the first equation of the module, and the next W."""
+        """Return the residual of the equation for V + <W>, and the next oscillation W."""
         slopes = self._slopes(mean[..., None] + waves, fast, slow)
         right = self._start + (slopes @ fast.mean) @ (self.length * slow.integral.T)
         waves = (slopes - (slow.slope / self.length) @ waves) @ fast.integral
@@ -204,7 +204,7 @@ class MacroStep:
         return right + (offset[:, :1] - offset) - mean, waves
 
     def _linearise(self, mean: Array, few: Fast) -> Array:
-        """Set the matrices of Newton's method, and return the mean of F over psi, (4, nodes)."""
+        """Set the matrices of Newton's method, and return the mean slopes over psi, (4, nodes)."""
         n, count = self._n_unknowns, self._sizes[0]
         shift = _DIFFERENCE * self.scale[:n, None]
         shifted = np.repeat(mean[:, None], n + 1, axis=1)
@@ -229,7 +229,7 @@ class MacroStep:
         return found
 
     def _measured(self) -> Array:
-        """Return the measured error of V at the nodes."""
+        """Return the measured error of the stroboscopic solution V at the nodes."""
         count, angles = self._sizes
         nodes, turns, back = _finer(count, angles)
         slow, fast = slow_nodes(count + _MORE_NODES), fast_nodes(angles + _MORE_ANGLES)
@@ -240,7 +240,7 @@ class MacroStep:
         return self._newton(residual @ back.T)
 
     def propagated(self, angle: float) -> tuple[Array, Array]:
-        """Return, at an angle (rad), the error of V, (4,), and dV/dV(0), (4, 4)."""
+        """Return, at an angle (rad), the error of the solution V, (4,), and dV/dV(0), (4, 4)."""
         at = between_nodes(self._sizes[0], np.array([angle / self.length]))[0]
         found, n, count = np.eye(4), self._n_unknowns, self._sizes[0]
         responses = self._inverse.reshape(n, count, n, count).sum(axis=-1)
@@ -252,7 +252,7 @@ class MacroStep:
 
     @property
     def end(self) -> tuple[Array, tuple[float, float]]:
-        """Return the point at the end with t = 0, and the two summands of its time (s)."""
+        """Return the point at the step's end, with t = 0, and its time (s) as two summands."""
         found = self.stroboscopic[:, -1].copy()
         found[3] = 0.0
         return found, (self._pace * self.length, float(self.stroboscopic[3, -1]))

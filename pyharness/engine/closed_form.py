@@ -18,12 +18,12 @@ from pyharness.model.principal import principal
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
 
-_CALM = 1e3  # error amplification below which only the last time is evaluated
-_MOST_ROWS = 16  # rows at which a larger amplification is computed
+_CALM = 1e3
+_MOST_ROWS = 16
 
 
 def period_of(scene: Scene) -> float:
-    """Return the period of omega (s); 0 if none, under a torque or a changing inertia."""
+    """Return the period of omega (s); 0 without one, with a torque, or with a changing inertia."""
     if scene.changing is not None or not scene.torque.is_zero:
         return 0.0
     bare = principal(scene)[0]
@@ -34,7 +34,10 @@ def period_of(scene: Scene) -> float:
 def _largest_estimate(
     scene: Scene, times: Sequence[float], noise: float
 ) -> tuple[float | None, float | None]:
-    """Return the last error and amplification; if this is 1000 or more, maxima over 16 rows."""
+    """Return the estimated error and the error amplification at the last time.
+
+    If the amplification is at least 1000, return the maxima over 16 rows.
+    """
     error, growth = closed_form_estimate(scene, scene.omega, times[-1], noise)
     if error is None or growth is None or growth < _CALM:
         return error, growth

@@ -34,7 +34,7 @@ _SUDDEN, _BEFORE = 1e3, 0.01
 _MOST_PIECES = 100_000  # intervals that are divided at the same time
 _SHIFT = 2.0**-26  # relative change of an argument for a numerical derivative
 ROUNDING = 2.0**-50  # relative rounding error of the arguments of a function
-# Largest relative error of the state that noise includes, as `Solution.state_error` explains.
+# Largest relative error of the state in noise; see `Solution.state_error`.
 _COARSEST = 1e-10
 _SOME = slice(5, None, 11)  # three nodes at which noise is computed
 # Matrix from values at the nodes of the solution's polynomials to values at POINTS.
@@ -79,17 +79,17 @@ class Solution:
         return g(times, states, rates)
 
     def exact_values(self, g: EventFunction, times: Array) -> Array:
-        """Return the values for the states of `sol` instead of `pieces`."""
+        """Return an event function's values for the states of `sol` instead of `pieces`."""
         return self.values(g, times, self.sol.normalized(self.sol.states(times)))
 
     def noise(self, g: EventFunction, times: Array) -> Array:
-        """Return the errors of the values due to errors of time, state and rates."""
+        """Return the errors of a function's values due to errors of time, state and rates."""
         return self.values_and_noise(g, times)[1]
 
     def values_and_noise(
         self, g: EventFunction, times: Array, states: Array | None = None
     ) -> tuple[Array, Array, Array]:
-        """Return a function's values, their `noise`, and the noise that is due to rounding."""
+        """Return a function's values, their errors (noise), and the part due to rounding."""
         states = self.states(times) if states is None else states
         n, width = states.shape
         # One call with all arguments: the state at a later time, the state itself, and the state
@@ -184,7 +184,7 @@ def _noise_of(g: EventFunction, solution: Solution, low: Array, high: Array) -> 
 def with_noise(
     g: EventFunction, solution: Solution, fits: Fits, needed: Index
 ) -> tuple[Fits, Roots]:
-    """Return `fits`, with the noise where a value may be 0, and roots at ends of the solution."""
+    """Return `fits`, with the error where a value may be 0, and roots at ends of the solution."""
     sizes, largest = fits.sizes, fits.sizes.max(initial=0.0)
     which = np.flatnonzero(needed | (sizes <= largest / _SUDDEN) | (sizes == largest))
     ends, states = solution.at_ends
@@ -215,7 +215,7 @@ def _sign_changes(times: Array, values: Array, first: Array) -> Roots:
 
 @dataclass(frozen=True, eq=False)
 class ZeroIntervals:
-    """The zero intervals of a function, from `low` to `high` (s), ascending.
+    """The ascending intervals, `low` to `high` (s), in which a function is 0 to within its error.
 
     Near an interval, values below `noise` can't be distinguished from 0. `before` and `after` are
     the signs of the function on the two sides: 0 if it decays to 0 there, or at an end of the
@@ -229,7 +229,7 @@ class ZeroIntervals:
     after: Array
 
     def roots(self, counts_touches: bool) -> Roots:
-        """Return each interval's root, at the end that the integration from 0 reaches first.
+        """Return each interval's root, at the end that the integration from time 0 reaches first.
 
         Without `counts_touches`, intervals with equal signs on both sides have no root.
         """

@@ -54,7 +54,7 @@ class Event:
 class EventFunction:
     """A checked event.
 
-    The event number `limit`, from 1, ends the integration; infinity means that none does.
+    The event number `limit`, counted from 1, ends the integration; infinity means that none does.
     `is_vectorized` is true if the function accepts arrays, None if that is not yet known.
     """
 
@@ -220,7 +220,7 @@ def _with_own(
 
 
 def _arguments(given: Callable[..., Any], name: str, with_own: bool = False) -> int:
-    """Return the number of a function's arguments, 2 or 3, without own states."""
+    """Return the number of a function's arguments, 2 or 3, not counting the user's own states."""
     if type(given) is FunctionType and not (given.__defaults__ or vars(given).keys() & _SIGNED):
         code = given.__code__
         count = code.co_argcount - with_own

@@ -2,7 +2,7 @@
 
 A function is approximated by polynomials on intervals, which are divided until the polynomials
 converge. All roots of the polynomials are isolated, including close and double roots. Where the
-function is not smooth, intervals become tiny, and only sign changes between nodes are found.
+function is not smooth, intervals become tiny, and only its sign changes between nodes are found.
 """
 
 import math
@@ -45,7 +45,7 @@ def event_roots(g: EventFunction, solution: Solution) -> Roots:
 
 
 def _distinct(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
-    """Return the roots, each with the noise at its time, without extrema that differ from 0."""
+    """Return the roots, each with the error (noise) at its time, without extrema that are not 0."""
     if not roots.time.size:
         return roots
     value, noise, _ = solution.values_and_noise(g, roots.time)
@@ -181,7 +181,7 @@ def _with_extrema(
 
 
 def _chosen(roots: Roots, group: Index, change: int, ends: tuple[float, ...]) -> int:
-    """Return the index of the root that replaces a group: one at an end, else in the middle."""
+    """Return the index of the root that replaces a group: one in `ends`, else in the middle."""
     at_end = group[np.isin(roots.time[group], ends)]
     if at_end.size:
         return int(at_end[0])
@@ -217,7 +217,7 @@ def side_events(g: EventFunction, solution: Solution, roots: Roots, side: int) -
 def _repeated(
     g: EventFunction, solution: Solution, times: Array, side: int, period: float
 ) -> Array:
-    """Return the times (s) of all events on one side of 0; those beyond the polynomials repeat."""
+    """Return the times (s) of all events on one side of 0, by repetition beyond the polynomials."""
     last, end = solution.pieces.edges[-1], solution.sol.t_max
     if side < 0:
         last, end = solution.pieces.edges[0], solution.sol.t_min

@@ -1,4 +1,4 @@
-"""Methods with equal steps: Gauss collocation, and those of section III.2 of the thesis."""
+"""Methods with equal steps: Gauss collocation, and those of section III.2 of Jacobs 1982."""
 
 import math
 from collections.abc import Sequence
@@ -144,7 +144,7 @@ def _blows_up(finer: _Solution, coarser: _Solution, start: float) -> bool:
 
 
 def _step_counts(lengths: Array, step: float) -> Array:
-    """Return the number of steps in each interval; a step exceeds `step` by at most 1e-6 of it."""
+    """Return the steps per interval; a step exceeds `step` by a fraction of 1e-6 at most."""
     with np.errstate(over="ignore", divide="ignore"):
         return np.maximum(1.0, np.floor(np.minimum(lengths / step, 1e18) + (1.0 - 1e-6)))
 

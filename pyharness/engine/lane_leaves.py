@@ -1,6 +1,6 @@
-"""Leaves (leaves.py) for many bodies, one per lane of a register; see fortran/many/tape_lanes.c.
+"""C code for Taylor series of many bodies, one per vector lane; see fortran/many/tape_lanes.c.
 
-To save loads, the parts of four sums of products known before term k are computed together.
+To save loads, the sums of products for four successive terms begin together.
 """
 
 import re
@@ -100,7 +100,7 @@ static SHORT reg late_sum(const reg *x, const reg *y, int k, int late, const reg
 
 @lru_cache(maxsize=64)
 def whole_source(tape: Structure) -> str:
-    """Return the C source of all leaves of a tape, with `leaves`, a structure of tape.h."""
+    """Return the C source of all functions of a tape, and `leaves`, their table (see tape.h)."""
     functions, lines = ["0"] * 4, [HEADER]
     if not _has_parameters(tape):
         functions, lines = names(tape), [source(tape)]
@@ -117,7 +117,7 @@ def whole_source(tape: Structure) -> str:
 
 
 def _in_lanes(text: str) -> str:
-    """Return statements for numbers as statements for registers."""
+    """Return C statements for numbers as statements for vector registers."""
     for old, new in {
         "const double t": "const reg t",
         "halved(": "half_in_lanes(",
@@ -138,18 +138,18 @@ def _first_result(tape: Structure) -> int:
 
 
 def _has_parameters(tape: Structure) -> bool:
-    """Return whether the tape has parameters in which bodies differ; only lanes allow them."""
+    """Return whether bodies differ in parameters of the tape, as this module alone allows."""
     return tape.n_unknowns in _UNKNOWNS and _first_result(tape) > _N_INPUTS + 1
 
 
 def _inputs(tape: Structure, texts: list[str], letter: str) -> list[int]:
-    """Return the slots of inputs (time, unknowns, parameters) that are read under a letter."""
+    """Return the slots of inputs (time, unknowns, parameters) read in texts, such as 5 for t5."""
     read = {int(each) for each in re.findall(rf"\b{letter}(\d+)", " ".join(texts))}
     return sorted(slot for slot in read if slot < _first_result(tape))
 
 
 def _expand(tape: Structure) -> Iterator[str]:
-    """Yield the function that computes the terms of all slots, order by order."""
+    """Yield the C function that computes the Taylor terms of all slots, order by order."""
     terms, pairs = recurrences(tape)
     terms = [_in_lanes(each) for each in terms]
     first, later = rates_of_term(tape)
@@ -214,5 +214,5 @@ def _set_noise(tape: Structure) -> Iterator[str]:
 
 
 def _of_registers(text: str) -> str:
-    """Return a definition for registers, with `zero` added in case it has only numbers."""
+    """Return a C definition for registers; the added `zero` converts a plain number."""
     return _in_lanes(text).replace("= ", "= zero + ", 1)

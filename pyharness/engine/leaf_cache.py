@@ -32,7 +32,7 @@ _NATIVE = "-march=native"
 
 
 class LeavesError(Exception):
-    """The reason why leaves can't be compiled or loaded, in one line."""
+    """The reason why C code (leaves) can't be compiled or loaded, in one line."""
 
 
 # RuntimeError: no home folder is known.
@@ -40,13 +40,13 @@ _FAILURES = (LeavesError, RuntimeError)
 
 
 def folder() -> Path:
-    """Return the folder of compiled leaves, which may be missing."""
+    """Return the folder of compiled code (leaves), which may be missing."""
     home = Path(os.environ.get("XDG_CACHE_HOME", ""))
     return (home if home.is_absolute() else Path("~/.cache").expanduser()) / "pyharness" / "leaves"
 
 
 def size() -> int:
-    """Return the size of the folder in bytes."""
+    """Return the size (bytes) of all files of compiled code."""
     return sum(info.st_size for _, info in _files())
 
 
@@ -59,7 +59,7 @@ def about_leaves() -> dict[str, str | int]:
 
 
 def leaves_for(scene: Scene, compiled: bool) -> tuple[int, str]:
-    """Return the address of the compiled leaves, 0 without any, and the text of `Solver.leaves`."""
+    """Return the address of compiled code, 0 without any, and the text of `Solver.leaves`."""
     tape = system_of(with_constant_body(scene))
     address, found = leaves_of(tape) if compiled else (0, "interpreter")
     if not address and has_ready_leaves(tape):
@@ -68,9 +68,9 @@ def leaves_for(scene: Scene, compiled: bool) -> tuple[int, str]:
 
 
 def leaves_of(tape: Tape) -> tuple[int, str]:
-    """Return the address of a tape's compiled leaves and ``compiled``, or 0 and the reason.
+    """Return the address of a tape's compiled code and ``compiled``, or 0 and the reason.
 
-    The leaves are compiled unless the folder has them.
+    The code is compiled unless the folder has it.
     """
     shape = structure(listing(tape))
     if shape is None:
@@ -91,7 +91,7 @@ def leaves_of_many(packed: Array, leaves: str) -> str:
 
 @cache  # kernels may use a loaded library as long as the process lives
 def loaded(tape: Structure, place: str) -> int:
-    """Return the address of a tape's leaves, a structure of tape.h; raise LeavesError."""
+    """Return the address of a tape's functions (see tape.h), or raise LeavesError."""
     try:
         text = whole_source(tape)
         library = CDLL(str(_found(Path(place), _key(text)) or compiled_file(Path(place), text)))
@@ -146,7 +146,7 @@ def _files() -> Iterator[tuple[Path, os.stat_result]]:
 
 
 def _found(place: Path, key: str) -> Path | None:
-    """Return the file of the leaves with this key; None if none may be loaded."""
+    """Return the compiled file with this key; None if none may be loaded."""
     try:
         info = place.lstat()
     except OSError:
@@ -164,7 +164,7 @@ def _found(place: Path, key: str) -> Path | None:
 
 
 def compiled_file(place: Path, text: str) -> Path:
-    """Compile leaves, and return their file, which enters the folder only when complete."""
+    """Compile C code, and return the file, which enters the folder only when complete."""
     from tempfile import TemporaryDirectory
 
     place.mkdir(mode=0o700, parents=True, exist_ok=True)

@@ -46,18 +46,18 @@ def rule_of(operation: Listed) -> Operation:
 
 
 def letters(operation: Listed) -> dict[str, int]:
-    """Return the slots by their letters in recurrences.py."""
+    """Return an operation's slots by their letters in recurrences.py."""
     _, x, y, out = operation
     return {"x": x, "y": y, "o": out, "p": out + 1, "q": out + 2}
 
 
 def place(slot: int, k: str) -> str:
-    """Return term k of a slot, as C."""
+    """Return C code for term k of a slot's series."""
     return f"A({slot}, {k})"
 
 
 def with_slots(text: str, operation: Listed) -> str:
-    """Return C with slots in place of letters."""
+    """Return C code with an operation's slots in place of letters."""
     slots = letters(operation)
 
     def name(match: re.Match[str]) -> str:
@@ -76,13 +76,13 @@ def combined(tape: Structure, number: int, name: str, *, is_value: bool) -> str:
 
 
 def numbered_terms(tape: Structure, number: int) -> Iterator[tuple[int, int]]:
-    """Yield coefficient numbers and slots of a combination."""
+    """Yield coefficient numbers and slots of a linear combination."""
     begin = sum(map(len, tape.combinations[: number - 1]))
     yield from enumerate(tape.combinations[number - 1], begin)
 
 
 def rates_of(tape: Structure) -> range:
-    """Return the numbers of the rates."""
+    """Return the numbers of the combinations that are rates of unknowns."""
     return range(len(tape.combinations) - tape.n_unknowns + 1, len(tape.combinations) + 1)
 
 
@@ -92,5 +92,5 @@ def unknowns_of(tape: Structure) -> range:
 
 
 def slots_read(lines: list[str]) -> list[int]:
-    """Return the slots whose term 0 is read."""
+    """Return the slots whose term 0 is read in lines of C code."""
     return sorted({int(each) for each in re.findall(r"\bz(\d+)", " ".join(lines))})

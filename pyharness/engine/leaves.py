@@ -62,7 +62,7 @@ static void put(double *to, int nodes, double h, abreast a, abreast b, abreast c
 def source(tape: Structure, suffix: str = "") -> str:
     """Return the C source of the functions of tape.h for a single body.
 
-    With a suffix, added to their names, they are static.
+    With a suffix, added to their names, the functions are static.
     """
     parts = chain(_expand(tape), _set_jacobian(tape), _set_values(tape), _set_noise(tape))
     text = "\n".join([HEADER, *parts]) + "\n"
@@ -78,7 +78,7 @@ def names(tape: Structure, suffix: str = "") -> list[str]:
 
 
 def recurrences(tape: Structure) -> tuple[list[str], list[tuple[int, int]]]:
-    """Return the statements that compute term k of all results, and the pairs of their sums."""
+    """Return C statements for term k of all results, and the slots of the products they sum."""
     pairs: dict[tuple[int, int], int] = {}
     terms = []
     for operation in tape.operations:
@@ -99,13 +99,13 @@ def recurrences(tape: Structure) -> tuple[list[str], list[tuple[int, int]]]:
 
 
 def rates_of_term(tape: Structure) -> tuple[list[str], list[str]]:
-    """Return the rates of the unknowns: term 0, and term k, as C."""
+    """Return C code for the unknowns' rates: term 0, and term k."""
     first = [combined(tape, number, "z", is_value=True) for number in rates_of(tape)]
     return first, [combined(tape, number, "t", is_value=False) for number in rates_of(tape)]
 
 
 def _expand(tape: Structure) -> Iterator[str]:
-    """Yield the function that computes the terms of all slots, order by order."""
+    """Yield the C function that computes the Taylor terms of all slots, order by order."""
     terms, pairs = recurrences(tape)
     groups = [pairs[i : i + _ABREAST] for i in range(0, len(pairs), _ABREAST)]
     for g, group in enumerate(groups):
@@ -150,7 +150,7 @@ def _vector(names: list[str]) -> str:
 
 
 def _kept(unknowns: range, k: str) -> Iterator[str]:
-    """Yield the statements that store term k, one by one and in groups."""
+    """Yield C statements that store term k of the unknowns, one by one and in groups."""
     yield from (f"  {place(slot, k)} = t{slot};" for slot in unknowns)
     for begin in unknowns[::_ABREAST]:
         at = (begin - FIRST_UNKNOWN) * Storage.PERTURBATION_LENGTH
@@ -174,7 +174,7 @@ def _set_jacobian(tape: Structure) -> Iterator[str]:
 
 
 def first_values(tape: Structure) -> list[str]:
-    """Return definitions of term 0 of all results; none if the interpreter computes one of them."""
+    """Return C definitions of term 0 of all results; none if the interpreter computes one."""
     lines = []
     for operation in tape.operations:
         if operation[0] == Operations.LINEAR:
@@ -199,7 +199,7 @@ def _set_values(tape: Structure) -> Iterator[str]:
 
 
 def kept_values(lines: list[str], rates: list[str], number: str) -> Iterator[str]:
-    """Yield statements that store term 0 of results, of a C type, and define what `rates` read."""
+    """Yield C statements that store term 0 of results, and define the values that `rates` read."""
     results = [int(each[1 : each.index(" ")]) for each in lines]
     for slot in slots_read([each.partition("=")[2] for each in lines] + rates):
         if slot not in results:
@@ -210,7 +210,7 @@ def kept_values(lines: list[str], rates: list[str], number: str) -> Iterator[str
 
 
 def _roundings(tape: Structure) -> tuple[list[str], list[str]]:
-    """Return definitions of the errors of results, and errors of rates, in rounding errors of 1.
+    """Return C definitions of errors of results, and errors of rates, in rounding errors of 1.
 
     This is the running error analysis of fortran/modern/tape_noise.h.
     """
@@ -260,9 +260,9 @@ def _set_noise(tape: Structure) -> Iterator[str]:
 
 
 def noises(tape: Structure, number: str, written: Callable[[str], str]) -> Iterator[str]:
-    """Yield the statements that bound the rounding errors of the rates, for a C type.
+    """Yield C statements that bound the rounding errors of the rates, for the C type `number`.
 
-    `written` translates a definition, such as "e9 = 2.0".
+    `written` translates a definition, such as "e9 = 2.0", to this type.
     """
     lines, rates = _roundings(tape)
     for slot in slots_read(lines + rates):
@@ -272,9 +272,9 @@ def noises(tape: Structure, number: str, written: Callable[[str], str]) -> Itera
 
 
 def derivatives(tape: Structure, count: int) -> tuple[list[str], list[dict[int, str]]]:
-    """Return definitions of values and slopes, and the derivatives of each rate by unknown.
+    """Return C definitions of values and slopes, and the derivatives of each rate by unknown.
 
-    The values are at the part u of a step, from `count` terms of the series.
+    The values are at the fraction u of a step, from `count` terms of the series.
     """
     # By slot: the names of its derivatives, by unknown.
     by = {slot: {slot: "one"} for slot in unknowns_of(tape)}
@@ -300,7 +300,7 @@ def derivatives(tape: Structure, count: int) -> tuple[list[str], list[dict[int, 
 
 
 def _summed(slot: int, count: int) -> str:
-    """Return the definition of a value; even and odd terms are summed side by side."""
+    """Return the C definition of a slot's value; even and odd terms are summed side by side."""
     sums = ["", ""]
     for k in reversed(range(count)):
         later = sums[k % 2]

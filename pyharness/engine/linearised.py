@@ -1,4 +1,4 @@
-"""Linearisation of Euler's equations (13-15 of the thesis) along a solution."""
+"""Linearisation of Euler's equations (13-15 in Jacobs 1982) along a solution."""
 
 import numpy as np
 

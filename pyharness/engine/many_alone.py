@@ -56,7 +56,7 @@ NO_ATTITUDE = "the torque needs the initial attitude; give attitude, or scenes w
 
 
 def is_solved_alone(scene: Scene, arrays: Mapping[str, object]) -> bool:
-    """Return whether the vector kernel refuses the scene.
+    """Return whether the kernel for bodies side by side refuses the scene.
 
     Raise InputError if its torque depends on the state, and `arrays` has torques too.
     """
@@ -275,9 +275,9 @@ def solve_with_states(
     scene: Scene, t_end: Any, times: Array | None, arrays: dict[str, Any], states: object, *,
     refused: Mapping[str, object], estimates: bool, threads: int, **settings: Any,
 ) -> Ensemble:  # fmt: skip
-    """Return the final states of bodies with own states, at `t_end` or at common `times` (s).
+    """Return the states of bodies with unknowns of the user's own, at `t_end` or `times` (s).
 
-    Each body has one integration for all times. `refused` are arguments that must be None.
+    Each body has one integration for all `times`. `refused` are arguments that must be None.
     """
     for name, value in refused.items():
         if value is not None:
@@ -311,7 +311,6 @@ def solve_with_states(
     )
 
     def solve_body(i: int) -> None:
-        """Solve body `i`; a body with invalid numbers remains REFUSED."""
         try:
             initial = tuple(
                 each._replace(start=float(row_of(starts[each.name], i))) for each in scene.states

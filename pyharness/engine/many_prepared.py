@@ -63,7 +63,7 @@ def many_starts(
 
 
 def times_within(scene: Scene, times: Array) -> Array:
-    """Return times (s); those beyond a zero of a moment become NaN, which kernels refuse."""
+    """Return times (s), with NaN, which kernels refuse, beyond a zero of a changing moment."""
     if scene.changing is None:
         return times
     first, last = scene.changing.span

@@ -51,9 +51,9 @@ _SHAPES: dict[str, tuple[int, ...]] = {
 def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Array, Array | None]:
     """Return the arrays of bodies with inertia matrices about principal axes, and these axes.
 
-    The arrays have A, B, C, because rounded moments would be less accurate. They are NaN for a
-    matrix that is not symmetric and positive definite. The axes are columns of matrices,
-    (n, 3, 3), and, if there are attitudes, also quaternions, (n, 4).
+    The arrays have Euler's coefficients A, B, C, because rounded moments would be less accurate;
+    they are NaN for a matrix that is not symmetric and positive definite. The axes are columns of
+    matrices, (n, 3, 3), and, if there are attitudes, also quaternions, (n, 4).
     """
     rows = checked_rows({name: given[name] for name in given if name not in BODIES})
     own = {"inertia": rows_of("inertia", given["inertia"], 3, 3)}
@@ -143,7 +143,7 @@ def keep_with(scene: Scene, key: tuple[Any, ...], make: Callable[[], Any]) -> An
 
 
 def rows_of_scene(scene: Scene) -> dict[str, Any]:
-    """Return the cached `checked_rows` of a scene with its `merged` torque; callers only read them.
+    """Return the cached arrays of a scene, and its torque with `merged` waves, to be read only.
 
     Converting again for few bodies would take longer than solving them.
     """
@@ -157,7 +157,7 @@ def rows_of_scene(scene: Scene) -> dict[str, Any]:
 
 
 def checked_rows(given: Mapping[str, Any]) -> dict[str, Array]:
-    """Return float arrays with one row per body, or one for all; raise InputError otherwise."""
+    """Return float arrays, one row per body or for all; raise InputError for wrong shapes."""
     rows = {}
     for name in (*_SHAPES, *(each for each in given if each.startswith(PARAMETER))):
         values = given.get(name)
@@ -280,7 +280,7 @@ def solve_bodies(
     found = place_for(out, n, attitude is not None, with_estimates)
     if found.estimates is not None:
         found.estimates[:] = _UNKNOWN
-    # The kernel may write a result before it reads the start again.
+    # As in `many_starts`.
     if np.may_share_memory(omega, found.omega):
         omega = omega.copy()
     if attitude is not None and np.may_share_memory(attitude, found.attitude):

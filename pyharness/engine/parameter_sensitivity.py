@@ -105,8 +105,8 @@ def sensitivities_at(
     """Return the derivatives with respect to each parameter, (n, k, m) for k unknowns, m values.
 
     `states` returns the unknowns of a changed scene at the n times of `found`. The tolerance is
-    relative to the largest derivative, so far, with respect to the same value. Raise InputError if
-    the work limit is exceeded, or a derivative overflows.
+    relative to the largest derivative with respect to the same value up to that time. Raise
+    InputError if the work limit is exceeded, or a derivative overflows.
     """
     if not names:
         return {}

@@ -143,7 +143,7 @@ def tape_of_bodies(
 
 
 def initial_state(scene: Scene, equations: VariedEquations) -> tuple[Array, Array]:
-    """Return the state at time 0, (n,), and its derivatives with respect to m values, (n, m)."""
+    """Return the state at time 0, (n,), and its derivatives by m parameter values, (n, m)."""
     n, m = equations.forcings.shape
     start = scene.attitude or IDENTITY
     state = np.array([*scene.omega, *start])[:n]
@@ -164,7 +164,7 @@ def _equations(
     values: tuple[tuple[str, tuple[float, ...]], ...],
     attitude: bool,
 ) -> VariedEquations:
-    """Return the equations; `values` are names and values, in the order of columns."""
+    """Return equations of motion and derivatives by `values`, parameters in order of columns."""
     # The initial omega and attitude have three columns each, but no values here.
     n = 7 if attitude else 3
     flat = [each for _, listed in values for each in listed]

@@ -39,8 +39,8 @@ def _is_of_omega(g: EventFunction) -> bool:
 def repeated(times: Array, period: float, end: float, where: str) -> tuple[Array, int]:
     """Return the times (s) of events until `end`, and how many are not repetitions.
 
-    `times` (s) are the events of the first PERIODS periods. Raise InputError, which begins with
-    `where`, for more than 5 000 000 events.
+    `times` (s) are the events of the first three periods. Raise InputError, with `where` in its
+    message, for more than 5 000 000 events.
     """
     # An event at the end of a period may be found on either side of it.
     margin = _MARGIN * period

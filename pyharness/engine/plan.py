@@ -23,7 +23,7 @@ _FEW_DIGITS = 1e-9
 
 
 class Decision(NamedTuple):
-    """The decision whether a part, such as ``torque``, is computed, and the reason."""
+    """The decision whether a part of the solution, such as ``torque``, is computed, and why."""
 
     part: str
     kept: bool

@@ -67,8 +67,8 @@ def outputs_at(tape: Tape, times: Array, state: Array) -> Array:
 def system_of(scene: Scene, attitude: bool | None = None) -> Tape:
     """Return the equations of motion of a scene with principal axes as a tape.
 
-    The outputs are the time derivatives of omega (equations 16-18 of the thesis), of the quaternion
-    (q' = q (0, omega)/2), and of own states (unknowns that `Scene.states` adds). The quaternion is
+    The outputs are the time derivatives of omega (equations 16-18 of Jacobs 1982), the quaternion
+    (q' = q (0, omega)/2), and own states (unknowns that `Scene.states` adds). The quaternion is
     missing if `attitude` is false; by default, if the scene has none. The inputs are the time and
     these unknowns. Raise InputError for an opaque torque.
     """
@@ -237,7 +237,7 @@ def kernel_tape(tape: Tape, n_unknowns: int | None = None) -> Array:
 
 
 def number_of_leaves(packed: Array) -> int:
-    """Return the address or number of the leaves of a packed tape."""
+    """Return the address or number of the compiled code (leaves) of a packed tape."""
     at = Places.WAVES + _LEAVES
     return int(packed[at : at + 1].view(np.int64)[0])
 
@@ -250,7 +250,7 @@ def _in_pairs(integers: Sequence[int] | NDArray[np.int64]) -> Array:
 
 
 def has_ready_leaves(tape: Tape) -> bool:
-    """Return whether leaves for the tape were built with the package, as for ready torques."""
+    """Return whether code for the tape was built with the package, as for ready torques."""
     return bool(kernel_tape(tape)[_LEAVES] != 0.0)
 
 

@@ -194,13 +194,11 @@ REGISTRY = {
         ),
     )
 }
-# The methods that return rows at requested times.
 METHODS = {name: method for name, method in REGISTRY.items() if method.gives_rows}
 FIXED_STEP = tuple(name for name, method in REGISTRY.items() if method.is_fixed_step)
 GAUSS = tuple(name for name in REGISTRY if name.startswith("gauss-"))
 # Methods with a prepared solver for torques that depend on the state; they integrate own states.
 PREPARED_FOR_STATE = ("auto", "taylor")
-# SciPy's name of each of its methods, by the name in this registry.
 SCIPY_METHODS = {name: method.scipy for name, method in REGISTRY.items() if method.scipy}
 
 

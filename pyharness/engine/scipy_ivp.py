@@ -1,4 +1,4 @@
-"""The methods of `scipy.integrate.solve_ivp`; SciPy is imported when one of them is first used.
+"""The methods of `scipy.integrate.solve_ivp`.
 
 SciPy controls the local error of a step. Our tolerance limits the error at the requested times,
 which grows in proportion to the phase. The local tolerance therefore follows from the largest
@@ -67,7 +67,7 @@ class _Ahead(NamedTuple):
 def steps_sum(name: str, radians: float, growth: float, turned: float = 0.0) -> float:
     """Return a bound on the ratio of the error at the end to the local error.
 
-    The arguments are as in `_Ahead`.
+    `radians` is the phase, `growth` the error amplification, `turned` the body's rotation (rad).
     """
     found = _SUM[name] + _SUM_A_RADIAN[name] * radians * min(growth, _SENSITIVE)
     return found + _SUM_A_TURN[name] * turned * min(growth, _SENSITIVE)

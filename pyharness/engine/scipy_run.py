@@ -219,7 +219,7 @@ def bounds_of(scene: Scene, end: float) -> list[float]:
 
 
 def series_beside(scene: Scene, times: Sequence[float], tolerance: float) -> Beside | None:
-    """Return the series of a recorded torque at `times` (s); None if it does not reach the end."""
+    """Return the results of Taylor series at `times` (s); None if they do not reach the last."""
     end, bounds = times[-1], bounds_of(scene, times[-1])
     attitude = scene.attitude is not None
     rows = [[*scene.omega, *(scene.attitude or ())]] if times[0] == 0.0 else []

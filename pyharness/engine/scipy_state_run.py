@@ -1,4 +1,4 @@
-"""One integration by SciPy of a torque of the state."""
+"""One integration by SciPy under a torque that depends on the state."""
 
 import itertools
 import math
@@ -22,8 +22,7 @@ from pyharness.model.trajectory import Array
 # integrations pass a short pulse or sample a wave alike.
 _FEWEST_STEPS, _MORE_STEPS = 32, 7
 _COARSE = 1e-3
-# The preliminary integration of a body at rest is repeated if its largest omega times this factor
-# is less than expected.
+# As in scipy_ivp.py.
 _FAR = 4.0
 _MOST_GUESSES = 200
 # Largest number of successive steps that do not change the time; without it LSODA might not return.
@@ -48,7 +47,7 @@ class StateRows(NamedTuple):
 
 
 class StateRun(Run):
-    """An integration, which may be repeated."""
+    """A repeatable integration under a torque that depends on the state."""
 
     def __init__(self, scene: Scene, end: float, name: str, effort: float, most: float) -> None:
         torque = scene.torque
@@ -122,7 +121,7 @@ class StateRun(Run):
             raise InputError(f"[torque]: {HAS_MEMORY}")
 
     def work_error(self, time: float) -> TimedError:
-        """Return the error beyond the work limit."""
+        """Return the exception for an exceeded work limit."""
         if self._jumps():
             return TimedError(
                 f"{self.label}: the torque jumps back and forth at t = {{time}} s; write a smooth "
@@ -238,7 +237,7 @@ class StateRun(Run):
         return np.empty((0, len(self.start)))
 
     def steps(self, scene: Scene) -> DenseOutput | None:
-        """Return the steps of the last integration; None if there are none, or above 20 000."""
+        """Return the last integration's steps as dense output; None for 0 or over 20 000 steps."""
         edges, values = [0.0], []
         for sol in self._solutions:
             for (first, last), step in zip(

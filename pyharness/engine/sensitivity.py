@@ -43,7 +43,7 @@ def is_sensitive(growth: float | None, tolerance: float, noise: float = 0.0) -> 
 def torque_noise(
     scene: Scene, omega0: Triple, t_end: float, steps: float = math.inf, scale: float | None = None
 ) -> float:
-    """Return the rounding error of torque terms that nearly cancel, divided by that of omega.
+    """Return the rounding error of torque terms that nearly cancel, divided by omega's.
 
     The result is the sum of the omegas that the terms cause alone until `t_end` (s), with rounding
     in each of `steps` steps, over `scale` (rad/s). By default, `scale` is the larger of the initial

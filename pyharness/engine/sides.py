@@ -13,7 +13,7 @@ _WORST_FIRST = ("singular", "sliding", "overflow", "unchecked", "sensitive", "co
 
 
 def row_names(found: Trajectory) -> tuple[str, ...]:
-    """Return the names of the arrays with a row for each time."""
+    """Return the names of a trajectory's arrays with a row for each time."""
     more = ("attitude", "own")
     return *_ROWS, *(name for name in more if getattr(found, name) is not None)
 

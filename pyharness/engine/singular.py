@@ -38,7 +38,7 @@ def undefined_operation(
     """Return a text: the operation undefined at the end of an integration, and a replacement.
 
     `begin`, `before` and `end` are the tape's inputs at the beginning of the integration, of its
-    last step, and at its end. The result is None if instead omega or a quotient becomes infinite.
+    last step, and at its end. Return None if instead omega or a quotient becomes infinite.
     """
     first, last = (max(abs(inputs[slot]) for slot in OMEGA) for inputs in (begin, end))
     if last > _UNBOUNDED * (first or 1.0):

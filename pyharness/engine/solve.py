@@ -208,7 +208,6 @@ class _Call(NamedTuple):
         given, scene, method, tolerance = self.given, self.scene, self.method, self.tolerance
         chosen = METHODS[method]
         below = [t for t in values if t < 0.0]
-        # Methods take times on one side of 0, in order away from 0.
         sides = (below[::-1], values[len(below) :])
         needs_steps = self.dense_output or self.functions is not None
         more = (True,) if chosen.gives_steps and needs_steps else ()

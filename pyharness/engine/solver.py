@@ -233,7 +233,7 @@ class Solver(BoundKernel[Result]):
 
     @property
     def steps(self) -> int:
-        """Return the steps of the last call; for Gauss collocation, its right-hand sides."""
+        """Return the number of steps, for Gauss collocation right-hand sides, of the last call."""
         return 0 if self._ending is None else abs(self._ending[1])
 
     def _judge(self) -> tuple[str, float | None, float | None]:
@@ -317,7 +317,8 @@ def prepare(
     InputError
         If the method is unknown, or can't solve the scene or its attitude; if the torque needs the
         attitude, and `attitude` is false; or if the tolerance or effort is out of range. A call
-        raises it if a changing moment reaches 0; if that is a function, the status is `overflow`.
+        raises it if a changing moment reaches 0; for a moment given by a function, the status is
+        `overflow` instead.
     NotBuiltError
         If the extension is not built.
 

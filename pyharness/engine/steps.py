@@ -21,10 +21,9 @@ MOST_STEPS = 20_000  # that `sol` has; it limits the memory
 
 
 def rates(scene: Scene, times: Array, state: Array) -> Array:
-    """Return the time derivatives of n states, shape (n, m): omega, quaternion, own states.
+    """Return the time derivatives of n states, shape (n, m); not finite at a singular torque.
 
-    Own states are unknowns that `Scene.states` adds. A derivative is not finite where the torque is
-    singular.
+    A state is omega, the quaternion, and the unknowns that `Scene.states` adds.
     """
     bare, axes = principal(scene)
     bare = with_constant_body(bare)
@@ -63,7 +62,7 @@ def steps_output(scene: Scene, pieces: Pieces) -> DenseOutput:
 def transformed_steps(
     sol: DenseOutput | None, states: Callable[[Array], Array], factor: float = 1.0
 ) -> DenseOutput | None:
-    """Return steps in a unit of time that is `factor` times shorter, and with transformed states.
+    """Return `sol` in a unit of time that is `factor` times shorter, and with transformed states.
 
     `states` transforms rows of the state, for example to other axes.
     """
@@ -77,7 +76,7 @@ def transformed_steps(
 
 
 def joined_steps(before: DenseOutput | None, after: DenseOutput | None) -> DenseOutput | None:
-    """Return the steps before and after time 0; None if one is missing."""
+    """Return one dense output from those before and after time 0; None if one is missing."""
     if before is None or after is None:
         return None
     parts = before.states, after.states

@@ -21,7 +21,7 @@ _NUMBER = re.compile(r"\[switch (\d+)\]")
 
 
 def reason_of(ended: str, time: float, number: int) -> str | None:
-    """Return the reason if a switch caused an ending; `number` is the switch, from 1, or 0."""
+    """Return the reason if a switch caused an ending; `number` counts switches from 1, or is 0."""
     if ended != "sliding" and not (ended == "sensitive" and number):
         return None
     message = str(TimedError(SLIDING if ended == "sliding" else _TOUCHED, time))

@@ -58,7 +58,8 @@ class Taylor(OdeSolver):  # type: ignore[misc]
         shorter steps separate them.
     rtol, atol : float or array_like, shape (n,), optional
         The local error of component k of y is below ``atol[k] + rtol[k] * abs(y[k])``. If `atol` is
-        0, the error of a zero component is relative to the largest. Defaults are 1e-3 and 1e-6.
+        0, the error of a zero component is relative to the largest component. Defaults are 1e-3 and
+        1e-6.
     vectorized : bool, optional
         Ignored.
     first_step : float, optional
@@ -164,7 +165,7 @@ class Taylor(OdeSolver):  # type: ignore[misc]
         end = self.t + step.h
         is_cut = end == self.t + self.direction * longest
         self._terms = step.terms
-        # The length of a shortened step is no guess for the next one.
+        # As in `Stepper.step`.
         self._trial = max(self._trial, abs(step.h)) if is_cut else abs(step.h)
         self._longest = max(self._longest, _MOST_GROWTH * abs(step.h))
         self.t = self.t_bound if is_cut and longest == rest else end

@@ -1,6 +1,6 @@
 """Checks of the arguments of torque terms, and the form of terms in scene files.
 
-Each InputError begins with `where`.
+The message of each InputError begins with `where`.
 """
 
 from dataclasses import replace
@@ -17,7 +17,7 @@ from pyharness.model.values import converted, finite, number_list, three
 
 
 def ready_term(kind: str, function: Function, **arguments: Any) -> StateTorque:
-    """Return the ready term that records `function`, with its kind and checked arguments."""
+    """Return the torque that `function` computes, with its kind and checked arguments."""
     pairs = ((key, _file_value(value)) for key, value in arguments.items())
     return replace(replayed(function), terms=((("kind", kind), *pairs),))
 

@@ -117,8 +117,8 @@ def rate_control(gain: MatrixLike, target: Numbers = (0.0, 0.0, 0.0)) -> StateTo
     """Return the torque -K (omega - target), which controls the angular velocity.
 
     Alone, with a positive definite K and the target 0, it drives any omega to 0. A target along a
-    principal axis attracts nearby omegas if K is large enough: for K = k and the middle axis, k >
-    |target| sqrt((I3 - I2) (I2 - I1)), with the moments I1 < I2 < I3.
+    principal axis attracts nearby omegas if K is large enough: for a number K and the middle axis,
+    K > |target| sqrt((I3 - I2) (I2 - I1)), with the moments I1 < I2 < I3.
 
     Parameters
     ----------

@@ -36,7 +36,9 @@ def split_command(command: str, option: str = "--port") -> list[str]:
     try:
         words = shlex.split(command)
     except ValueError as error:
-        raise InputError(f"{option} {command}: {error}; allowed: a command, as for a shell") from None
+        raise InputError(
+            f"{option} {command}: {error}; allowed: a command, as for a shell"
+        ) from None
     if not words or not words[0] or "\0" in command:
         example = _EXAMPLES[option]
         raise InputError(f"{option}: no command is given; give one, as in {option} '{example}'")

@@ -70,7 +70,7 @@ class Coordinates(NamedTuple):
         return min(found)[1] if found else None
 
     def point(self, omega: Triple) -> Array:
-        """Return the point with this omega (rad/s) at psi = 0 and t = 0."""
+        """Return the point (p1, p2, p3, t) with this omega (rad/s) at psi = 0 and t = 0."""
         b, c, a = (omega[axis] for axis in self.axes)
         y = self.on_c * c
         return np.array([self.on_b * b, y, a * a - self.bend * y * y, 0.0])

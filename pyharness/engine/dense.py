@@ -60,7 +60,7 @@ class _Open:
     def is_rough(
         self, tail: float, times: Array, values: Array, sizes: Array, rough: float
     ) -> bool:
-        """Return whether errors of the method, up to `rough`, keep the last coefficients large."""
+        """Return whether a method's errors, up to `rough`, keep the last coefficients large."""
         if self.whole is None or not self.tail / _DIVIDED < tail <= rough:
             return False
         # A fast wave between few nodes has small tails too, but differs from the longer polynomial.
@@ -68,7 +68,7 @@ class _Open:
         return bool(apart.max() <= rough)
 
 
-# A function that returns the trajectory at given times to a given tolerance.
+# Returns the trajectory at given times to a given tolerance.
 Rows = Callable[[Array, float], Trajectory]
 
 

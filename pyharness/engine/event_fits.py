@@ -59,7 +59,7 @@ class Solution:
 
     @cached_property
     def at_nodes(self) -> tuple[Array, Array]:
-        """The times (s) of the nodes of each polynomial, and the states."""
+        """The times (s) of each polynomial's nodes, and the states there."""
         times = nodes(self.pieces.edges[:-1], self.pieces.edges[1:], POINTS)
         return times, self.sol.normalized(_REFINED @ self.pieces.values)
 
@@ -122,7 +122,7 @@ class Solution:
 
     @cached_property
     def _sizes(self) -> Array:
-        """For each polynomial, the sizes (by `sizes_of`) of the unknowns from time 0 to its end."""
+        """The sizes of the unknowns, for relative errors, from time 0 to each polynomial's end."""
         # The nodes come first, because many short columns are slow.
         largest = np.abs(self.pieces.values.swapaxes(0, 1), order="C").max(axis=0)
         count = np.searchsorted(self.pieces.edges[:-1], 0.0)
@@ -132,7 +132,7 @@ class Solution:
 
 
 def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
-    """Return polynomials through a function's values, and sign changes where none converges."""
+    """Return polynomials through a function's values; sign changes where they do not converge."""
     edges = solution.pieces.edges
     low, high = edges[:-1], edges[1:]
     times, inner = solution.at_nodes
@@ -267,7 +267,7 @@ class ZeroIntervals:
 
 
 def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroIntervals | None:
-    """Return the zero intervals of a function, if any."""
+    """Return the intervals in which a function is 0 to within its error, if any."""
     sizes = fits.sizes
     if not sizes.size:
         return None

@@ -32,7 +32,7 @@ FIT_ERROR = 4e-13
 
 
 def _transforms() -> tuple[Array, Array, Array]:
-    """Return matrices from coefficients to those of the derivative, and of both halves."""
+    """Return matrices from Chebyshev coefficients to those of derivative and half intervals."""
     slope = np.zeros((NODES, NODES))
     slope[:-1] = chebyshev.chebder(np.eye(NODES))
     left = TO_COEFFICIENTS @ chebyshev.chebvander(0.5 * (POINTS - 1.0), NODES - 1)

@@ -51,7 +51,7 @@ def size() -> int:
 
 
 def about_leaves() -> dict[str, str | int]:
-    """Return the folder of compiled leaves, its size in bytes, and the compiler or an error."""
+    """Return the folder of compiled code, its size in bytes, and the compiler or an error."""
     try:
         return {"folder": str(folder()), "bytes": size(), "compiler": " ".join(compiler())}
     except _FAILURES as error:

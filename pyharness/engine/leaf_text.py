@@ -35,7 +35,7 @@ def structure(tape: "Listing") -> Structure | None:
 
 
 def key(tape: Structure) -> int:
-    """Return a 63-bit integer that identifies a structure."""
+    """Return a 63-bit integer that identifies a tape's structure."""
     return int.from_bytes(sha256(repr(tuple(tape)).encode()).digest()[:8]) >> 1
 
 

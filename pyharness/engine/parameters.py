@@ -164,7 +164,7 @@ def _equations(
     values: tuple[tuple[str, tuple[float, ...]], ...],
     attitude: bool,
 ) -> VariedEquations:
-    """Return equations of motion and derivatives by `values`, parameters in order of columns."""
+    """Return equations of motion and derivatives; `values` are names and values, by column."""
     # The initial omega and attitude have three columns each, but no values here.
     n = 7 if attitude else 3
     flat = [each for _, listed in values for each in listed]

@@ -178,7 +178,7 @@ def plan_report(scene: Scene, plan: "Plan") -> Report:
 
 
 def trajectory_bound(scene: Scene, found: Trajectory, effort: float = 1.0) -> "ErrorBound | None":
-    """Return a bound on the error of a trajectory by `reference`, proved or estimated.
+    """Return a proved or estimated bound on the error of a trajectory by the method `reference`.
 
     It is None if not finite.
     """

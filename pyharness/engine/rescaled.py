@@ -72,7 +72,7 @@ def is_ordinary(omega: Triple) -> bool:
 def integrate(
     method: "Method", scene: Scene, times: list[float], tolerance: float, effort: float, *more: bool
 ) -> Trajectory:
-    """Return the trajectory on one side of 0, computed in a suitable unit of time."""
+    """Return the trajectory on one side of time 0, computed in a suitable unit of time."""
     if is_ordinary(scene.omega):
         return method.solve(scene, times, tolerance, effort, *more)
     if not method.is_fixed_step:

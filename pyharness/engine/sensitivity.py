@@ -60,7 +60,7 @@ def torque_noise(
 
 
 def growth_of_rounding(scene: Scene, growth: float | None) -> float | None:
-    """Return a closed form's amplification of rounding errors; `growth` is the motion's."""
+    """Return a closed form's amplification of rounding errors, from the motion's `growth`."""
     if growth is None or growth >= _NEGLIGIBLE_TO or isinstance(scene, PrincipalScene):
         return growth
     return 1.0

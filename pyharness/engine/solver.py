@@ -223,7 +223,7 @@ class Solver(BoundKernel[Result]):
 
     @property
     def growth(self) -> float | None:
-        """Return the error amplification of the last motion; None where `Trajectory` has None."""
+        """Return the error amplification of the last motion; None if unknown."""
         return self._judge()[2]
 
     @property

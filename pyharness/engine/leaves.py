@@ -210,7 +210,7 @@ def kept_values(lines: list[str], rates: list[str], number: str) -> Iterator[str
 
 
 def _roundings(tape: Structure) -> tuple[list[str], list[str]]:
-    """Return C definitions of errors of results, and of rates, in units of the rounding of 1.
+    """Return C definitions of errors of results, and of rates, in rounding errors of 1.
 
     This is the running error analysis of fortran/modern/tape_noise.h.
     """

@@ -193,7 +193,7 @@ class Beside(NamedTuple):
 
 
 def bounds_of(scene: Scene, end: float) -> list[float]:
-    """Return `end`, and the times (s) from 0 to it at which a table or switch of the torque changes.
+    """Return `end` and times (s) from 0 to it at which a table or switch of a torque changes.
 
     Raise InputError where a switch would change back and forth without end.
     """

@@ -24,6 +24,7 @@ from pyharness import (
     solve_many,
 )
 from pyharness.cli.main import main
+from pyharness.model.inertia_function import InertiaFunction
 from pyharness.model.scene_file import scene_text
 from pyharness.torques import gravity_gradient
 from pyharness.truth.reference import reference
@@ -160,9 +161,9 @@ def test_files_keep_functions_expressions_and_tables(
         found.save(tmp_path / "rows.npz")
         again = load(tmp_path / "rows.npz")
         assert again.scene == scene
-        assert again.scene.changing is not None
-        has_text = scene.changing.values() is not None  # type: ignore[union-attr]
-        assert (again.scene.changing.phrase == "a recorded function of t") != has_text
+        function = again.scene.changing
+        assert isinstance(function, InertiaFunction)
+        assert (function.phrase == "a recorded function of t") == (function.values() is None)
         assert (again.angular_momentum() == found.angular_momentum()).all()
         assert (solve(again.scene, 2.0).omega == solve(scene, 2.0).omega).all()
     for scene in scenes[:2]:

@@ -680,9 +680,25 @@ static inline lanes begun(lanes size, lanes term)
   return (lanes)(((bits)term & begins) | ((bits)size & ~begins));
 }
 
+/* Return the magnitudes of derivatives that were 0 so far, at the part `factor` of the step. */
+static lanes reached(const struct tape *tape, int last, double factor, const double *weights,
+                     lanes size)
+{
+  const bits begins = size == (lanes){0.0}, magnitude = ~(bits)(-(lanes){0.0});
+  lanes most = {0.0};
+  for (int i = 0; i < tape->n_unknowns; i++) {
+    const row *terms = perturbations_of(tape)[FIRST_UNKNOWN + i];
+    lanes sum = loaded(terms[last]);
+    for (int k = last - 1; k >= 0; k--) sum = factor * sum + loaded(terms[k]);
+    most = larger_lanes(most, weights[i] * (lanes)((bits)sum & magnitude));
+  }
+  return (lanes)((bits)most & begins);
+}
+
 /* Return whether the terms up to `last` suffice for the part `factor` of the step: whether the last
-   ones are small, and none is much larger than the derivative itself. */
-static int suffice(const lanes *terms, int last, double factor, lanes size, double tolerance)
+   ones are small, and none is much larger than the derivative itself, `size` or `end`. */
+static int suffice(const lanes *terms, int last, double factor, lanes size, lanes end,
+                   double tolerance)
 {
   lanes largest = {0.0}, tail = {0.0};
   double power = 1.0;
@@ -692,6 +708,8 @@ static int suffice(const lanes *terms, int last, double factor, lanes size, doub
     largest = larger_lanes(largest, term);
     if (k > last - SMALL_TERMS) tail = larger_lanes(tail, term);
   }
+  /* The first other term of a derivative that was 0 may be a rounding error. */
+  size = larger_lanes(size, end);
   return all_below(tail, tolerance * size) && all_below(largest, MOST_CANCELLED * size);
 }
 
@@ -731,7 +749,8 @@ double OF_LEVEL(vary_tape, LEVEL)(struct block *block, double h, int order, doub
     if (small == SMALL_TERMS || k == order) break;
   }
   block->last_term = k;
-  while (!suffice(sizes, k, factor, loaded(block->sizes), tolerance)) {
+  size = loaded(block->sizes);
+  while (!suffice(sizes, k, factor, size, reached(tape, k, factor, weights, size), tolerance)) {
     if (++tries > MOST_TRIES) return 0.0;
     factor *= SHORTER;
   }

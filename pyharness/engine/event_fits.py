@@ -23,6 +23,7 @@ from pyharness.engine.event_roots import (
 from pyharness.model import dense_output
 from pyharness.model.array_type import Array
 from pyharness.model.dense_output import DenseOutput, Pieces, nodes, sizes_of
+from pyharness.model.errors import InputError
 
 # Largest of the last coefficients of a polynomial that has converged, relative to its values.
 _LAST = 2e-14
@@ -141,6 +142,7 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
     first, last = values[:, 0].copy(), values[:, -1]
     # Equal signs at the common end of adjacent intervals, so that no root is lost or doubled.
     first[1:] = last[:-1]
+    most = max(_MOST_PIECES, 2 * len(edges))
     done: list[Fits] = []
     rough = [Roots.bare(np.zeros(0), 0)]
     for level in range(_MOST_DIVISIONS + 1):
@@ -158,8 +160,15 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
         is_rough = ~is_done & (
             (high - low <= 64.0 * np.spacing(np.abs(low) + np.abs(high)))
             | (level == _MOST_DIVISIONS)
-            | (len(low) > max(_MOST_PIECES, 2 * len(edges)))
         )
+        if len(low) > most:
+            # A function with many jumps need not be divided far from 0.
+            is_rough |= ~is_done & (np.abs(values).min(axis=1) > np.ptp(values, axis=1))
+            if (~is_done & ~is_rough).sum() > most // 2:
+                raise InputError(
+                    f"{g.name}: the function changes too fast for {most} polynomials; use a "
+                    "shorter time, or a smooth function"
+                )
         rough.append(_sign_changes(times[is_rough], values[is_rough], first[is_rough]))
         split = ~is_done & ~is_rough
         middle = 0.5 * low[split] + 0.5 * high[split]

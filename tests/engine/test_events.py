@@ -11,6 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pyharness import InputError, Scene, TorqueLaw, case_scene, load, solve
+from pyharness.engine import event_fits
 from pyharness.engine.event_fits import Solution
 from pyharness.engine.event_functions import event_functions
 from pyharness.events import Event, crosses, extremum, flip, rest, tilt
@@ -319,6 +320,18 @@ def test_a_torque_without_a_value_at_time_0_is_told_as_without_events() -> None:
     assert solve(inverse, 1e4, events=event).ended == "overflow"
     with pytest.raises(InputError, match="the function raised ZeroDivisionError at t = 0 s"):
         solve(replace(inverse, torque=opaque(lambda t, w: (1.0 / t, 0, 0))), 1e4, events=event)
+
+
+def test_functions_that_change_too_fast_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Many jumps are no reason for a refusal, because only those near 0 are searched."""
+    monkeypatch.setattr(event_fits, "_MOST_PIECES", 1000)
+    for fast in (lambda t, omega: np.sin(2e5 * t), lambda t, omega: np.sin(1e5 * t**4)):
+        with pytest.raises(InputError, match="event 1: the function changes too fast for 1000"):
+            solve(BODY, 2.0, events=fast)
+    smooth = times_of(BODY, 9.0, lambda t, omega: omega[1] - 0.10005)
+    stairs = times_of(BODY, 9.0, lambda t, omega: np.round(omega[1], 4) - 0.10005)
+    assert len(smooth) == 1
+    assert stairs == pytest.approx(smooth, abs=1e-9)
 
 
 def test_no_events_without_a_request() -> None:

@@ -1,6 +1,7 @@
 """Sensitivities: derivatives with respect to parameters, against solutions of 40 digits."""
 
 import decimal
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, load, solve
-from pyharness.engine.parameters import parameters_of
+from pyharness.engine.parameters import INERTIA_ELEMENTS, parameters_of
 from pyharness.engine.scene_reader import scene_of_file
 from pyharness.engine.steps import rates
 from pyharness.events import crosses
@@ -253,6 +254,24 @@ def test_a_fast_wave_without_amplitude_is_that_of_theory() -> None:
     found = slopes(ball, [0.3, 2.0], "torque.sines")
     expected = (1.0 - np.cos(1e3 * np.array([0.3, 2.0]))) / 1e3
     assert found[:, 0, 0] == pytest.approx(expected, rel=1e-10)
+
+
+@pytest.mark.parametrize("tilt", [0.0, math.pi / 6.0])
+@pytest.mark.parametrize("end", [0.1, 3.0])
+def test_derivatives_may_begin_as_rounding_errors(tilt: float, end: float) -> None:
+    """The rates of the derivatives at time 0 would be 0 without rounding."""
+    c, s = math.cos(tilt), math.sin(tilt)
+    axes = np.array([[c, -s, 0.0], [c * s, c * c, -s], [s * s, c * s, c]])
+    inertia = axes @ np.diag([2.0, 2.0, 1.0]) @ axes.T + 1e-12
+    values = [0.5 * (inertia[i, j] + inertia[j, i]) for i, j in INERTIA_ELEMENTS]
+
+    def made(changed: list[float]) -> Scene:
+        whole = np.zeros((3, 3))
+        for (i, j), value in zip(INERTIA_ELEMENTS, changed, strict=True):
+            whole[i, j] = whole[j, i] = value
+        return Scene("steady", tuple(2.0 * axes[:, 2]), inertia=whole)
+
+    check(slopes(made(values), end, "inertia"), differences(made, values, [end]), 1e-8)
 
 
 def test_drag_from_rest_is_that_of_differences() -> None:

@@ -252,7 +252,7 @@ def judge(name: Name, tried: MethodRun, truth: Truth, policy: Policy) -> Check:
     """Return the check that a method's error is within its limit, or that its refusal is permitted.
 
     Without a limit, a finite error is only reported. `closed-form` fails if it solves a scene
-    without one.
+    that has no closed form.
     """
     answer = tried.answer
     if why := answer.refusal:

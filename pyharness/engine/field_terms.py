@@ -121,10 +121,10 @@ def magnetic_dipole(moment: Numbers, field: TorqueLaw | Numbers) -> StateTorque:
 def magnetic_damping(gain: Number, field: TorqueLaw | Numbers) -> StateTorque:
     """Return the torque m x b of coils that damp the rotation in a magnetic field.
 
-    The coils have the moment m = -k b'. Here b = R^T B is the field about the body axes, and R
-    rotates from body to space. As measured in the body, b changes at the rate b' = R^T B' - omega x
-    b. In a constant field the torque -k (|b|^2 omega - (omega . b) b) damps the part of omega
-    perpendicular to the field. In a rotating field the body finally rotates with the field.
+    The coils have the moment m = -k b', where b = R^T B is the field about the body axes, R rotates
+    from body to space, and b' = R^T B' - omega x b. In a constant field the torque is
+    -k (|b|^2 omega - (omega . b) b), and damps the part of omega perpendicular to the field. In a
+    rotating field the body finally rotates with the field.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """Checks that the Fortran port of each program and its Python twin agree bit for bit.
 
-A cell is a combination of a program, a case of Table 1 of the thesis, defects and readings. Cells
-are also checked in our arithmetic of machine words, with the length and the rounding of a machine's
-numbers, such as the 48 bits of the CDC.
+A cell is a combination of a program, a case of Table 1 of the thesis, defects and readings
+(interpretations of doubtful cards). Cells are also checked in our arithmetic of other number
+formats, such as the CDC's with 48 bits.
 
 A deck, compiled from the author's cards, shares no code with port and twin. Its TAPE5, the file of
 all steps, and its printed page must equal the port's. After an overflow the port ends its run; the
@@ -42,7 +42,7 @@ _EVALUATIONS = {"two-term": 3, "four-term": 5, "runge-kutta": 4}
 
 
 def cells(chosen: Selection) -> Iterator[Attempt]:
-    """Yield a deferred check for each cell, or for a few if `chosen.thin`."""
+    """Yield a deferred check for each listing and case, or for a few if `chosen.thin`."""
     divergences = facts("divergences")["divergence"]
     listed = {entry["cell"] for entry in divergences if entry["kind"] == "cross-language"}
     for listing, case in all_cells():
@@ -54,7 +54,7 @@ def cells(chosen: Selection) -> Iterator[Attempt]:
 
 
 def of_cell(suite: str, listing: Listing, case: int) -> Name:
-    """Return the name of a cell's check; `suite` is its kind."""
+    """Return the name of a listing's check in a case; `suite` is its kind."""
     return Name(suite, listing.program, f"case-{case}", listing_name(listing))
 
 
@@ -75,7 +75,7 @@ def _agreement(
 ) -> Check:
     """Return the check that Fortran and Python agree, or differ if `is_listed` as a divergence.
 
-    `options` has the constant of the stop test (1/s), and whether it may end the run.
+    `options` has the constant of the stop test (1/s), and whether the test may end the run.
     """
     run = PROGRAM_REGISTRY[listing.program].run
     compiled, twin = (run(scene, listing, language, *options) for language in ("fortran", "python"))
@@ -103,10 +103,10 @@ _VECTORS = Basis(
 def words(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks of our arithmetic of machine words, bit for bit.
 
-    The first check compares CDC instructions with their expected results. In each cell, our
-    arithmetic with 53 bits must agree with floats, and for every other word the compiled program
-    with its Python version. If `chosen.only` is empty, only the original and corrected listings are
-    checked; against floats also those with a single defect or reading.
+    The first check compares CDC instructions with their expected results. In each case and listing,
+    our arithmetic with 53 bits must agree with floats; in other arithmetics the compiled program
+    must agree with its Python version. If `chosen.only` is empty, only the original and corrected
+    listings are checked; against floats also those with a single defect or reading.
     """
     yield Attempt(Name("words", "vectors"), _vectors)
     for listing, case in all_cells():
@@ -128,7 +128,7 @@ def _vectors(name: Name) -> Check:
 
 
 def _in_word(listing: Listing, case: int, word: str | None, name: Name) -> Check:
-    """Return the check of Python in `word` against Fortran; if `word` is None, against floats."""
+    """Return the check of Python in `word` against Fortran; if None, in binary64 against floats."""
     scene = case_scene(case)
     ours = in_word.run(scene, listing, WORDS[word or BINARY64])
     if word is None:
@@ -155,7 +155,7 @@ def listings(program: str) -> list[Listing]:
 
 
 def decks(chosen: Selection) -> Iterator[Check]:
-    """Yield checks of decks against the port; none without a Fortran compiler."""
+    """Yield checks of the author's cards, compiled, against the port; none without a compiler."""
     every = product(chain.from_iterable(map(listings, PROGRAMS)), case_numbers())
     some = [cell for cell in every if not chosen.thin or cell_name(*cell) in _THIN]
     named = [(of_cell("decks", *cell), *cell) for cell in some]

@@ -38,9 +38,9 @@ class Name:
     """The name of a check. Its id joins the parts by slashes, as in ``cells/two-term``.
 
     `suite` is a kind of checks of `verify`, or a trial of `stress`; `subject` is a program or
-    method. `circumstance` names the problem, with its `scene`, if any. `setting` is a tolerance,
-    step size or listing, `quantity` the compared number. `command` (``verify`` or ``stress``), the
-    id and `options` repeat the check.
+    method. `circumstance` names the problem; `scene` is its scene, if any. `setting` is a
+    tolerance, step size or listing, `quantity` the compared number. `command` (``verify`` or
+    ``stress``), the id and `options` repeat the check.
     """
 
     suite: str
@@ -101,11 +101,11 @@ class Check:
 
     name: Name
     passed: bool
-    value: float | None  # None without a single number
+    value: float | None  # None if there is no single number
     limit: float | None  # None if `value` is not compared
     basis: Basis | None  # why the limit has this value
     note: str = ""  # fault or observation, in a few words
-    again: str = ""  # command that repeats the check, if not the name's
+    again: str = ""  # command that repeats the check, if not `name.replay`
     # Returns the error bound of the reference solution in the unit of `value`, or None without
     # one. It is called only when the check is reported.
     reference_bound: Callable[[], ErrorBound | None] | None = field(

@@ -39,7 +39,8 @@ _DEGREE = {"two-term": 4, "four-term": 4, "runge-kutta": 16}
 # Number of roundings along the longest chain of operations in a step, without linear systems: seven
 # in each of four stages (a rate and a sum), and those of the result.
 _LONGEST = 40.0
-# A derivative is computed from neighbours of omega. This is their largest distance over omega.
+# A derivative is computed from neighbours of omega. This is their largest distance relative to
+# omega.
 _REACH = 2.0**-2
 _GROWTH_STEPS = 64
 # Bounds on the sum of the rates' absolute weights, for any collocation points. The sum is largest
@@ -87,7 +88,7 @@ def jacobian(scene: Scene, omega: Sequence[float]) -> Exact:
 
 
 def eigenvalues(scene: Scene) -> Array:
-    """Return the eigenvalues of J at the initial omega, times the step size."""
+    """Return the eigenvalues of the Jacobian at the initial omega, times the step size."""
     return np.asarray(np.linalg.eigvals(np.array(jacobian(scene, scene.omega), dtype=float)))
 
 
@@ -157,9 +158,9 @@ def complex_step(listing: Listing, step: int, z: complex) -> Probe:
 def observed_boundary(listing: Listing, direction: complex) -> Probe:
     """Return the distance of z from 0 at which perturbations begin to grow, measured and derived.
 
-    z is the step size times an eigenvalue of J. The distance is bisected along `direction`, -1 or
-    1j, in runs of a spinning top. With the defect `base-not-restored`, where a constant part of
-    omega might hide the growth, the change of omega from step to step is measured.
+    z is the step size times an eigenvalue of the Jacobian. The distance is bisected along
+    `direction`, -1 or 1j, in runs of a spinning top. With the defect `base-not-restored`, where a
+    constant part of omega might hide the growth, the change of omega from step to step is measured.
     """
     matrix = amplification(listing)
     expected, slope = boundary(matrix, direction)
@@ -196,8 +197,8 @@ def _moved(listing: Listing, step: int) -> float:
 def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
     """Return the derivative of a collocation step at an unsteady omega, measured and derived.
 
-    A step h takes omega to omega + h F + h**2/2 J F + w h**3 Q(F), where F is the right-hand side
-    and Q its quadratic part. Only the weight w depends on the collocation points.
+    A step h takes omega to omega + h F + h**2/2 J F + w h**3 Q(F), where F is the right-hand side,
+    J its Jacobian and Q its quadratic part. Only the weight w depends on the collocation points.
     """
     program, h = listing.program, scene.step_size
     moved = _moved(listing, step)

@@ -1,4 +1,4 @@
-"""Checks of every method against published results that were not computed here.
+"""Checks of every method against results published by others.
 
 The limit is the sum of the accuracy of the published number, a bound on the method's error, and the
 effect of rounding the problem's numbers to binary64.

@@ -1,4 +1,4 @@
-"""Published results that were not computed here, and the files that describe them.
+"""Results published by others, and the files that describe them.
 
 A file has a scene, the source of the results, and their printed digits, which set their accuracy.
 """

@@ -63,7 +63,7 @@ class Recorded:
     tolerance: float | None  # None if every bit is compared
 
     def run(self) -> Trajectory:
-        """Return the trajectory, newly computed."""
+        """Compute the trajectory."""
         if self.source in PROGRAMS:
             is_original = self.name.endswith("original")
             listing = (Listing.original if is_original else Listing.corrected)(self.source)
@@ -221,7 +221,7 @@ def _entry(each: Recorded, run: Trajectory) -> dict[str, Any]:
 
 
 def _rows(entry: dict[str, Any]) -> Array:
-    """Return an entry's rows: step, time, recorded TIME, omega and, for programs, velocity."""
+    """Return an entry's rows: step, time, time as printed, omega and, for programs, velocity."""
     return np.array([[float(row[0]), *map(float.fromhex, row[1:])] for row in entry["rows"]])
 
 

@@ -188,7 +188,7 @@ DERIVED = Policy(_derived, STEPS, refusable)
 
 
 def _roundings(tried: MethodRun, truth: Truth) -> float:
-    """Return the number of uncompensated roundings of omega; estimated for SciPy's."""
+    """Return the number of uncompensated roundings of omega; estimated for SciPy's methods."""
     method, answer = tried.method, tried.answer
     if tried.tolerance is None:
         return 0.0 if method in GAUSS else float(_steps(tried.scene, truth.end))

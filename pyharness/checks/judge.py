@@ -40,7 +40,7 @@ class Answer:
     steps: int = 0
     evaluations: int | None = None  # of right-hand sides, if counted
     refusal: str = ""  # why the method refused the scene, if it did
-    is_whole: bool = True  # reached the last time, with every row
+    is_whole: bool = True  # reached the last time, with all results
 
 
 def of_end(method: str, end: End) -> Answer:
@@ -110,8 +110,8 @@ class Truth:
     data : float
         Change of omega by the rounding of A, B and C, divided by the largest abs(omega).
     exact : bool
-        Whether it is a torque-free closed form, with known `data`, and conserved energy and
-        momentum.
+        Whether the solution is a torque-free closed form, with known `data`, and conserved energy
+        and momentum.
     scene, reference, effort : Scene, Reference and float, or None
         The scene, the reference solution and its factor on the work limit, if one was used.
     """

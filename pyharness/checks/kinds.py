@@ -48,7 +48,7 @@ KINDS: dict[str, Callable[[Selection], Attempts]] = {
     # Programs and methods in scenes drawn from a seed, half of them of the difficult kinds in
     # `NASTY`. Methods also under torques that depend on omega or attitude.
     "random": lambda chosen: chain.from_iterable(each(chosen) for each in _RANDOM),
-    # Programs and methods against published results that were not computed here.
+    # Programs and methods against results published by others.
     "external": _external,
     # Programs and methods against trajectories of an earlier run.
     "golden": golden,

@@ -1,4 +1,4 @@
-"""Checks of methods against the high-precision reference in the cases of Table 1.
+"""Checks of methods against the high-precision reference in the cases of Table 1 of the thesis.
 
 The limit of an error is the requested tolerance. Errors of omega are relative to the largest omega,
 errors of the attitude are angles (rad).
@@ -211,7 +211,7 @@ def _order_of_method(scene: Scene, method: str, truth: Reference, **limits: Any)
 
 
 def in_few_steps(scene: Scene, time: float) -> Scene:
-    """Return the scene in 16 steps until `time` (s), the coarsest to measure orders."""
+    """Return the scene in 16 steps until `time` (s), the fewest to measure orders."""
     return replace(scene, step_size=time / _FEWEST, steps=_FEWEST)
 
 

@@ -1,7 +1,7 @@
-"""Checks of a port, an implementation of the programs in any language, against the twins.
+"""Checks of a port, an implementation of the programs in any language, against our Python versions.
 
-A twin is our Python version. Results must agree bit for bit in random scenes and in all cells, the
-combinations of program, case, defects and readings. Protocol: `docs/how-to/ports.md`.
+Results must agree bit for bit in random scenes and in all cells, the combinations of program, case,
+defects and readings of doubtful cards. Protocol: `docs/how-to/ports.md`.
 """
 
 import math
@@ -76,7 +76,7 @@ class PortCheck(Check):
 
 
 def port_cells(programs: Sequence[str], cases: Sequence[int], cells: Sequence[str]) -> list[Cell]:
-    """Return the cells whose names begin with an element of `cells`; all if it is empty."""
+    """Return the runs whose names begin with an element of `cells`; all if it is empty."""
     found = []
     for listing, case in all_cells():
         name, of = cell_name(listing, case), of_cell("port", listing, case)

@@ -1,7 +1,4 @@
-"""The process of a port or an integrator, which answers requests line by line in limited time.
-
-At its end, all processes that it started are ended too.
-"""
+"""The process of a port or an integrator, which answers requests line by line in limited time."""
 
 import contextlib
 import os
@@ -48,7 +45,7 @@ def split_command(command: str, option: str = "--port") -> list[str]:
 def refuse_other(
     command: str, option: str, instead: str, line: bytes, read: Callable[[bytes], object]
 ) -> None:
-    """Raise InputError that advises the option `instead` if `command` answers that one's requests.
+    """Raise InputError that advises the option `instead` if `command` answers its requests.
 
     `line` is such a request, and `read` raises PortError for an invalid answer.
     """

@@ -2,11 +2,11 @@
 
 The true omega is from `integer_series`, the true attitude from `reference`. An entry point is
 `solve` or a prepared solver, with one method. The tolerance limits the error of omega, relative to
-the largest omega until the last time, or of the attitude (rad). With an error amplification of K,
-rounding alone causes relative errors of 2e-15 K.
+the largest omega until the last time, or of the attitude (rad).
 
-Torques that depend on omega or attitude are sums of recorded functions or of ready-made terms. The
-reference's series for them (`pyharness.truth.tape_series`) shares no code with the methods.
+Torques that depend on omega or attitude are sums of functions whose arithmetic is recorded, or of
+ready-made terms. The reference's series for them (`pyharness.truth.tape_series`) shares no code
+with the methods.
 """
 
 from collections.abc import Callable, Iterator
@@ -134,7 +134,7 @@ TORQUE_POLICY = replace(POLICY, may_refuse=_may_refuse_torque)
 
 
 def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
-    """Yield checks of omega by every entry point; without a true solution, one of the scene."""
+    """Yield checks of omega by every entry point; without a true solution, a check of the scene."""
     for number in range(chosen.draws):
         if number // 2 % _EVERY or not chosen.may_ask(f"random/{number}"):
             continue

@@ -1,4 +1,4 @@
-"""Stress trials of a user's scene, with any torque that can be recorded.
+"""Stress trials of a user's scene, with any torque whose arithmetic can be recorded.
 
 Results are compared with the reference, and under transformations that must not change the motion.
 """
@@ -51,7 +51,7 @@ State = tuple[Array, Array | None]
 def scene_trials(scene: Scene, options: str) -> dict[str, Trial]:
     """Return the trials of a scene by name; `options` end the command that repeats them.
 
-    Raise InputError if the torque is opaque, or needs an attitude that the scene lacks.
+    Raise InputError if the torque can't be recorded, or needs an attitude that the scene lacks.
     """
     if isinstance(scene.torque, StateTorque):
         system_of(scene)  # raises InputError for an opaque torque

@@ -223,7 +223,7 @@ def _quotients(scene: Scene, run: Trajectory, kutta: _Stages, listing: Listing) 
 
 
 def _constants(quotients: _Quotients) -> list[float]:
-    """Return stop constants (1/s) below and above each new maximum, by more than its rounding."""
+    """Return stop constants (1/s) below and above each new largest quotient, beyond rounding."""
     constants = []
     below = 0.0
     for values, rounding in zip(quotients.values, quotients.rounding, strict=True):

@@ -1,7 +1,7 @@
 """Cells, combinations of a listing and a case, in which Fortran and Python ports are compared.
 
-A listing is a program with a choice of defects, readings and conjectures; a case is a scene of
-Table 1 of the thesis.
+A listing is a program with a choice of defects, readings (interpretations of doubtful cards) and
+conjectures; a case is a scene of Table 1 of the thesis.
 """
 
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ def subsets(names: tuple[str, ...]) -> Iterator[frozenset[str]]:
 
 
 def all_listings(program: str) -> Iterator[Listing]:
-    """Yield every listing of a program: each subset of readings with each subset of `switches`."""
+    """Yield every listing of a program: each subset of readings with each subset of defects."""
     for readings in subsets(names_of("reading", program)):
         for defects in subsets(switches(program)):
             yield Listing(program, defects, readings)

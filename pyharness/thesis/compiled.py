@@ -39,7 +39,7 @@ def read_rows(
     `rows` has shape (n, 8): true time and the program's TIME (s), omega (rad/s) and translational
     velocity (m/s). The first n values of `ier` are used. `stop_variable` is the number in
     `STOP_VARIABLES`, from 1, of the variable that failed the stop test, or 0. `stop_quotient` is
-    the change of its right-hand side divided by its change (1/s).
+    the change of the variable's right-hand side divided by the variable's (1/s).
     """
     n = len(rows)
     return trajectory_of(

@@ -132,7 +132,7 @@ def job_text(deck: str, system: str = "nos", rounds: bool = False) -> str:
 def _is_made(
     alteration: Mapping[str, Any], listing: Listing, dialect: str, case: int | None
 ) -> bool:
-    """Return whether all conditions of an alteration hold; `case` None is the published one."""
+    """Return whether all conditions of an alteration hold; `case` is None for published cards."""
     named = alteration.get
     return (
         named("program") == listing.program
@@ -159,15 +159,14 @@ def _model(terms: int, listing: Listing, scene: Scene | None) -> dict[int, str]:
 def model_cards(terms: int) -> dict[int, str]:
     """Return the cards of a collocation deck with `terms` terms, by their new numbers.
 
-    The deck is a conjecture: V.2 uses three and five terms in Case 6, but the thesis prints no such
-    deck. The collocation points are at the fractions k/(terms + 1) of the interval.
+    The deck is a conjecture: section V.2 of the thesis uses three and five terms in Case 6, but
+    prints no such deck. The collocation points are at the fractions k/(terms + 1) of the interval.
     """
     text = [card.text for card in deck("four-term").cards.values()]
     terms_range = range(1, terms + 1)
     end = f"T{terms + 1}"
 
     def polynomials(at: str, time: str) -> Iterator[str]:
-        """Yield the statements that evaluate all unknowns."""
         for column, name in enumerate(("U1", "U2", "U3", "V1", "V2", "V3"), 1):
             powers = [f"B({k},{column})*{time}" + (f"**{k}" if k > 1 else "") for k in terms_range]
             more = ["+".join(powers[3:])] if terms > 3 else []

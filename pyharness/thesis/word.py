@@ -200,8 +200,7 @@ class Number:
     """An immutable number of a floating-point format: the integer `m` times 2**`e`.
 
     If `m` is 0, `e` is the value as a float. `Word` makes a subclass for each format. The operators
-    round their results; x/0 is infinite, 0/0 is nan. Square roots, sines and cosines are rounded to
-    nearest even if the format truncates.
+    round their results; x/0 is infinite, 0/0 is nan.
     """
 
     __slots__ = ("e", "m")

@@ -19,7 +19,7 @@ class Accuracy:
     omega: tuple[float, float, float]  # largest error of each component (rad/s)
     velocity: float | None  # largest error of any component (m/s)
     # Drifts of the energy and of the squared angular momentum, relative to the initial values; None
-    # with a torque, without moments or without rows.
+    # with a torque, without moments or for an empty trajectory.
     energy: float | None
     momentum: float | None
     error: Array  # shape (n,): largest error of omega at each time (rad/s)
@@ -30,14 +30,14 @@ class Accuracy:
 
     @property
     def angle(self) -> float | None:
-        """Return the largest error of the attitude (rad), or None; infinite without rows."""
+        """Return the largest error of the attitude (rad), or None; infinite without any times."""
         return None if self.turned is None else _largest(self.turned)
 
 
 def accuracy(scene: Scene, trajectory: Trajectory, truth: Reference) -> Accuracy:
     """Return the errors of a trajectory against `truth`, and the drifts of conserved quantities.
 
-    Errors are up to the last time that both have, and infinite without rows.
+    Errors extend to the last common time, and are infinite for an empty trajectory.
     """
     n = min(len(trajectory.time), len(truth.time))
     with np.errstate(all="ignore"):
@@ -84,7 +84,7 @@ def _drift_in_space(scene: Scene, trajectory: Trajectory) -> float:
 def distance(first: Trajectory, second: Trajectory) -> float:
     """Return the largest difference of two trajectories, in units in the last place.
 
-    It is infinite for different numbers of rows.
+    It is infinite for different numbers of times.
     """
     if len(first.time) != len(second.time):
         return math.inf

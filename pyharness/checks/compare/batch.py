@@ -28,7 +28,7 @@ from pyharness.thesis.many import ProgramEnsemble, run_many
 
 # Arrays for a program, but not for a method.
 OF_PROGRAMS = ("step_size", "lipschitz")
-_EFFORT = 1e9  # so large that there is no limit: the caller has requested the whole batch
+_EFFORT = 1e9  # factor on the work limit; so large because the caller requested the whole batch
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Solver:
 
     `t_end` (s) is by default the step size times the number of steps. `listing` to `may_stop` are
     for programs: `reading` is the interpretation of doubtful cards, `lipschitz` the limit (1/s) of
-    the stop test, which may end a run if `may_stop`. `compiled` is as in `solve_many`.
+    the stop test, which may end a run if `may_stop`. `compiled` requests a compiled torque.
     """
 
     method: str | None = "auto"
@@ -105,7 +105,7 @@ class Batch:
 
     @property
     def leaves(self) -> str | None:
-        """Return what computed the Taylor terms of a recorded torque, as `Ensemble.leaves`."""
+        """Return whether compiled code or an interpreter computed a torque's Taylor terms."""
         return self._ends.leaves
 
     @property
@@ -119,7 +119,7 @@ class Batch:
         return self._program.stop_variable
 
     def sample_steps(self, samples: int) -> list[int]:
-        """Return the last step, from 1, of each of `samples` nearly equal parts of a run."""
+        """Return the last step (from 1) of each of `samples` nearly equal parts of a run."""
         steps = self.scene.steps
         return [max(1, round(steps * (i + 1) / samples)) for i in range(samples)]
 
@@ -177,7 +177,7 @@ class Batch:
     def scene_of(self, i: int) -> Scene:
         """Return scene `i` (from 0), with an attitude only if the torque needs it.
 
-        Raise InputError for an invalid number.
+        Raise InputError if the scene is invalid.
         """
         own = {name: array for name, array in self.arrays.items() if name != "lipschitz"}
         return scene_of_row(self._shared, own, i)

@@ -64,7 +64,7 @@ class Candidate:
     # solve the scene, or has no result at the time, as a program whose steps end at other times.
     ready: Callable[[Scene, float], Ready]
     # Returns the trajectory at the times of the scene's steps or, for a method, at those in an
-    # optional second argument. A prepared solver has no rows and raises InputError.
+    # optional second argument. A prepared solver has no trajectory and raises InputError.
     rows: Callable[..., Trajectory]
 
     def end(self, scene: Scene, time: float) -> End:
@@ -74,7 +74,7 @@ class Candidate:
 
 
 def method_candidate(name: str, tolerance: float, effort: float = 1.0) -> Candidate:
-    """Return a candidate that calls `solve`; its rows have the attitude if the scene has one."""
+    """Return a candidate that calls `solve`; its trajectories have attitudes if the scene has."""
 
     def rows(scene: Scene, times: Sequence[float] | None = None) -> Trajectory:
         times = scene.times() if times is None else times

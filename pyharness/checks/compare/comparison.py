@@ -190,9 +190,9 @@ def compare_methods(
     ----------
     scene : Scene
         The motion; methods are compared at the ends of its steps. A torque may depend on omega or
-        attitude if it can be recorded.
+        attitude if its arithmetic can be recorded.
     methods : sequence of str
-        Names in `pyharness.engine.registry.METHODS`; by default `auto` and SciPy's methods.
+        Names in `pyharness.engine.registry.METHODS`.
     tolerance : float, optional
         The tolerance of each method, relative to the largest component of omega; by default that of
         `solve`. Methods with a fixed step ignore it.

@@ -66,7 +66,7 @@ class Comparison:
     lipschitz : float or None
         The constant of the Runge-Kutta program's stop test, 1/s; None without programs.
     reference : Reference
-        The reference solution, with an estimate of its error.
+        The reference solution.
     bound : ErrorBound
         The error of the reference solution, proved or estimated.
     programs : tuple of ProgramFinding
@@ -108,7 +108,7 @@ class Comparison:
 
     @property
     def is_complete(self) -> bool:
-        """Return whether every method has all rows; true with programs."""
+        """Return whether every method reached all times; true if programs were compared."""
         found = [] if self.programs else [each.trajectory for each in self.methods]
         return all(each is not None and each.has_all_rows for each in found)
 
@@ -118,7 +118,7 @@ class Comparison:
 
         With programs, these are differences between Fortran and Python, and corrected programs that
         miss their order. Without programs, they are errors above the limit that follows from a
-        method's tolerance, missing rows, and no result of any method.
+        method's tolerance, missing times, and no result of any method.
         """
         found = [] if self.programs else [*filter(None, map(self._excess, self.methods))]
         if not self.programs and all(each.trajectory is None for each in self.methods):

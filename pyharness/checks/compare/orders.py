@@ -199,7 +199,7 @@ def _fastest(scene: Scene, omega: Array) -> float:
 
 
 def _is_grown_rounding(scene: Scene, found: Order) -> bool:
-    """Return whether the error may be amplified rounding; True if its bound can't be computed."""
+    """Return whether the error may be amplified rounding; True if no bound can be computed."""
     if not found.steps or not math.isfinite(found.error):
         return False
     with suppress(InputError):

@@ -21,7 +21,7 @@ _STYLES: dict[str, dict[str, Any]] = {
     "corrected": {"color": "#1040a0", "linestyle": (0, (1, 1.2)), "linewidth": 2.0},
 }
 _REFERENCE: dict[str, Any] = {"color": "#b8b8b8", "linestyle": "-", "linewidth": 3.5}
-# Markers for trajectories of one row, which a line does not show; distinct even at the same point.
+# Markers for trajectories of one time, which a line does not show; distinct even at the same point.
 _MARKERS: dict[str, dict[str, Any]] = {
     "reference": {"marker": "s", "markersize": 11.0},
     "original": {"marker": "o", "markersize": 8.0, "markerfacecolor": "none"},

@@ -1,7 +1,7 @@
 """Known faults of integrators, each with the motion that a faulty integrator computes.
 
-This motion is our solution of another scene, or in other conventions. An integrator has the fault
-if it converges to it.
+This motion is our solution of another scene, or in other conventions. An integrator that converges
+to this motion has the fault.
 """
 
 import math
@@ -75,7 +75,7 @@ def _gyroscopic(scene: Scene, omega: Any) -> list[Any]:
 
 
 def _with_gyroscopic(*factors: float, applied: float = 1.0) -> Callable[[Scene], Scene]:
-    """Return a change of a scene that multiplies its torque and the term -omega x (I omega)."""
+    """Return a function that multiplies a torque by `applied`, -omega x (I omega) by `factors`."""
 
     def changed(scene: Scene) -> Scene:
         def torque(t: Any, omega: Any) -> list[Any]:
@@ -132,10 +132,10 @@ def _conjugate(q: Any) -> Any:
 
 
 def _with_space_rates(scene: Scene) -> Scene:
-    """Return the scene of p and -omega, where q' = (0, omega) q/2 instead of q' = q (0, omega)/2.
+    """Return the scene of p, the conjugate of q, and -omega, if q' = (0, omega) q/2.
 
-    The conjugate p of q satisfies p' = p (0, -omega)/2, and -omega satisfies Euler's equations with
-    opposite gyroscopic term and torque.
+    Correct is q' = q (0, omega)/2. The conjugate satisfies p' = p (0, -omega)/2, and -omega
+    satisfies Euler's equations with opposite gyroscopic term and torque.
     """
     start, back = _conjugate(scene.attitude), np.negative(scene.omega).tolist()
     opposite = _with_gyroscopic(-1.0, -1.0, -1.0, applied=-1.0)(scene)
@@ -143,7 +143,7 @@ def _with_space_rates(scene: Scene) -> Scene:
 
 
 def _with_doubled_rates(scene: Scene) -> Scene:
-    """Return the scene of a body with twice the omega, where q' = q (0, omega)."""
+    """Return the scene of a body with twice omega, so that q' = q (0, omega), not half of it."""
     halved = _with_gyroscopic(0.5, 0.5, 0.5, applied=2.0)(scene)
     return replace(halved, omega=np.multiply(2.0, scene.omega).tolist())
 

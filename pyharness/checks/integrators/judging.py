@@ -96,7 +96,8 @@ def judge_integrator(
 
     `chosen` are the problems (random scenes), `due` is the required order. ``again(name)`` returns
     the command that repeats the checks in a scene; `told` receives the number of finished problems
-    and the next name. An invalid answer ends the checks. Raise InputError for an empty command.
+    and the name of the next. An invalid answer ends the checks. Raise InputError for an empty
+    command.
     """
     found = Verdict(command, again)
     where = "start"

@@ -83,7 +83,7 @@ def _held(asked: dict[str, Any]) -> None:
 
 
 def _turned_start(asked: dict[str, Any]) -> None:
-    """Rotate the initial angular momentum about a body axis, by the step size (s) in rad."""
+    """Rotate the initial angular momentum about a body axis by the step size (s), taken as rad."""
     moments, h = np.array(asked["moments"]), asked["step_size"]
     vector = moments * np.array(asked["omega"])
     across = np.cross(_STEP_AXIS, vector)

@@ -39,7 +39,7 @@ _LEAST = 1e-300  # replaces an error of 0, to compute an order
 # An error larger than this many roundings, times the square root of the number of steps, is due to
 # the method.
 _ROUNDINGS = 240.0
-_BETWEEN = 8.0  # time (s) from a row to the next
+_BETWEEN = 8.0  # time (s) between states of the long motion
 _ROWS, _FEWEST, _FEWEST_COARSE = 64, 16, 4
 # Levels of the largest step size (1/32 s) and tolerance (1e-6) of the long motion.
 _FIRST = {"step_size": 4, "tolerance": 3}
@@ -95,7 +95,7 @@ class Problem:
         return list(motions(self.scene, self.times, self.step_size(LEVELS - 1)))
 
     def faulty_states(self, fault: Fault, level: int) -> State:
-        """Return the states of one of the `faulty` at the step size of a level."""
+        """Return the states with a fault, at the step size of a level."""
         if fault.of_step:
             found = fault.motion(self.scene, self.times, self.step_size(level))
             assert found is not None
@@ -150,7 +150,7 @@ class Convergence:
     """The errors of a `part`, omega or attitude, in one problem, at decreasing settings.
 
     The errors are proportional to the power `order` of the setting, a step size (s) or a tolerance;
-    it is None if all errors are rounding errors.
+    `order` is None if all errors are rounding errors.
     """
 
     part: str
@@ -160,7 +160,7 @@ class Convergence:
 
     @property
     def is_first(self) -> bool:
-        """Return whether the order is about 1 over the last two settings, and over several."""
+        """Return whether the order is about 1 over the last two settings and over the last four."""
         if self.order is None:
             return False
         far = _power(self.errors[-_SEVERAL] / max(self.errors[-1], _LEAST),
@@ -188,9 +188,9 @@ def convergence(
 ) -> Convergence:
     """Return the measured order of convergence of errors above `floor`.
 
-    It is from the last pair of settings. With `overall`, for tolerances, with which errors decrease
-    irregularly, it is the smaller of two orders: from the first setting to the last, and from the
-    fourth last to the last.
+    It is from the last pair of settings. If `overall`, as for tolerances, with which errors
+    decrease irregularly, it is the smaller of two orders: from the first setting to the last, and
+    from the fourth last to the last.
     """
     seen = [k for k in range(1, len(errors)) if not errors[k] <= floor]
     order = None
@@ -226,7 +226,7 @@ class Judged:
 
     @cached_property
     def lost(self) -> int:
-        """Return the number of rows that should be finite and are not.
+        """Return the number of states that should be finite and are not.
 
         A level may overflow if the order and the error of the next level predict an error of 1 or
         more.
@@ -264,7 +264,7 @@ def problems(seed: str, draws: int, names: Sequence[str] = ()) -> list[Problem]:
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """The drifts since time 0 at n `times` (s), and the largest `change` from row to row.
+    """The drifts since time 0 at n `times` (s), and the largest `change` between successive times.
 
     `named` has the drifts, shape (n,), of "energy", "momentum" and, with an attitude, "direction".
     """
@@ -275,9 +275,9 @@ class Drift:
 
 
 def long_motion(free: Judged) -> tuple[int, Array, float | None]:
-    """Return level and times (s) of the long motion, and the limit of the drift between rows.
+    """Return level and times (s) of the long motion, and the limit of the drift between two times.
 
-    The level is the first that allows enough rows; without one, the last or, if errors do not
+    The level is the first that allows enough times; without one, the last or, if errors do not
     decrease, the first. The limit is None if the errors in the problem `free` are too large.
     """
     control = free.finest.control
@@ -295,7 +295,7 @@ def long_motion(free: Judged) -> tuple[int, Array, float | None]:
 
 
 def drift_of(scene: Scene, times: Array, motion: Motion) -> Drift:
-    """Return the drift in `motion`, whose rows are at `times` (s)."""
+    """Return the drift in `motion`, whose states are at `times` (s)."""
     omega = np.vstack([scene.omega, motion.omega])
     with np.errstate(all="ignore"):
         vectors = np.array(scene.moments) * omega

@@ -40,7 +40,7 @@ class Motion:
 
     @property
     def lost(self) -> int:
-        """Return the number of rows that are not finite."""
+        """Return the number of states that are not finite."""
         parts = [self.omega] if self.attitude is None else [self.omega, self.attitude]
         return int((~np.isfinite(np.hstack(parts)).all(axis=1)).sum())
 
@@ -69,7 +69,7 @@ def asking_of(process: PortProcess) -> Ask:
 
 
 def refuse_integrator(command: str) -> None:
-    """Raise InputError that advises `--integrator` if `command`, no port, is an integrator."""
+    """Raise InputError that advises `--integrator` if `command` is an integrator, not a port."""
     line = request(draw_moderate("", MODERATE[0], 0), [1.0], 0.5, 1e-3)
     refuse_other(command, "--port", "--integrator", line, lambda answer: read_motion(answer, 1))
 

@@ -1,7 +1,7 @@
 """Faults of a chosen size: which function is faulty, and how its result changes.
 
-A fault is planted in the running process until its context ends. A faulty twin (Python version of a
-program) is a copy of the sources with one replacement.
+A fault is planted in the running process until its context ends. A faulty Python version of a
+program (twin) is a copy of the sources with one replacement.
 """
 
 import importlib
@@ -73,7 +73,7 @@ def change_result(target: str, change: Change) -> Fault:
 
 
 def change_at(path: str, change: Callable[[Any], Any]) -> Callable[[dict[str, Any]], None]:
-    """Return a function that changes the value at `path`, as in ``scene.run``, unless empty."""
+    """Return a function that changes the value at `path`, as in ``scene.run``, if not empty."""
     *outer, last = path.split(".")
 
     def changed(record: dict[str, Any]) -> None:
@@ -96,7 +96,7 @@ def change_attribute(name: str, change: Change) -> Change:
 
 
 class TwinFault(NamedTuple):
-    """A row of `data/plants.toml`: `wrong` replaces `right` in a `file` of the Python versions."""
+    """Entry of `data/plants.toml`: `wrong` replaces `right` in a `file` of the Python versions."""
 
     file: str
     right: str

@@ -20,7 +20,7 @@ from pyharness.model.listing import Listing
 from pyharness.model.records import listing_record
 from pyharness.model.report import counted
 
-_MOST_CELLS = 24  # cells in which the faults are planted
+_MOST_CELLS = 24  # runs in which the faults are planted
 
 Row = list[float]
 # A function that changes a parsed request or answer in place, unless the fault can't occur in it.

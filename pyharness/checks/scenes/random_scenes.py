@@ -28,7 +28,7 @@ class Draw:
     """The random inputs of one check: a scene, a program, and parameters of the runs."""
 
     scene: Scene  # in odd draws a difficult one, named by its kind in `NASTY`
-    listing: Listing  # of any program, with random defects and readings
+    listing: Listing  # of any program, with random defects and readings of doubtful cards
     lipschitz: float  # of the stop test (1/s)
     may_stop: bool
     digits: float  # from 0 (coarsest tolerance) to 1 (a method's finest)

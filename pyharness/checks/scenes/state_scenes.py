@@ -1,7 +1,7 @@
 """Random scenes with torques that depend on omega or attitude, reproducible from a seed.
 
-Torques are sums of recorded functions or of ready-made terms, about as large as the gyroscopic
-torque, so that they affect slow and fast bodies alike. End times may be negative.
+Torques are sums of functions whose arithmetic is recorded, or of ready-made terms, about as large
+as the gyroscopic torque, so that they affect slow and fast bodies alike. End times may be negative.
 """
 
 from collections.abc import Callable

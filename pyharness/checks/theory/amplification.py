@@ -2,15 +2,15 @@
 
 A perturbation x of a steady rotation, or the velocity during it, obeys x' = J x with a constant
 Jacobian J. A step of size h multiplies x by a matrix of polynomials in z, where z is h times an
-eigenvalue of J, or hJ itself. The coefficients are exact fractions. The matrix has a row for each
-of the m vectors that a program propagates. The original Runge-Kutta program propagates two: the
-result, and U(1), at which the first stage is evaluated.
+eigenvalue of J, or hJ itself. The matrix has a row for each of the m vectors that a program
+propagates. The original Runge-Kutta program propagates two: the result, and U(1), at which the
+first stage is evaluated.
 
 A program is linearly stable where, in the plane of z, the spectral radius is at most 1.
 
 A collocation program evaluates the right-hand side along its first estimate, a straight line, and
-corrects once. At time s it is F + s J F + s**2 Q(F) there, where F is the right-hand side at s = 0
-and Q its quadratic part.
+corrects once. At time s of this line the right-hand side is F + s J F + s**2 Q(F), where F is its
+value at s = 0 and Q its quadratic part.
 """
 
 from dataclasses import dataclass
@@ -105,7 +105,10 @@ def amplification(listing: Listing, step: int = 1) -> Amplification:
 
 
 def weight_of_squares(listing: Listing, step: int) -> Fraction:
-    """Return the weight of h**3 Q(F) in a collocation step; exact integration would give 1/3."""
+    """Return the weight of h**3 Q(F) in a collocation step; exact integration would give 1/3.
+
+    F is the right-hand side, Q its quadratic part, h the step size.
+    """
     points, weights = _quadrature(listing, step)
     return Fraction(weights @ points**2)
 
@@ -120,8 +123,8 @@ def _quadrature(listing: Listing, step: int) -> tuple[Fractions, Fractions]:
 def _runge_kutta(listing: Listing) -> Amplification:
     """Return the matrix of the Runge-Kutta program (cards 770-1200).
 
-    Stages depend linearly on U(1) and on the base of the step, the previous result. Such a vector
-    has the shape (2, powers of z).
+    Stages depend linearly on U(1) and on the base of the step, the previous result. A stage has the
+    shape (2, powers of z).
     """
     first, base = np.full((2, 2, _HIGHEST), Fraction(0), dtype=object)
     first[0, 0] = base[1, 0] = Fraction(1)
@@ -205,8 +208,8 @@ class Regions:
 def regions() -> Regions:
     """Return the stability regions of all programs, original and corrected.
 
-    The Runge-Kutta program also has regions with `stage-base` or `base-not-restored` alone. That of
-    Gauss collocation, the left half-plane, is omitted.
+    The Runge-Kutta program also has regions with `stage-base` or `base-not-restored` alone. The
+    region of Gauss collocation, the left half-plane, is omitted.
     """
     real, imaginary = np.linspace(*_REAL), np.linspace(*_IMAGINARY)
     distances = np.geomspace(*_DISTANCES)

@@ -1,4 +1,4 @@
-"""The collocation matrices (eq. 36), and the accuracy of their solution by LEQT1F.
+"""The collocation matrices (eq. 36 of the thesis), and the accuracy of their solution by LEQT1F.
 
 LEQT1F is the linear solver of the collocation programs, "two-term" and "four-term". Exact solutions
 are computed in fractions.
@@ -198,11 +198,11 @@ def solver_roundings(program: str) -> tuple[float, float]:
     """Return two bounds on the rounding error that the solver adds to a step's result.
 
     Both are in units of 2**-53 times step size times rate. The first is for equal rates at all
-    points, where only c1 is not zero. The second, times the relative deviation from equal rates, is
-    for unequal rates. For n points they are 3n abs(powers) abs(inverse) abs(L) abs(U) abs(X)
-    (Higham 2002, theorem 9.4), with the matrix's inverse and factors L and U, the solution X and
-    the powers of the step size. They do not depend on the step size while the largest element of
-    each row is 1.
+    points, where only the coefficient of t is not zero. The second, times the relative deviation
+    from equal rates, is for unequal rates. For n points they are 3n abs(powers) abs(inverse) abs(L)
+    abs(U) abs(X) (Higham 2002, theorem 9.4), with the matrix's inverse and factors L and U, the
+    solution X and the powers of the step size. They do not depend on the step size while the
+    largest element of each row is 1.
     """
     step, matrix = _small_step(program)
     count = len(matrix)
@@ -262,7 +262,7 @@ def _share(error: Fraction, bound: Fraction) -> float:
 def _pivoting(matrix: Fractions, order: Sequence[int], sizes: Fractions) -> tuple[float, float]:
     """Return the largest relative shortfall of a pivot, and the largest that rounding can cause.
 
-    The shortfall is that from the best candidate, in exact elimination in the solver's `order`.
+    The shortfall is relative to the best candidate, in exact elimination in the solver's `order`.
     `sizes` is abs(L) abs(U).
     """
     shortfall, allowed = Fraction(0), Fraction(0)

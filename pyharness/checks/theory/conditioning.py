@@ -195,7 +195,7 @@ def conditioning_at(scene: Scene, times: Sequence[float]) -> Conditioning:
 
     Under a torque law it is the sensitivity at the last time; under other torques the largest at
     any of the times, because damping may reduce errors. Raise InputError as `conditioning` does, or
-    if the torque is opaque.
+    if the torque can't be recorded.
     """
     if not isinstance(scene.torque, StateTorque):
         return conditioning(scene, times[-1])

@@ -183,9 +183,9 @@ def _phase(coefficients: Sequence[float], rate: float, share: float) -> float | 
     """Return the time (s) when the phase error about a stable axis reaches 0.1 rad.
 
     `coefficients` are in cyclic order from the axis; `rate` is the frequency (rad/s) by linear
-    theory. A tilt by d (rad) towards another axis changes it by the fraction d**2 / 4 times the
-    first coefficient over that of the other axis. The time is infinite if the first coefficient is
-    0, else None if the frequency is 0, when only the spin drifts.
+    theory. A tilt by d (rad) towards another axis changes the frequency by the fraction d**2 / 4
+    times the first coefficient over that of the other axis. The time is infinite if the first
+    coefficient is 0, else None if the frequency is 0, when only the spin drifts.
     """
     spun, *others = map(abs, coefficients)
     if spun != 0.0 and rate == 0.0:

@@ -1,8 +1,8 @@
 """The schemes of programs and fixed-step methods, implemented again.
 
-A scheme computes one step from `omega` under constant torque (equations 16-18), sharing no code
-with the methods. Its argument `on` is a `Numbers`, or a `Series` for power series in the step size,
-which yield each term of the truncation error.
+A scheme computes one step from `omega` under constant torque (equations 16-18 of the thesis),
+sharing no code with the methods. Its argument `on` is a `Numbers`, or a `Series` for power series
+in the step size, which yield each term of the truncation error.
 """
 
 import math
@@ -209,7 +209,7 @@ def spacing(count: int) -> Sequence[Fraction]:
     """Return the weights of a central difference for the first derivative.
 
     Weight i, from 1, multiplies the difference of the values at i and -i spacings. The sum, divided
-    by the spacing, is exact for polynomials up to degree 2 count.
+    by the spacing, is exact for polynomials up to degree 2 `count`.
     """
     middle = math.comb(2 * count, count)
     return [

@@ -71,8 +71,8 @@ class Integrator:
 
     `run` returns omega, shape (n, 3), and the number of steps until each time; `noise` bounds the
     errors of a step of given size (s). `revolutions` is the length of the run from the first
-    initial condition, `others` from the others, in revolutions. `preference` tells whether rounding
-    errors are biased.
+    initial condition, `others` of each other run, both in revolutions. `preference` tells whether
+    rounding errors are biased.
     """
 
     run: Runner
@@ -187,7 +187,8 @@ def measured(
 ) -> Iterator[tuple[str, Array, Array, list[float]]]:
     """Yield name, errors, numbers of steps and error bounds of each quantity.
 
-    Errors have the shape (initial conditions, horizons), with NaN after the end of a run.
+    Errors have the shape (initial conditions, numbers of revolutions), with NaN after the end of a
+    run.
     """
     turn = 2.0 * math.pi / body.largest
     reached = [r for r in REVOLUTIONS if r <= 1.01 * integrator.revolutions]

@@ -152,7 +152,7 @@ _OF_ANY = len(fields(Check))
 
 @dataclass(frozen=True)
 class Sample(Check):
-    """A check in a random scene, with three fields by which reports group such checks."""
+    """A check in a random scene, with three fields by which reports group checks."""
 
     entrance: str = ""  # call that solved the scene, as in ``solve-taylor``
     tolerance: float = math.nan

@@ -282,8 +282,8 @@ def divergence(
 ) -> tuple[float, float, float]:
     """Return measured and predicted step size (s) of divergence, and a bound on their difference.
 
-    The bound is relative to the predicted step size, with which the wobble doubles by linear
-    theory. The body spins for `time` (s) about axis 3, which is stable.
+    The bound is relative to the predicted step size, with which the wobble (omega1, omega2) doubles
+    by linear theory. The body spins for `time` (s) about axis 3, which is stable.
     """
     found = smallest_divergent(scene, time, runner, smallest)
     a, b, c = scene.euler_coefficients

@@ -208,12 +208,12 @@ def allowed(truth: Truth, made: float, growth: float, steps: float = 0.0) -> flo
 
 
 def lively(growth: float) -> float:
-    """Return the factor on the tolerance in a limit: `growth` if above `LIVELY`, else 1."""
+    """Return the factor on the tolerance in a limit: `growth` if above 1000, else 1."""
     return growth if growth > LIVELY else 1.0
 
 
 def linear(limit: float) -> float:
-    """Return `limit`, or infinity if it is above `LINEAR`, where the linearised equations fail."""
+    """Return `limit`, or infinity if it is above 0.01, where the linearised equations fail."""
     return limit if limit <= LINEAR else math.inf
 
 

@@ -209,7 +209,7 @@ _TIMES = (
 
 
 def port_report(command: str, checks: Sequence[PortCheck], asked: int, seed: str) -> Report:
-    """Return the report of the checks of a port, of which there is at least one."""
+    """Return the report of a port's checks, at least one."""
     title = [f"{command}: against the twins, bit for bit"]
     title += [f"seed of the random scenes: {seed}"] if seed else []
     if checks[-1].value is None:

@@ -27,8 +27,8 @@ ENDINGS = ("complete", "stopped", "overflow")
 class Answer:
     """A port's result of one run.
 
-    `rows` has the values of `VARIABLES` after each step, shape (n, 7); `ended` is one of `ENDINGS`.
-    `ier` has the error code of each step, or is None for a program that prints none.
+    `rows` has TIME (s), omega and velocity after each step, shape (n, 7); `ended` is one of
+    `ENDINGS`. `ier` has the error code of each step, or is None for a program that prints none.
     """
 
     rows: Array

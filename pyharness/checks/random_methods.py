@@ -93,8 +93,8 @@ def may_refuse(tried: MethodRun, truth: Truth, why: str) -> bool:
 
     `auto` may never refuse, `quick` always, a closed form only near the limits of binary64. Others
     may refuse the kinds of scenes in `_MAY_REFUSE`, and scenes with an error amplification above
-    `_CALM`. SciPy's methods may also refuse a tolerance finer than they meet, or one below `_FINE`
-    that takes too much work.
+    10. SciPy's methods may also refuse a tolerance finer than they meet, or one below 1e-9 that
+    takes too much work.
     """
     method, kind = tried.method, tried.scene.name
     if method == "auto":

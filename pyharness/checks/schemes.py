@@ -148,7 +148,7 @@ _QUOTIENT = Basis(
 
 @dataclass(frozen=True, eq=False)
 class _Quotients:
-    """The quotients that the program compares with its stop constant, in its order."""
+    """The quotients that the program compares with its stop constant, in the program's order."""
 
     values: Array  # shape (n, m) for n steps, 1/s
     rounding: Array  # shape (n, m): bound on the difference of two computations, 1/s
@@ -156,7 +156,7 @@ class _Quotients:
 
 
 def stops(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of the stops, for every combination of the stop test's defects.
+    """Yield deferred checks of stops, for every combination of the stop test's defects.
 
     The value is the largest difference from a recomputed quotient, over its rounding bound.
     """

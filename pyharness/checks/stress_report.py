@@ -87,8 +87,8 @@ def _size(check: Check) -> float:
 class _Mark(NamedTuple):
     """A plotted check, with the properties that determine its position and style.
 
-    `kind` is the circumstance up to its first number. Marks with equal `rank` and `what` are one
-    series.
+    `kind` is the circumstance up to its first number. Marks with equal `rank` (tolerance or
+    listing) and `what` (quantity) are one series.
     """
 
     method: str

@@ -54,7 +54,7 @@ def read_rows(
 def program_arguments(
     scene: Scene, listing: Listing, lipschitz: float, may_stop: bool, velocity: bool
 ) -> tuple[Any, ...]:
-    """Return the arguments of the compiled function `run_program`, in its order.
+    """Return the arguments of the compiled function `run_program`.
 
     Among them are a bit mask of defects, readings and conjectures, and seven triples: moments (kg
     m2), or A, B and C of Euler's equations; omega (rad/s); masses (kg); forces (N); constant (N m)

@@ -123,7 +123,7 @@ def run_program(
     scene : Scene
         Body, initial condition, torque, step size and number of steps.
     listing : Listing
-        The program with its active defects, readings and conjectures.
+        The program with its active defects, readings of doubtful cards and conjectures.
     implementation : {"fortran", "python"}
         The compiled program or its Python port; the results are bit-for-bit identical.
     lipschitz : float

@@ -148,7 +148,7 @@ def listings_for(
     """Return the listings to compare: original, selected and corrected, for each program.
 
     The selected listing is `base`, changed by `fix` and `keep`; `readings` and `conjectures` apply
-    to all. If `base` is specified without `fix` and `keep`, it is the only listing. Raise
+    to all listings. If `base` is specified without `fix` and `keep`, it is the only listing. Raise
     InputError for a name that none of `programs` has.
     """
     chosen = list(programs)

@@ -143,7 +143,7 @@ def _with_space_rates(scene: Scene) -> Scene:
 
 
 def _with_doubled_rates(scene: Scene) -> Scene:
-    """Return the scene of a body with twice omega, so that q' = q (0, omega), not half of it."""
+    """Return the scene of a body with twice omega, so that q' = q (0, omega)."""
     halved = _with_gyroscopic(0.5, 0.5, 0.5, applied=2.0)(scene)
     return replace(halved, omega=np.multiply(2.0, scene.omega).tolist())
 

@@ -169,7 +169,7 @@ class Convergence:
 
     @property
     def converges(self) -> bool:
-        """Return whether the order is at least 1 - `ORDER_SLACK`, or unknown (None)."""
+        """Return whether the order is at least 0.5, or unknown (None)."""
         return self.order is None or self.order >= 1.0 - ORDER_SLACK
 
     @property

@@ -86,7 +86,7 @@ class Amplification:
         return np.asarray(total)
 
     def text(self) -> str:
-        """Return the polynomials as text, row by row."""
+        """Return the polynomials as text."""
         rows = [", ".join(_polynomial_text(each) for each in row) for row in self.coefficients]
         return rows[0] if self.size == 1 else "[" + "; ".join(rows) + "]"
 
@@ -107,7 +107,7 @@ def amplification(listing: Listing, step: int = 1) -> Amplification:
 def weight_of_squares(listing: Listing, step: int) -> Fraction:
     """Return the weight of h**3 Q(F) in a collocation step; exact integration would give 1/3.
 
-    F is the right-hand side, Q its quadratic part, h the step size.
+    F is the right-hand side, Q its quadratic part.
     """
     points, weights = _quadrature(listing, step)
     return Fraction(weights @ points**2)

@@ -53,7 +53,7 @@ class SteadyRotation:
 
     @property
     def doubling_time(self) -> float | None:
-        """Return the doubling time (s) of the fastest growth exp(Q t), or None without growth."""
+        """Return the doubling time (s) of the fastest growth, or None without growth."""
         rate = self.rates[0].real
         return math.log(2.0) / rate if rate > 0.0 else None
 
@@ -160,8 +160,9 @@ def _growing(
 ) -> float | None:
     """Return the time (s) when second-order terms reach a tenth of a growing perturbation.
 
-    It is infinite if these terms are zero, and None if they exceed binary64. `rate` is the Q (1/s)
-    with the fastest growth, `matrix` the Jacobian (1/s).
+    It is infinite if these terms are zero, None if they exceed binary64. `rate` is the complex rate
+    (1/s) of fastest growth, `matrix` the Jacobian (1/s), `share` the initial perturbation divided
+    by the rotation.
     """
     # The eigenvector of `rate`.
     grows = np.linalg.svd(matrix - rate * np.eye(3))[2][-1].conj()
@@ -183,9 +184,9 @@ def _phase(coefficients: Sequence[float], rate: float, share: float) -> float | 
     """Return the time (s) when the phase error about a stable axis reaches 0.1 rad.
 
     `coefficients` are in cyclic order from the axis; `rate` is the frequency (rad/s) by linear
-    theory. A tilt by d (rad) towards another axis changes the frequency by the fraction d**2 / 4
-    times the first coefficient over that of the other axis. The time is infinite if the first
-    coefficient is 0, else None if the frequency is 0, when only the spin drifts.
+    theory. A tilt by `share` (rad) towards another axis changes the frequency by the fraction
+    `share`**2 / 4 times the first coefficient over that of the other axis. The time is infinite if
+    the first coefficient is 0, else None if the frequency is 0, when only the spin drifts.
     """
     spun, *others = map(abs, coefficients)
     if spun != 0.0 and rate == 0.0:
@@ -200,8 +201,8 @@ def _flip_interval(coefficients: Sequence[float], spin: float, share: float) -> 
     `coefficients` are in cyclic order from that axis; `spin` is in rad/s. The time is 2 K / lambda,
     where K is the complete elliptic integral of the first kind with complementary modulus k', and
     lambda is near the growth rate; for a small k' the time is near (2 / lambda) ln(4 / k'). It is
-    shortest for a perturbation along the other axis with the smaller coefficient. Return None if
-    the signs of the coefficients are impossible for a middle axis.
+    shortest for a relative perturbation `share` along the other axis with the smaller coefficient.
+    Return None if the signs of the coefficients are impossible for a middle axis.
     """
     first, second, third = coefficients
     if first * second >= 0.0 or first * third >= 0.0:

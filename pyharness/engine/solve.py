@@ -279,7 +279,7 @@ def _trial_ends(call: _Call, last: float) -> Iterator[float]:
     state = np.array([[*scene.omega, *attitude, *(each.start for each in scene.states)]])
     try:
         slopes = np.abs(rates_of(scene, np.zeros(1), state)[0, :3])
-    except Exception:  # what an opaque torque raises is told by the integration
+    except Exception:  # the integration reports what an opaque torque raises
         return
     fastest = max(*map(abs, scene.omega), math.sqrt(slopes.max()))
     end = _PHASES[call.method in SCIPY_METHODS] / fastest if fastest > 0.0 else math.inf

@@ -188,7 +188,7 @@ class Scene:
         """Check the fields."""
         if not isinstance(self.name, str):
             raise InputError(
-                f"name is {kind_of(self.name)}; allowed: text; in Python, give omega by keyword"
+                f"name is {kind_of(self.name)}; allowed: text; in Python, write omega=, moments="
             )
         self._set("name", printable(" ".join(self.name.split()))[:_LONGEST_NAME].rstrip())
         self._set_changing()

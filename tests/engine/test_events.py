@@ -303,9 +303,14 @@ def test_terminal_events_at_the_end_of_a_trial_and_on_both_sides() -> None:
     body = Scene("at 1 rad/s", (0.3, 0.2, 1.0), moments=(1.0, 2.0, 2.5))
     for direction in (-1, 0, 1):
         event = with_attributes(lambda t, omega: abs(t) - 200.0, True, direction)
-        found = solve(body, [100.0, 300.0, 900.0], events=event)
-        assert events_of(found)[0][0].tolist() == ([] if direction < 0 else [200.0])
-        assert found.time.tolist() == ([100.0, 300.0, 900.0] if direction < 0 else [100.0])
+        for sign in (1.0, -1.0):
+            rows = [sign * t for t in (100.0, 200.0, 300.0, 900.0)]
+            for times in (rows, [rows[0], *rows[2:]]):
+                found = solve(body, times, events=event)
+                occurs = direction >= 0
+                assert events_of(found)[0][0].tolist() == ([200.0 * sign] if occurs else [])
+                kept = [t for t in times if abs(t) <= 200.0] if occurs else times
+                assert found.time.tolist() == kept
     event = with_attributes(lambda t, omega: (t + 300.0) * (t - 30.0), True)
     found = solve(body, [-1e7, -40.0, 40.0, 1e7], events=event)
     assert events_of(found)[0][0].tolist() == pytest.approx([-300.0, 30.0])

@@ -102,11 +102,11 @@ def checked_names(
 def sensitivities_at(
     scene: Scene, found: Trajectory, names: Sequence[str], effort: float, states: States
 ) -> dict[str, Array]:
-    """Return the derivatives with respect to each parameter, (n, k, m) for k unknowns, m values.
+    """Return the derivatives of k unknowns with respect to each parameter's m numbers, (n, k, m).
 
     `states` returns the unknowns of a changed scene at the n times of `found`. The tolerance is
-    relative to the largest derivative with respect to the same value up to that time. Raise
-    InputError if the work limit is exceeded, or a derivative overflows.
+    relative to the largest derivative with respect to the same number so far. Raise InputError if
+    the work limit is exceeded, or a derivative overflows.
     """
     if not names:
         return {}

@@ -61,7 +61,7 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
         torque about the axes of space is unchanged; the result then always has an attitude.
     axes : ndarray, shape (3, 3)
         The principal axes as columns, in components about the body axes. They form a right-handed
-        frame; each axis is near the body axis of the same number.
+        frame, in the order and directions nearest to the body axes.
 
     Raises
     ------

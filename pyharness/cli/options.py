@@ -65,7 +65,7 @@ STRICT = {
     "a method ends before the last requested time. Without this option the status is 1 if the "
     "Fortran and Python versions of a program differ, a corrected program misses its order of "
     "convergence, or a method of --method misses its tolerance or ends although the true solution "
-    "continues.",
+    "continues."
 }
 ALSO = {
     "--also FILE,...": "Write the result to these files too, each in the format of its ending: "

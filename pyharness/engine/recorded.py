@@ -209,7 +209,7 @@ def kernel_tape(tape: Tape, n_unknowns: int | None = None) -> Array:
     n_unknowns, n_slots, operations, combinations, tables = listed
     terms = [term for _, each in combinations for term in each]
     starts = np.cumsum([1, *(len(each) for _, each in combinations)])
-    # f2py refuses empty arrays. The kernel does not read these entries.
+    # The kernel expects at least one entry, and does not read it.
     breaks = [each.breaks for each in tables] or [np.zeros(1)]
     pieces = [each.pieces.ravel() for each in tables] or [np.zeros(4)]
     counts = [

@@ -51,10 +51,10 @@ def counted(number: int, what: str) -> str:
 
 
 def format_duration(seconds: float) -> str:
-    """Return a duration as text, in seconds to days."""
+    """Return a duration as text, in a unit from seconds to days."""
     for limit, unit, name in ((120.0, 1.0, "s"), (7200.0, 60.0, "min"), (172800.0, 3600.0, "h")):
         if seconds < limit:
-            return f"{seconds / unit:{'.2g' if seconds < 100.0 else '.0f'}} {name}"
+            return f"{seconds / unit:{'.2g' if seconds < 99.5 else '.0f'}} {name}"
     return f"{seconds / 86400.0:.0f} days"
 
 

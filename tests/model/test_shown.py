@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from pyharness import case_scene, compare_programs, run_many, run_program, solve, solve_many, subset
+from pyharness.model.report import format_duration
 from pyharness.model.trajectory import Trajectory
 
 
@@ -40,6 +41,11 @@ def test_other_results() -> None:
     assert "omega=<float64 (1000, 3)>" in repr(solve_many(scene, 1.0, omega=starts))
     _lines(run_many(scene, subset("two-term"), omega=starts))
     _lines(run_program(scene, subset("two-term")))
+
+
+def test_durations_have_a_unit_in_which_they_are_short() -> None:
+    shown = [format_duration(each) for each in (0.0123, 99.4, 99.9, 119.9, 3600.0, 1e6)]
+    assert shown == ["0.012 s", "99 s", "100 s", "120 s", "60 min", "12 days"]
 
 
 def test_a_field_of_any_length_is_cut() -> None:

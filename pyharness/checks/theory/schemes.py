@@ -26,7 +26,7 @@ class Numbers:
     """Euler's equations for numbers; omega (rad/s) has the shape (..., 3)."""
 
     def __init__(self, scene: Scene, step: float = 1.0, sizes: bool = False) -> None:
-        """Store a step size (s) and the equations; with `sizes`, magnitudes of coefficients."""
+        """Store a step size (s) and the equations, with `sizes` the magnitudes of their numbers."""
         self._step = step
         size = np.abs if sizes else np.positive
         self._coefficients = size(np.array(scene.euler_coefficients))

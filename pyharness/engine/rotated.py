@@ -46,7 +46,7 @@ def axes_of(turn: Callable[[Triple], Triple]) -> Array:
 
 
 def later(torque: StateTorque, by: float) -> StateTorque:
-    """Return a torque with time 0 moved to the time `by` (s); raise InputError if it is opaque."""
+    """Return the torque of t + `by` (s) as a function of t; raise InputError if it is opaque."""
     if torque.tape is None:
         raise InputError(
             "an opaque torque can't be shifted in time; allowed: a torque that can be recorded"

@@ -680,18 +680,31 @@ static inline lanes begun(lanes size, lanes term)
   return (lanes)(((bits)term & begins) | ((bits)size & ~begins));
 }
 
+/* Sum the terms of the perturbations of each unknown up to `last` for the part `factor` of the
+   step. */
+void OF_LEVEL(sum_perturbations, LEVEL)(const struct tape *tape, int last, double factor,
+                                        double (*sums)[SIDE_BY_SIDE])
+{
+  for (int i = 0; i < tape->n_unknowns; i++) {
+    const row *terms = perturbations_of(tape)[FIRST_UNKNOWN + i];
+    for (int p = 0; p < SIDE_BY_SIDE; p += IN_REGISTER) {
+      reg sum = *(const reg *)(terms[last] + p);
+      for (int k = last - 1; k >= 0; k--) sum = factor * sum + *(const reg *)(terms[k] + p);
+      *(reg_anywhere *)(sums[i] + p) = sum;
+    }
+  }
+}
+
 /* Return the magnitudes of derivatives that were 0 so far, at the part `factor` of the step. */
 static lanes reached(const struct tape *tape, int last, double factor, const double *weights,
                      lanes size)
 {
   const bits begins = size == (lanes){0.0}, magnitude = ~(bits)(-(lanes){0.0});
+  double sums[MOST_UNKNOWNS][SIDE_BY_SIDE];
   lanes most = {0.0};
-  for (int i = 0; i < tape->n_unknowns; i++) {
-    const row *terms = perturbations_of(tape)[FIRST_UNKNOWN + i];
-    lanes sum = loaded(terms[last]);
-    for (int k = last - 1; k >= 0; k--) sum = factor * sum + loaded(terms[k]);
-    most = larger_lanes(most, weights[i] * (lanes)((bits)sum & magnitude));
-  }
+  OF_LEVEL(sum_perturbations, LEVEL)(tape, last, factor, sums);
+  for (int i = 0; i < tape->n_unknowns; i++)
+    most = larger_lanes(most, weights[i] * (lanes)((bits)loaded(sums[i]) & magnitude));
   return (lanes)((bits)most & begins);
 }
 
@@ -755,19 +768,4 @@ double OF_LEVEL(vary_tape, LEVEL)(struct block *block, double h, int order, doub
     factor *= SHORTER;
   }
   return factor;
-}
-
-/* Sum the terms of the perturbations of each unknown up to `last` for the part `factor` of the
-   step. */
-void OF_LEVEL(sum_perturbations, LEVEL)(const struct tape *tape, int last, double factor,
-                                        double (*sums)[SIDE_BY_SIDE])
-{
-  for (int i = 0; i < tape->n_unknowns; i++) {
-    const row *terms = perturbations_of(tape)[FIRST_UNKNOWN + i];
-    for (int p = 0; p < SIDE_BY_SIDE; p += IN_REGISTER) {
-      reg sum = *(const reg *)(terms[last] + p);
-      for (int k = last - 1; k >= 0; k--) sum = factor * sum + *(const reg *)(terms[k] + p);
-      *(reg_anywhere *)(sums[i] + p) = sum;
-    }
-  }
 }

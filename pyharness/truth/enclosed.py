@@ -123,8 +123,8 @@ def scales_of(coefficients: Sequence[Fraction]) -> list[float]:
     """Return the units in which proofs measure errors of the components of omega, at most 1.
 
     They are the square roots of abs(A), abs(B) and abs(C) over the largest of these, but at least
-    0.01. If none is 0.01, the logarithmic norm of the Jacobian is 0 for rotations about the axes of
-    the largest and the smallest moment.
+    0.01. If all are above 0.01, the logarithmic norm of the Jacobian is 0 for rotations about the
+    axes of the largest and the smallest moment.
     """
     sizes = [abs(x) for x in coefficients]
     largest = max(sizes) or Fraction(1)

@@ -139,7 +139,7 @@ def _split_card(card: Card) -> list[_Part]:
 
 
 def _runs(text: str, parts: Sequence[_Part], marks: dict[int, str]) -> list[Run]:
-    """Return a card's text in pieces without leading blanks; `marks` has differences by column."""
+    """Return a card's text, without leading blanks, in pieces that begin at columns of `marks`."""
     found, done = [], 0
     for part in parts:
         if part.column in marks:

@@ -186,7 +186,7 @@ class StateRun(Run):
         return scale
 
     def _pushed(self) -> float:
-        """Return the |omega| (rad/s) that the largest torque would cause from rest to the end, or 1."""
+        """Return the |omega| (rad/s) that the largest torque causes from rest to the end, or 1."""
         times = np.linspace(0.0, self.end, _FEWEST_STEPS + 1).tolist()
         rates = [abs(x) for time in times for x in self._rates(time, self.start)[:3].tolist()]
         omega = max(filter(math.isfinite, rates), default=0.0) * abs(self.end)

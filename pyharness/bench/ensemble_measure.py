@@ -17,7 +17,6 @@ from time import perf_counter, process_time
 import numpy as np
 
 from pyharness.bench.ensemble_contenders import (
-    HORIZON,
     SAMPLE,
     EnsembleContender,
     EnsembleLoad,
@@ -264,7 +263,7 @@ def sizes(seed: str, most: int, progress: Progress = no_progress) -> list[Size]:
 
 def _prepared(load: EnsembleLoad) -> Callable[[], object]:
     solver, out = prepare(load.scene, "closed-form"), np.empty_like(load.omega0)
-    return lambda: solver.many(load.omega0, HORIZON, out=out)
+    return lambda: solver.many(load.omega0, load.horizon, out=out)
 
 
 def memory(bodies: int) -> list[Memory]:

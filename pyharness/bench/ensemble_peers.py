@@ -12,7 +12,6 @@ import numpy as np
 
 from pyharness.bench.contenders import refuse_rounding
 from pyharness.bench.ensemble_contenders import (
-    HORIZON,
     MOMENTS,
     EnsembleContender,
     EnsembleLoad,
@@ -99,7 +98,7 @@ def _heyoka_ensemble(
 
     def run() -> Array:
         found = heyoka.ensemble_propagate_until_batch(
-            integrator, HORIZON, len(starts), begin, max_workers=threads
+            integrator, load.horizon, len(starts), begin, max_workers=threads
         )
         ends = np.array([each[0].state for each in found])
         return ends.transpose(0, 2, 1).reshape(-1, 3)[: load.n]
@@ -136,7 +135,7 @@ def _numpy_rk4(load: EnsembleLoad, setting: float, threads: int) -> Callable[[],
     starts, torques = load.omega0.T.copy(), load.acceleration.T.copy()
     found = np.empty_like(load.omega0)
     steps = round(setting)
-    h = HORIZON / steps
+    h = load.horizon / steps
 
     def slope(w: Array, torque: Array) -> Array:
         x, y, z = w
@@ -189,7 +188,7 @@ def _scipy_loop(load: EnsembleLoad, setting: float, threads: int) -> Callable[[]
 
             size = max(map(abs, start))
             found = solve_ivp(
-                slope, (0.0, HORIZON), start, method="DOP853", rtol=setting, atol=setting * size
+                slope, (0.0, load.horizon), start, method="DOP853", rtol=setting, atol=setting * size
             )
             ends.append(found.y[:, -1])
         return np.array(ends)
@@ -224,7 +223,7 @@ def numba_rk4(
     piece = LANES * max(1, -(-load.n // (LANES * threads)))
 
     def solve(rows: slice) -> None:
-        kernel(starts[rows], torques[rows], rates, HORIZON / steps, steps, found[rows])
+        kernel(starts[rows], torques[rows], rates, load.horizon / steps, steps, found[rows])
 
     def run() -> Array:
         in_threads(solve, load.n, threads, piece)

@@ -203,9 +203,10 @@ def with_noise(
     else:
         times = nodes(fits.low[which], fits.high[which], POINTS)[:, _SOME]
         inner = solution.states(times.ravel())
-    n = times.size
+    n, width = times.size, states.shape[1]
+    inner = inner.reshape(n, width)
     values, noise, rounding = solution.values_and_noise(
-        g, np.concatenate([times.ravel(), ends]), np.concatenate([inner.reshape(n, -1), states])
+        g, np.concatenate([times.ravel(), ends]), np.concatenate([inner, states])
     )
     fits.noise[which] = noise[:n].reshape(times.shape).max(axis=1)
     # At an end, a value that exceeds its rounding error is no root.

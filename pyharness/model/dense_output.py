@@ -5,6 +5,7 @@ Formulas: Trefethen 2013, Approximation Theory and Approximation Practice, chapt
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -44,10 +45,10 @@ def nodes(low: Array, high: Array, at: Array) -> Array:
 NODES = Storage.AT_ONCE + 1  # of a polynomial
 POINTS = points(NODES)
 TO_COEFFICIENTS = to_coefficients(NODES)
-_BLOCK = 20_000  # times that are evaluated together; limits the memory
+_BLOCK = 4_000  # times that are evaluated together; limits the memory
 _ROUNDED = 4.0  # units in the last place by which a time such as n*dt may exceed an end
 # Weights of the barycentric formula.
-_WEIGHTS: Array = np.where(np.arange(NODES) % 2, -1.0, 1.0)
+_WEIGHTS: Array = np.where(np.arange(NODES) % 2, -1.0, 1.0)[:, None]
 _WEIGHTS[[0, -1]] /= 2.0
 
 
@@ -66,19 +67,28 @@ class Pieces:
         begins = range(0, len(times) or 1, _BLOCK)
         return np.concatenate([self._evaluate(times[k : k + _BLOCK]) for k in begins])
 
+    @cached_property
+    def _by_node(self) -> Array:
+        """The values of shape (m, NODES, p): sums along the times are faster than along nodes."""
+        return np.ascontiguousarray(self.values.transpose(2, 1, 0))
+
     def _evaluate(self, times: Array) -> Array:
+        if len(times) == 1:
+            # NumPy adds the terms of a single sum in another order than those of several.
+            return self._evaluate(np.repeat(times, 2))[:1]
         piece = self.numbers(times)
         low, high = self.edges[piece], self.edges[piece + 1]
-        apart = (((times - low) - (high - times)) / (high - low))[:, None] - POINTS
-        values = self.values[piece]
+        apart = ((times - low) - (high - times)) / (high - low) - POINTS[:, None]
         with np.errstate(divide="ignore", invalid="ignore"):
             weights = _WEIGHTS / apart
-            found: Array = np.einsum("nj,njm->nm", weights, values)
-            found /= weights.sum(axis=1)[:, None]
+            total = weights.sum(axis=0)
+            found: Array = np.einsum("jn,mjn->mn", weights, self._by_node[:, :, piece])
+            found /= total
         # The formula fails at the nodes, where the values are known.
-        row, node = np.nonzero(apart == 0.0)
-        found[row] = values[row, node]
-        return found
+        at_node = np.flatnonzero(np.isinf(total))
+        node = np.isinf(weights[:, at_node]).argmax(axis=0)
+        found[:, at_node] = self._by_node[:, node, piece[at_node]]
+        return found.T
 
     def numbers(self, times: Array) -> NDArray[np.intp]:
         """Return the number of the interval of each time."""

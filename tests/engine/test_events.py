@@ -333,6 +333,8 @@ def test_functions_that_change_too_fast_are_refused(monkeypatch: pytest.MonkeyPa
     for fast in (lambda t, omega: np.sin(2e5 * t), lambda t, omega: np.sin(1e5 * t**4)):
         with pytest.raises(InputError, match="event 1: the function changes too fast for 1000"):
             solve(BODY, 2.0, events=fast)
+    # Nowhere smooth, and far from 0.
+    assert times_of(BODY, 0.1, lambda t, omega: 1.0 + 1e-6 * np.sin(1e9 * t)) == []
     smooth = times_of(BODY, 9.0, lambda t, omega: omega[1] - 0.10005)
     stairs = times_of(BODY, 9.0, lambda t, omega: np.round(omega[1], 4) - 0.10005)
     assert len(smooth) == 1

@@ -85,9 +85,10 @@ class Pieces:
             found: Array = np.einsum("jn,mjn->mn", weights, self._by_node[:, :, piece])
             found /= total
         # The formula fails at the nodes, where the values are known.
-        at_node = np.flatnonzero(np.isinf(total))
-        node = np.isinf(weights[:, at_node]).argmax(axis=0)
-        found[:, at_node] = self._by_node[:, node, piece[at_node]]
+        at_node = np.isinf(total)
+        if at_node.any():
+            node = np.isinf(weights[:, at_node]).argmax(axis=0)
+            found[:, at_node] = self._by_node[:, node, piece[at_node]]
         return found.T
 
     def numbers(self, times: Array) -> NDArray[np.intp]:

@@ -76,10 +76,13 @@ contains
     if (bodies%n == 0) return
     call mark_bodies(bodies, code, status, n_waves)
     call solve_marked(bodies, FREE, 0, code, omega, status, raised)
-    if (raised == 0) call solve_marked(bodies, STEPPED, 0, code, omega, status, raised)
-    if (raised == 0) call solve_marked(bodies, RAMPED, 0, code, omega, status, raised)
-    if (raised == 0) call solve_marked(bodies, WAVED, n_waves, code, omega, status, raised)
-    if (raised /= 0 .or. .not. any(status == NEEDS_FALLBACK)) then
+    ! Marks are below all other statuses.
+    if (minval(status) < NEEDS_FALLBACK) then
+      if (raised == 0) call solve_marked(bodies, STEPPED, 0, code, omega, status, raised)
+      if (raised == 0) call solve_marked(bodies, RAMPED, 0, code, omega, status, raised)
+      if (raised == 0) call solve_marked(bodies, WAVED, n_waves, code, omega, status, raised)
+    end if
+    if (raised /= 0 .or. minval(status) /= NEEDS_FALLBACK) then
       continue
     else if (with_attitude(bodies)) then
       call solve_left_with_attitude(bodies, code, omega, status, raised)

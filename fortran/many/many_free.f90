@@ -89,13 +89,20 @@ contains
       call turn_back(m, o%odd, w)
       call put_back(block, w, omega)
       do i = 1, block%there
-        status(block%at(i)) = merge(int(COMPLETE, i1), NEEDS_FALLBACK, &
-                                    o%error(i) <= bodies%tolerance &
-                                    .and. .not. o%unsure(i) > 0.0_dp)
-        if (is_estimated) then
-          call put_estimates(bodies, block%at(i), o%error(i) + ROUNDING*o%growth(i), o%growth(i))
-        end if
+        if (.not. o%error(i) <= bodies%tolerance) o%unsure(i) = 1.0_dp
       end do
+      if (block%in_row .and. .not. maxval(o%unsure(:block%there)) > 0.0_dp) then
+        status(block%at(1):block%at(block%there)) = COMPLETE
+      else
+        do i = 1, block%there
+          status(block%at(i)) = merge(NEEDS_FALLBACK, int(COMPLETE, i1), o%unsure(i) > 0.0_dp)
+        end do
+      end if
+      if (is_estimated) then
+        do i = 1, block%there
+          call put_estimates(bodies, block%at(i), o%error(i) + ROUNDING*o%growth(i), o%growth(i))
+        end do
+      end if
     end do
   end subroutine many_free_solve
 
@@ -106,12 +113,13 @@ contains
     real(dp), intent(in) :: tolerance
     real(dp), intent(in) :: a(LANES, 3), w(LANES, 3)
     type(orbits_t), intent(inout) :: o
-    real(dp) :: most, early, c1, c3, s12
+    real(dp) :: most, early, most_unlike, allowed, c1, c3, s12
     real(dp) :: a1, a2, a3, w1, w2, w3, s1, s2, s3, first, third, y1, y2, y3, left, right, gap
     integer :: i
 
     most = UNSURE*tolerance/(ABOVE_ESTIMATE*ROUNDING)
     early = log(max(1.0_dp, UNSURE*tolerance/(ROUNDING*sqrt(3.0_dp*UNLIKE))))**2
+    most_unlike = merge(UNLIKE, -1.0_dp, early > 0.0_dp)
     do i = 1, m
       a1 = a(i, 1)
       a2 = a(i, 2)
@@ -162,18 +170,24 @@ contains
       s12 = s1*s2
       o%turning(i) = 4.0_dp*c1*max(s1*s1*c3, s12*c3, s3*s3*c1) &
                      *((s3*s3*c1 + s12*c3)*(s2*(gap*gap)) + (s1*s1*c3 + s3*s3*c1)*(s1*(c3*c3)))
-      o%most(i) = (((1.0_dp - OF_AMPLITUDES)*most)*(s12*(c3*gap)))**2
+      allowed = (((1.0_dp - OF_AMPLITUDES)*most)*(s12*(c3*gap)))**2
       y1 = max(s12, s1*s1, s2*s2, s1*s3)*(s1*c3)**2
       y2 = (OF_AMPLITUDES*most)**2*s12*(s2*gap)**2
-      if (.not. (y1 <= y2 .and. y2 <= NEVER .and. y2 >= LEAST)) o%most(i) = -1.0_dp
-      if (.not. (o%most(i) <= NEVER .and. o%most(i) >= LEAST)) o%most(i) = -1.0_dp
+      ! With a condition of several comparisons, the loop would not be vector code.
+      if (.not. y1 <= y2) allowed = -1.0_dp
+      if (.not. y2 <= NEVER) allowed = -1.0_dp
+      if (.not. y2 >= LEAST) allowed = -1.0_dp
+      if (.not. allowed <= NEVER) allowed = -1.0_dp
+      if (.not. allowed >= LEAST) allowed = -1.0_dp
+      o%most(i) = allowed
       ! In units of the square roots of the coefficients, the symmetric part of the Jacobian matrix
       ! has the norm (s1 s3)**(1/2) omega2. The amplification is at most the exponential of its
       ! integral, which is the smaller bound for short times.
       o%rate(i) = NEVER
-      if (max(s1, s2, s3) <= UNLIKE*min(s1, s2, s3) .and. early > 0.0_dp) o%rate(i) = s3*c1/early
+      if (max(s1, s2, s3) <= most_unlike*min(s1, s2, s3)) o%rate(i) = s3*c1/early
       if (.not. s2 > 0.0_dp) o%error(i) = NEVER
-      if (.not. (o%modulus(i) <= FAR .and. o%modulus(i) >= 1.0_dp/FAR)) o%error(i) = NEVER
+      if (.not. o%modulus(i) <= FAR) o%error(i) = NEVER
+      if (.not. o%modulus(i) >= 1.0_dp/FAR) o%error(i) = NEVER
     end do
   end subroutine begin
 
@@ -183,13 +197,12 @@ contains
     type(orbits_t), intent(inout) :: o
     integer :: i, n
 
-    do n = 1, LEVELS
-      do i = 1, m
+    do i = 1, m
+      !GCC$ unroll 5
+      do n = 1, LEVELS
         o%a(i, n) = 0.5_dp*(o%a(i, n - 1) + o%b(i, n - 1))
         if (n < LEVELS) o%b(i, n) = sqrt(o%a(i, n - 1)*o%b(i, n - 1))
       end do
-    end do
-    do i = 1, m
       o%half(i) = 0.5_dp*(o%a(i, LEVELS - 1) - o%b(i, LEVELS - 1))
     end do
   end subroutine climb
@@ -228,24 +241,28 @@ contains
     !! at each level, so that no level needs a division.
     integer, intent(in) :: m
     type(orbits_t), intent(inout) :: o
-    real(dp) :: s2, c2
+    real(dp) :: sine, cosine, numerator, denominator, s2, c2
     integer :: i, n
 
     do i = 1, m
-      o%numerator(i) = 1.0_dp - o%numerator(i)*(o%sine(i)*o%sine(i))
-      o%sine(i) = o%sine(i)*o%denominator(i)
-      o%denominator(i) = 1.0_dp
-    end do
-    do n = LEVELS, 1, -1
-      do i = 1, m
-        c2 = o%cosine(i)*o%cosine(i)
-        s2 = o%sine(i)*o%sine(i)
-        o%cosine(i) = o%cosine(i)*o%numerator(i)
-        o%sine(i) = o%sine(i)*o%denominator(i)
-        o%numerator(i) = c2 + (o%a(i, n)*o%b(i, n - 1))*s2
-        o%denominator(i) = c2 + (o%a(i, n)*o%a(i, n - 1))*s2
-        o%square(i) = s2
+      sine = o%sine(i)*o%denominator(i)
+      cosine = o%cosine(i)
+      numerator = 1.0_dp - o%numerator(i)*(o%sine(i)*o%sine(i))
+      denominator = 1.0_dp
+      !GCC$ unroll 5
+      do n = LEVELS, 1, -1
+        c2 = cosine*cosine
+        s2 = sine*sine
+        cosine = cosine*numerator
+        sine = sine*denominator
+        numerator = c2 + (o%a(i, n)*o%b(i, n - 1))*s2
+        denominator = c2 + (o%a(i, n)*o%a(i, n - 1))*s2
       end do
+      o%sine(i) = sine
+      o%cosine(i) = cosine
+      o%numerator(i) = numerator
+      o%denominator(i) = denominator
+      o%square(i) = s2
     end do
   end subroutine descend
 
@@ -315,6 +332,7 @@ contains
       larger = sqrt(s1*c3)
       smaller = sqrt(s2*gap)
       total = 0.0_dp
+      !GCC$ unroll 5
       do level = 1, LEVELS
         mean = 0.5_dp*(larger + smaller)
         total = total + 2.0_dp**(level - 3)*(larger - smaller)**2

@@ -26,9 +26,7 @@ contains
     else if (.not. (code == TAYLOR .or. code == CLOSED_FORM_OR_TAYLOR &
                     .or. (code >= IMPROVED_EULER .and. code <= RK4))) then
       status = NEEDS_FALLBACK
-    else if (shares_torque(bodies) .and. code /= CLOSED_FORM_OR_TAYLOR) then
-      status = mark_of(bodies, 1, code, n_waves)
-    else if (shares_torque(bodies) .and. .not. feels_torque(bodies, 1)) then
+    else if (shares_mark(bodies, code)) then
       status = mark_of(bodies, 1, code, n_waves)
     else
       do i = 1, bodies%n
@@ -37,13 +35,16 @@ contains
     end if
   end subroutine mark_bodies
 
-  pure logical function shares_torque(bodies)
-    !! Return whether all bodies have the same torque.
+  pure logical function shares_mark(bodies, code)
+    !! Return whether the mark of all bodies follows from that of the first.
     type(bodies_t), intent(in) :: bodies
+    integer, intent(in) :: code
 
-    shares_torque = max(size(bodies%constant, 2), size(bodies%rate, 2), size(bodies%sines, 3), &
-                        size(bodies%cosines, 3)) == 1
-  end function shares_torque
+    shares_mark = max(size(bodies%constant, 2), size(bodies%rate, 2), size(bodies%sines, 3), &
+                      size(bodies%cosines, 3)) == 1
+    if (code /= CLOSED_FORM_OR_TAYLOR .or. size(bodies%body, 2) == 1) return
+    if (shares_mark) shares_mark = .not. feels_torque(bodies, 1)
+  end function shares_mark
 
   pure logical function feels_torque(bodies, i)
     !! Return whether a torque acts on body i.

@@ -21,9 +21,9 @@ module many_free
   real(dp), parameter :: ERROR = 8.0_dp*2.0_dp**(-53)
   real(dp), parameter :: FAR = 1e100_dp ! products of moduli from 1/FAR to FAR are finite
   ! A result whose rounding error may be amplified beyond UNSURE tolerances is left to the
-  ! single-body kernel, which measures the amplification. A first bound takes no division and no
-  ! root. It allots the part OF_AMPLITUDES of the largest allowed amplification to the amplitudes,
-  ! and the rest to the phase.
+  ! single-body kernel, which measures the amplification. Before, three bounds are tried, each
+  ! tighter and slower than the last. The second takes no division and no root; it allots the part
+  ! OF_AMPLITUDES of the largest allowed amplification to the amplitudes, and the rest to the phase.
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
   real(dp), parameter :: UNSURE = 0.3_dp
   real(dp), parameter :: ABOVE_ESTIMATE = 1.5_dp ! margin, as in torque_free_differences.f90
@@ -72,6 +72,7 @@ contains
       call begin(m, bodies%tolerance, a, w, o)
       call climb(m, o)
       call turn(m, t, o)
+      if (maxval(o%unsure(1:m)) > 0.0_dp) call bound_phase(m, bodies%tolerance, a, t, o)
       if (is_turned) then
         turns%sine(:m) = o%sine(:m)
         turns%cosine(:m) = o%cosine(:m)
@@ -113,11 +114,10 @@ contains
     real(dp), intent(in) :: tolerance
     real(dp), intent(in) :: a(LANES, 3), w(LANES, 3)
     type(orbits_t), intent(inout) :: o
-    real(dp) :: most, early, most_unlike, allowed, c1, c3, s12
+    real(dp) :: early, most_unlike
     real(dp) :: a1, a2, a3, w1, w2, w3, s1, s2, s3, first, third, y1, y2, y3, left, right, gap
     integer :: i
 
-    most = UNSURE*tolerance/(ABOVE_ESTIMATE*ROUNDING)
     early = log(max(1.0_dp, UNSURE*tolerance/(ROUNDING*sqrt(3.0_dp*UNLIKE))))**2
     most_unlike = merge(UNLIKE, -1.0_dp, early > 0.0_dp)
     do i = 1, m
@@ -164,12 +164,44 @@ contains
       ! gap.
       o%error(i) = ERROR*(left + right)/gap
       if (.not. o%odd(i) > 0.0_dp) o%error(i) = NEVER
-      ! An upper bound of torque_free_growth_bound, squared and without a division.
-      c1 = s2*y1 + s1*y2
-      c3 = s3*y2 + s2*y3
+      ! In units of the square roots of the coefficients, the symmetric part of the Jacobian matrix
+      ! has the norm (s1 s3)**(1/2) omega2. The amplification is at most the exponential of its
+      ! integral: the first bound, for short times.
+      o%rate(i) = NEVER
+      if (max(s1, s2, s3) <= most_unlike*min(s1, s2, s3)) o%rate(i) = s3*(s2*y1 + s1*y2)/early
+      if (.not. s2 > 0.0_dp) o%error(i) = NEVER
+      if (.not. o%modulus(i) <= FAR) o%error(i) = NEVER
+      if (.not. o%modulus(i) >= 1.0_dp/FAR) o%error(i) = NEVER
+    end do
+  end subroutine begin
+
+  pure subroutine bound_phase(m, tolerance, a, t, o)
+    !! Bound torque_free_growth_bound from above, squared and without a division, for the bodies
+    !! for which the exponential bound does not suffice.
+    integer, intent(in) :: m
+    real(dp), intent(in) :: tolerance
+    real(dp), intent(in) :: a(LANES, 3)
+    real(dp), intent(in) :: t(LANES) !! s
+    type(orbits_t), intent(inout) :: o
+    real(dp) :: most, turning, allowed, c1, c3, s1, s2, s3, s12, y1, y2, gap
+    integer :: i
+
+    most = UNSURE*tolerance/(ABOVE_ESTIMATE*ROUNDING)
+    do i = 1, m
+      s1 = abs(a(i, 1))
+      s2 = abs(a(i, 2))
+      s3 = abs(a(i, 3))
+      if (o%gap(i) < 0.0_dp) then
+        s1 = abs(a(i, 3))
+        s3 = abs(a(i, 1))
+      end if
+      gap = abs(o%gap(i))
+      y2 = o%omega2(i)*o%omega2(i)
+      c1 = s2*(o%omega1(i)*o%omega1(i)) + s1*y2
+      c3 = s3*y2 + s2*(o%omega3(i)*o%omega3(i))
       s12 = s1*s2
-      o%turning(i) = 4.0_dp*c1*max(s1*s1*c3, s12*c3, s3*s3*c1) &
-                     *((s3*s3*c1 + s12*c3)*(s2*(gap*gap)) + (s1*s1*c3 + s3*s3*c1)*(s1*(c3*c3)))
+      turning = 4.0_dp*c1*max(s1*s1*c3, s12*c3, s3*s3*c1) &
+                *((s3*s3*c1 + s12*c3)*(s2*(gap*gap)) + (s1*s1*c3 + s3*s3*c1)*(s1*(c3*c3)))
       allowed = (((1.0_dp - OF_AMPLITUDES)*most)*(s12*(c3*gap)))**2
       y1 = max(s12, s1*s1, s2*s2, s1*s3)*(s1*c3)**2
       y2 = (OF_AMPLITUDES*most)**2*s12*(s2*gap)**2
@@ -179,17 +211,9 @@ contains
       if (.not. y2 >= LEAST) allowed = -1.0_dp
       if (.not. allowed <= NEVER) allowed = -1.0_dp
       if (.not. allowed >= LEAST) allowed = -1.0_dp
-      o%most(i) = allowed
-      ! In units of the square roots of the coefficients, the symmetric part of the Jacobian matrix
-      ! has the norm (s1 s3)**(1/2) omega2. The amplification is at most the exponential of its
-      ! integral, which is the smaller bound for short times.
-      o%rate(i) = NEVER
-      if (max(s1, s2, s3) <= most_unlike*min(s1, s2, s3)) o%rate(i) = s3*c1/early
-      if (.not. s2 > 0.0_dp) o%error(i) = NEVER
-      if (.not. o%modulus(i) <= FAR) o%error(i) = NEVER
-      if (.not. o%modulus(i) >= 1.0_dp/FAR) o%error(i) = NEVER
+      if (turning*(t(i)*t(i)) <= allowed) o%unsure(i) = 0.0_dp
     end do
-  end subroutine begin
+  end subroutine bound_phase
 
   pure subroutine climb(m, o)
     !! Compute the arithmetic-geometric mean, with the same number of levels for all lanes.
@@ -228,8 +252,7 @@ contains
       o%mean(i) = last - 0.25_dp*square*last
       o%phase(i) = o%mean(i)*t(i)
       o%unsure(i) = 1.0_dp
-      if (o%turning(i)*(t(i)*t(i)) <= o%most(i) &
-          .or. o%rate(i)*(t(i)*t(i)) <= 1.0_dp) o%unsure(i) = 0.0_dp
+      if (o%rate(i)*(t(i)*t(i)) <= 1.0_dp) o%unsure(i) = 0.0_dp
       if (.not. abs(t(i)) > 0.0_dp) error = NEVER ! the single-body kernel returns omega0
       o%error(i) = error + error*abs(o%phase(i))
     end do

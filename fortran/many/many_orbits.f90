@@ -15,11 +15,9 @@ module many_orbits
     real(dp), dimension(LANES) :: odd       !! body's axis that is axis 2 here; 0: none
     real(dp), dimension(LANES) :: gap       !! negative: axes 1 and 3 are exchanged
     real(dp), dimension(LANES) :: error     !! estimate of the relative error
-    real(dp), dimension(LANES) :: turning   !! square of phase amplification in 1 s, times a divisor
-    real(dp), dimension(LANES) :: most      !! square of its limit, times the same divisor
     real(dp), dimension(LANES) :: rate      !! square of exponent over largest exponent, 1/s2
-    real(dp), dimension(LANES) :: unsure    !! 1 if the first amplification bound does not suffice
-    real(dp), dimension(LANES) :: growth    !! second bound of the amplification, if it was computed
+    real(dp), dimension(LANES) :: unsure    !! 1 if no bound of the amplification suffices so far
+    real(dp), dimension(LANES) :: growth    !! last bound of the amplification, if it was computed
     real(dp), dimension(LANES, 0:LEVELS) :: a, b !! the two means, level by level
     real(dp), dimension(LANES) :: half      !! half of the difference of the last means but one
     real(dp), dimension(LANES) :: mean      !! the mean in the limit

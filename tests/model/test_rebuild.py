@@ -1,4 +1,4 @@
-"""The files that are written and compiled anew when a constant or series_t changes."""
+"""The files that are compiled anew after a change, and vector code in those compiled."""
 
 import json
 import os
@@ -95,3 +95,33 @@ def test_c_code_follows_the_type_of_the_series(monkeypatch: pytest.MonkeyPatch) 
     for member in ("integer(c_int) :: more(8)", "real(c_double) :: more(3)"):
         with pytest.raises(SystemExit, match=r"series_t: .* allowed is real\(c_double\)"):
             offsets(text.replace(first, f"    {member}\n{first}"))
+
+
+@pytest.mark.campaign
+@pytest.mark.skipif(not BUILDS, reason="needs a build in the checkout")
+def test_loops_over_bodies_are_vector_code() -> None:
+    """One comparison too many in a loop doubled the run time of all bodies without torque."""
+    build, name = BUILDS[0], "bodies_avx512.f90"
+    entries = json.loads((build / "compile_commands.json").read_text())
+    commands = [each["command"].split() for each in entries if each["file"] == name]
+    if not commands or not commands[0][0].endswith("gfortran"):
+        pytest.skip("needs gfortran and AVX-512 kernels")
+    (command,) = commands
+    command[command.index("-o") + 1] = os.devnull
+    done = subprocess.run(
+        [*command, "-fopt-info-vec-optimized"],
+        cwd=build,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    there = {int(n) for n in re.findall(rf"{name}:(\d+):\d+: optimized: loop vec", done.stderr)}
+    scalar, loops, place = set(), 0, ""
+    for number, line in enumerate((build / name).read_text().splitlines(), 1):
+        if found := re.match(r" *(?:pure )?subroutine (\w+)", line):
+            place = found[1]
+        elif line.strip() == "do i = 1, m":
+            loops += 1
+            scalar |= set() if number in there else {place}
+    assert loops > 20
+    assert scalar <= {"put_attitudes", "advance_each"}  # they copy, and step body by body

@@ -17,7 +17,7 @@ typedef double nodal __attribute__((vector_size(8 * NODES)));
 typedef long long nodal_bits __attribute__((vector_size(8 * NODES)));
 
 /* Terms of several slots abreast. */
-enum { ABREAST = 4, GROUPS = (MOST_UNKNOWNS + ABREAST - 1) / ABREAST };
+enum { ABREAST = 4 };
 typedef double abreast __attribute__((vector_size(8 * ABREAST)));
 typedef long long abreast_bits __attribute__((vector_size(8 * ABREAST)));
 typedef abreast abreast_anywhere __attribute__((aligned(8)));
@@ -71,21 +71,22 @@ static void *taken(char **at, size_t count, size_t size)
 
 /* Divide the working storage, and return its size in bytes. An operation has at most two pairs, and a
    group at most as many terms as its members. */
-static size_t divide_work(struct work *work, char *begin, int n_operations, int n_products, int n_slots,
-                          int n_terms)
+static size_t divide_work(struct work *work, char *begin, int n_unknowns, int n_operations,
+                          int n_products, int n_slots, int n_terms)
 {
-  const size_t n = n_operations, most = n + MOST_UNKNOWNS;
+  const size_t n = n_operations, n_groups = (n_unknowns + ABREAST - 1) / ABREAST;
   const size_t n_sums = (2 * (n - n_products) + ABREAST - 1) / ABREAST;
   char *at = begin;
   taken(&at, 1, sizeof *work);
   work->items = taken(&at, n, sizeof *work->items);
   work->products = taken(&at, n_products, sizeof *work->products);
   work->others = taken(&at, n_sums, sizeof *work->others);
-  work->combinations = taken(&at, most, sizeof *work->combinations);
+  /* Each group is followed by another, where its terms end. */
+  work->combinations = taken(&at, n + n_groups + 1, sizeof *work->combinations);
   work->slots = taken(&at, n_terms, sizeof *work->slots);
   work->coefficients = taken(&at, n_terms, sizeof *work->coefficients);
   work->sums = taken(&at, n_sums, sizeof *work->sums);
-  work->unknowns = taken(&at, GROUPS, sizeof *work->unknowns);
+  work->unknowns = taken(&at, n_groups, sizeof *work->unknowns);
   work->tangents = taken(&at, n_slots, sizeof *work->tangents);
   work->middle = taken(&at, n_slots, sizeof *work->middle);
   work->levels = taken(&at, n_slots, sizeof *work->levels);

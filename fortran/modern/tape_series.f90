@@ -68,12 +68,12 @@ module tape_series
   end type block_t
 
   interface
-    pure integer(c_int64_t) function size_of_work(n_operations, n_products, n_slots, n_terms) &
-      bind(c, name="size_of_work_level")
+    pure integer(c_int64_t) function size_of_work(n_unknowns, n_operations, n_products, n_slots, &
+                                                  n_terms) bind(c, name="size_of_work_level")
       !! Return the size of the working storage, in numbers.
       import :: c_int, c_int64_t
       implicit none(type, external)
-      integer(c_int), intent(in), value :: n_operations, n_products, n_slots
+      integer(c_int), intent(in), value :: n_unknowns, n_operations, n_products, n_slots
       integer(c_int), intent(in), value :: n_terms !! of all combinations
     end function size_of_work
 
@@ -211,7 +211,8 @@ contains
     n_terms = (LAST_TERM + 1)*(1 + int(tape%n_slots, int64))
     n_perturbations = SIDE_BY_SIDE*(MOST_ORDER + 1)*int(n_perturbed, int64)*n_blocks
     n_products = count(tape%operations(1, :) == PRODUCT)
-    n_work = size_of_work(tape%n_operations, n_products, tape%n_slots, size(tape%slots))
+    n_work = size_of_work(tape%n_unknowns, tape%n_operations, n_products, tape%n_slots, &
+                          size(tape%slots))
     fits = .false.
     allocate (memory(n_work + n_perturbations + n_terms + 2*SIDE_BY_SIDE), stat=failed)
     if (failed /= 0) return

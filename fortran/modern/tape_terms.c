@@ -44,10 +44,12 @@ enum { BLOCKS = (MOST_UNKNOWNS + SIDE_BY_SIDE - 1) / SIDE_BY_SIDE };
 typedef row matrix[BLOCKS][MOST_UNKNOWNS];
 
 /* Return the size of the working storage, in numbers. */
-int64_t OF_LEVEL(size_of_work, LEVEL)(int n_operations, int n_products, int n_slots, int n_terms)
+int64_t OF_LEVEL(size_of_work, LEVEL)(int n_unknowns, int n_operations, int n_products, int n_slots,
+                                      int n_terms)
 {
   struct work work;
-  return divide_work(&work, NULL, n_operations, n_products, n_slots, n_terms) / sizeof(double);
+  return divide_work(&work, NULL, n_unknowns, n_operations, n_products, n_slots, n_terms)
+         / sizeof(double);
 }
 
 /* Divide the working storage, and find the groups of operations that are interpreted. */
@@ -58,7 +60,7 @@ void OF_LEVEL(begin_work, LEVEL)(const struct tape *tape, int n_slots)
   const int derivatives = tape->n_combinations - tape->n_unknowns;
   int numbers[ABREAST], out[ABREAST], count, n_products = 0;
   for (int n = 0; n < n_operations; n++) n_products += tape->operations[n][0] == PRODUCT;
-  divide_work(work, tape->work, n_operations, n_products, n_slots,
+  divide_work(work, tape->work, tape->n_unknowns, n_operations, n_products, n_slots,
               tape->starts[tape->n_combinations] - 1);
   work->n_items = work->n_products = work->n_pairs = work->n_groups = 0;
   work->n_slots = n_slots;

@@ -174,6 +174,7 @@ def _scipy_loop(load: EnsembleLoad, setting: float, threads: int) -> Callable[[]
 
     refuse_rounding("solve_ivp", setting)
     a, b, c = coefficients()
+    end = load.horizon
     bodies = list(zip(load.omega0.tolist(), load.acceleration.tolist(), strict=True))
 
     def run() -> Array:
@@ -188,7 +189,7 @@ def _scipy_loop(load: EnsembleLoad, setting: float, threads: int) -> Callable[[]
 
             size = max(map(abs, start))
             found = solve_ivp(
-                slope, (0.0, load.horizon), start, method="DOP853", rtol=setting, atol=setting * size
+                slope, (0.0, end), start, method="DOP853", rtol=setting, atol=setting * size
             )
             ends.append(found.y[:, -1])
         return np.array(ends)

@@ -43,7 +43,7 @@ from pyharness.model.principal import in_double
 from pyharness.model.progress import bar_of_bodies, expect_bodies
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.trajectory import ROUNDING, Array
-from pyharness.model.values import Number, Numbers, boolean, checked_effort, finite
+from pyharness.model.values import Number, Numbers, boolean, checked_effort, finite, number_list
 
 _PLAIN, _TILTED = -2, -1  # kinds of scenes: about principal axes; with an inertia matrix
 _NO_DETAILS: dict[str, Any] = dict.fromkeys(("t_events", "y_events", "sensitivities", "refusals"))
@@ -173,7 +173,9 @@ def solve_many(
     }  # fmt: skip
     details = None
     method = known("method", method, PREPARED)
-    scene = scene if isinstance(scene, Scene) else list(scene)
+    if not isinstance(scene, Scene):
+        scenes: Any = number_list("scene", scene, "allowed: a Scene, or a list of scenes")
+        scene = list(scenes)
     if not only_one({"t_end": t_end, "times": times}):
         raise InputError("neither t_end nor times is given; give one of them")
     rows = None

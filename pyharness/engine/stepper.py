@@ -24,6 +24,7 @@ from pyharness.model.values import boolean, finite, number, three_floats, tolera
 
 FINEST = 1e-14  # smallest tolerance of a step
 _DEFAULT = 1e-9
+_MOST, _LOOK = 1e8, 100_000  # steps of `until`, and steps between forecasts
 
 
 class Stepper:
@@ -269,10 +270,19 @@ class Stepper:
             return np.zeros(len(self._state))
 
     def until(self, time: float) -> None:
-        """Take steps to `time` (s), later or earlier; raise InputError as `step` does."""
-        end = finite("time", time)
+        """Take steps to `time` (s), later or earlier.
+
+        Raise InputError as `step` does, or if more than 1e8 steps would be needed.
+        """
+        end, begin, first = finite("time", time), self._time, self._steps
         while self._time != end:
             self.step(end - self._time)
+            taken = self._steps - first
+            if taken % _LOOK == 0 and abs(end - begin) * taken > _MOST * abs(self._time - begin):
+                raise InputError(
+                    f"time is {end:g} s; allowed: times that 1e8 steps reach; {taken} steps "
+                    f"reached {self._time:g} s"
+                )
             # The sum of time and step is rounded.
             if abs(self._time - end) <= math.ulp(end):
                 self._time = end

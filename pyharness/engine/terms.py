@@ -15,7 +15,7 @@ from pyharness.model.numpy_calls import symbol_array
 from pyharness.model.own_states import OwnState
 from pyharness.model.state_torque import StateTorque, count_arguments, recorded
 from pyharness.model.torque_law import TorqueLaw, law_integral, law_value
-from pyharness.model.values import Number, Numbers, number_list, three
+from pyharness.model.values import Number, Numbers, boolean, number_list, three
 
 # A number stands for a multiple of the identity matrix, three numbers for a diagonal matrix.
 MatrixLike = Number | Numbers | Iterable[Numbers]
@@ -101,6 +101,7 @@ def drag(coefficients: Iterable[MatrixLike], per_axis: bool = False) -> StateTor
         count = f"more than {_MOST_COEFFICIENTS}" if given else "no"
         raise InputError(f"{where}: {count} coefficients; {allowed}")
     matrices = [matrix_of(f"{where}, number {n}", each) for n, each in enumerate(given)]
+    per_axis = boolean("[torque] drag per_axis", per_axis)
 
     def torque(time: Any, omega: Any, attitude: Any) -> Any:
         square = omega * omega if per_axis else omega @ omega
@@ -110,7 +111,7 @@ def drag(coefficients: Iterable[MatrixLike], per_axis: bool = False) -> StateTor
             total = total - matrix @ power
         return total
 
-    return ready_term("drag", torque, coefficients=matrices, per_axis=bool(per_axis))
+    return ready_term("drag", torque, coefficients=matrices, per_axis=per_axis)
 
 
 def rate_control(gain: MatrixLike, target: Numbers = (0.0, 0.0, 0.0)) -> StateTorque:

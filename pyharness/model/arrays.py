@@ -50,8 +50,11 @@ def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = N
 
 def numbers_of(where: str, values: object) -> Array:
     """Return real numbers of any type and shape as float64."""
-    if type(values) is not np.ndarray and unit_of(values):  # NumPy would drop the unit
-        number(where, values)
+    if type(values) is not np.ndarray:
+        if unit_of(values) or isinstance(values, (bytes, bytearray)):
+            number(where, values)  # NumPy would drop the unit, or read bytes as numbers
+        if hasattr(values, "filled"):  # a masked array: its masked numbers are missing
+            values = np.where(values.mask, np.nan, values.data)  # type: ignore[attr-defined]
     try:
         found = np.asarray(values)
     except Exception as error:  # rows of different lengths, or a user-defined class
@@ -121,7 +124,7 @@ def buffer_of(where: str, array: Any, shape: tuple[int, ...], kind: str) -> Any:
     It must have `shape` and the type character `kind`, such as "d", and be writable, contiguous and
     aligned.
     """
-    right = isinstance(array, np.ndarray) and array.shape == shape and array.dtype.char == kind
+    right = isinstance(array, np.ndarray) and array.shape == shape and array.dtype == kind
     if not (right and array.flags.c_contiguous and array.flags.writeable and array.flags.aligned):
         raise InputError(
             f"{where}: allowed: a writable array of {np.dtype(kind)}, shape {shape}, in one piece"

@@ -11,7 +11,7 @@ from pyharness.model.array_type import Array
 from pyharness.model.attitude import turned_to_space
 from pyharness.model.changing import Changing
 from pyharness.model.distribution import check_package, checked_axes
-from pyharness.model.errors import InputError, unknown
+from pyharness.model.errors import InputError, known
 from pyharness.model.torque_law import FRAMES, TorqueLaw
 from pyharness.model.values import Triple
 
@@ -115,8 +115,7 @@ class Conversions:
             If the body has no moments, the frame is unknown, or "space" is requested without an
             attitude.
         """
-        if frame not in FRAMES:
-            raise unknown("frame", str(frame), FRAMES)
+        frame = known("frame", frame, FRAMES)
         momentum = self._momentum(self.omega)
         return momentum if frame == "body" else turned_to_space(self._attitudes(), momentum)
 

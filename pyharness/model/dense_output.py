@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.model.array_type import Array
+from pyharness.model.arrays import numbers_of
 from pyharness.model.codes import Storage
 from pyharness.model.errors import InputError
 
@@ -196,8 +197,8 @@ class DenseOutput:
     def _at(self, t: Any, function: Callable[[Array, Array], Array]) -> Array:
         allowed = f"allowed: numbers from {self.t_min:.16g} to {self.t_max:.16g} s"
         try:
-            times = np.asarray(t, dtype=np.float64)
-        except (TypeError, ValueError):
+            times = numbers_of("t", t)
+        except InputError:
             raise InputError(f"dense output: a time is no number; {allowed}") from None
         if times.ndim > 1:
             raise InputError(f"dense output: times with {times.ndim} dimensions; allowed: one")

@@ -8,7 +8,7 @@ import numpy as np
 
 from pyharness.model.arrays import buffer_of, check_rows, only_one, rows_of, spread
 from pyharness.model.distribution import check_package, checked_axes
-from pyharness.model.errors import InputError, unknown
+from pyharness.model.errors import InputError, known
 from pyharness.model.torque_law import FRAMES
 from pyharness.model.trajectory import Array, BatchResult, turned_to_space
 
@@ -118,8 +118,7 @@ class Ensemble(BatchResult):
             If not exactly one of `moments` and `inertia` is given, or it has not one row or n rows;
             if the frame is unknown, or "space" is requested without attitudes.
         """
-        if frame not in FRAMES:
-            raise unknown("frame", str(frame), FRAMES)
+        frame = known("frame", frame, FRAMES)
         given = only_one({"moments": moments, "inertia": inertia})
         if not given:
             raise InputError("neither moments nor inertia is given; give one of them")

@@ -214,7 +214,8 @@ class Scene:
             self._set("attitude_length", length)
         # A torque may bring its states, such as the momentum of wheels.
         brought = self.torque.starts if isinstance(self.torque, StateTorque) else ()
-        self._set("states", checked_states(self.states or brought))
+        has_none = isinstance(self.states, (tuple, Mapping)) and not self.states
+        self._set("states", checked_states(brought if has_none else self.states))
         names = tuple(each.name for each in self.states)
         self._set("torque", checked_torque(self.torque, names))
         if self.torque.in_space and self.coefficients is not None:

@@ -3,6 +3,7 @@
 In this module, `own` maps each field in which the n scenes of a batch differ to its n values.
 """
 
+import sys
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -120,7 +121,10 @@ def _batch(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Batch:
     t_end = whole if solver.t_end is None else np.full(n, solver.t_end)
     t_end = own.get("t_end", t_end)
     omega = _omega(scene, own, values if body == "moments" else None, n)
-    attitude = _components("attitude", scene.attitude or IDENTITY, own, n, first=0)
+    # The axes replace numbers of the file, which are normalised afterwards.
+    length = min(scene.attitude_length, sys.float_info.max)
+    given = tuple(length * each for each in scene.attitude or IDENTITY)
+    attitude = _components("attitude", given, own, n, first=0)
     found = {"omega": omega, "attitude": attitude}
     found |= {name: own.get(name) for name in OF_PROGRAMS} | {body: values}
     if not isinstance(scene.torque, StateTorque):

@@ -279,6 +279,13 @@ def test_results_may_overlap_the_starts(law: TorqueLaw) -> None:
         solver.many(starts, times, place=omega)
 
 
+def test_a_masked_number_is_missing() -> None:
+    starts = np.ma.masked_array([[1, 2, 3], [1, 2, 3]], mask=[[False, True, False], 3 * [False]])
+    found = solve_many(TOP, 1.0, omega=starts)
+    assert found.ended.tolist() == ["overflow", "complete"]
+    assert np.isnan(found.omega[0]).all()
+
+
 def test_any_array_will_do() -> None:
     solver = prepare(TOP)
     starts = np.random.default_rng(4).standard_normal((6, 3))

@@ -8,6 +8,7 @@ import pytest
 from scipy.integrate import quad
 
 from pyharness import InputError, Scene, Stepper, solve
+from pyharness.engine import stepper as engine_stepper
 from pyharness.engine.stepped import step_lengths
 from pyharness.torques import in_space, table
 
@@ -212,6 +213,15 @@ def test_a_singular_torque_ends_the_steps() -> None:
     with pytest.raises(InputError, match="t = 1 s"):
         stepper.until(2.0)
     assert stepper.time < 1.0
+
+
+def test_a_time_that_no_steps_reach_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(engine_stepper, "_LOOK", 20)
+    stepper = Stepper(BRICK)
+    with pytest.raises(InputError, match="allowed: times that 1e8 steps reach; 20 steps reached"):
+        stepper.until(1e15)
+    stepper.until(stepper.time + 100.0)
+    assert stepper.steps > 40
 
 
 def test_a_refused_change_changes_nothing() -> None:

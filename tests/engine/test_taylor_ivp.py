@@ -230,6 +230,13 @@ def test_a_single_equation_may_return_a_number(fun: Any) -> None:
     assert found.y[0, -1] == pytest.approx(math.exp(-1.0), rel=1e-10)
 
 
+def test_many_unknowns_may_have_no_operations() -> None:
+    """Storage that was too small for the rates ended the interpreter."""
+    rates = np.linspace(0.1, 1.0, 150)
+    found = solve_ivp(lambda t, y: -y * rates, (0.0, 1.0), np.ones(150), method=Taylor, rtol=1e-10)
+    assert found.y[:, -1] == pytest.approx(np.exp(-rates), rel=1e-9)
+
+
 @pytest.mark.parametrize("begin", [-1e12, 1.7e9, 1e15])
 def test_a_late_time_is_rounded_together_with_the_step(begin: float) -> None:
     options: dict[str, Any] = {"method": Taylor, "rtol": 1e-11, "atol": 1e-11}

@@ -110,6 +110,9 @@ def test_attitudes_are_those_of_single_scenes(tmp_path: Path, torque: str) -> No
 def test_initial_attitudes_may_vary_where_a_quantity_needs_them(tmp_path: Path) -> None:
     top = 'reductions = ["attitude", {name = "pointing-error", towards = [0, 0, 1]}, "status"]'
     sweep, found = _found(tmp_path, text(axis("attitude.1", [0.0, 0.5, 1e200]), top=top))
+    scene = BASE.replace("omega =", "attitude = [2.0, 0.0, 0.0, 0.0]\nomega =")
+    _, doubled = _found(tmp_path, text(axis("attitude.1", [0.0, 1.0]), top=top, scene=scene))
+    assert doubled["attitude"] == pytest.approx(found["attitude"][:2], abs=1e-15)
     for i, x in enumerate((0.0, 0.5, 1e200)):
         rows = solve(replace(sweep.scene, attitude=(1.0, x, 0.0, 0.0)), 10.0, attitude=True)
         assert rows.attitude is not None

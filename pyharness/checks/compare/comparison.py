@@ -27,10 +27,10 @@ from pyharness.engine.registry import (
 from pyharness.engine.sensitivity import motion_growth
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.effort import check_steps
-from pyharness.model.errors import InputError, kind_of, unknown
+from pyharness.model.errors import InputError, kind_of, known, unknown
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset, switchable
 from pyharness.model.scene import Scene, checked_scene
-from pyharness.model.values import boolean
+from pyharness.model.values import boolean, number_list
 from pyharness.thesis.in_word import compiled_words
 from pyharness.thesis.programs import (
     BINARY64,
@@ -223,13 +223,10 @@ def compare_methods(
     """
     checked_scene(scene, any_state=True)
     attitude = boolean("attitude", attitude)
-    if isinstance(methods, str):
-        raise InputError(f"methods is text; allowed: a list of names, as in ['{methods}']")
     attitude = attitude or scene.torque.needs_attitude
     tolerances = {}
-    for name in methods:
-        if name not in METHODS:
-            raise unknown("method", name, METHODS)
+    for given in number_list("methods", methods, "allowed: a list of names, as in ['auto']"):
+        name = known("method", given, METHODS)
         chosen = METHODS[name]
         found = requested_tolerance(name, None if chosen.is_fixed_step else tolerance)
         if not chosen.finest <= found <= 1.0:

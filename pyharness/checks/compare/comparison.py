@@ -223,6 +223,8 @@ def compare_methods(
     """
     checked_scene(scene, any_state=True)
     attitude = boolean("attitude", attitude)
+    if isinstance(methods, str):
+        raise InputError(f"methods is text; allowed: a list of names, as in ['{methods}']")
     attitude = attitude or scene.torque.needs_attitude
     tolerances = {}
     for given in number_list("methods", methods, "allowed: a list of names, as in ['auto']"):

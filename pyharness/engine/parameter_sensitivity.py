@@ -33,7 +33,7 @@ from pyharness.model.extension import COMPLETE, GAVE_UP, extension
 from pyharness.model.scene import ImpossibleBodyWarning, Scene
 from pyharness.model.state_torque import has_switches, is_opaque
 from pyharness.model.trajectory import Trajectory
-from pyharness.model.values import number_list, triple
+from pyharness.model.values import are_several, triple
 
 # Largest tolerance of the derivatives over one period; smallest tolerance of all derivatives.
 _OF_PERIOD, _FINEST = 1e-13, 1e-15
@@ -69,13 +69,14 @@ def checked_names(
     if method not in _METHODS:
         raise InputError(f"{place}: the method is {method}; allowed: {', '.join(_METHODS)}")
     allowed = "allowed: names, as in ['omega', 'moments']"
-    given = number_list(place, names, allowed)
+    if not are_several(names):
+        raise InputError(f"{place}: {kind_of(names)}; {allowed}")
     if is_opaque(scene.torque):
         raise InputError(f"{place}: the torque is opaque; allowed: a torque that can be recorded")
     values = parameters_of(scene)
     known = [OMEGA, *([ATTITUDE] if attitude else []), *values]
     found: dict[str, None] = {}
-    for name in itertools.islice(given, _MOST_COLUMNS + 1):
+    for name in itertools.islice(names, _MOST_COLUMNS + 1):
         if not isinstance(name, str):
             raise InputError(f"{place}: {kind_of(name)}; {allowed}")
         if name == ATTITUDE and not attitude:

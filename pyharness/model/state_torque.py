@@ -17,7 +17,7 @@ from pyharness.model.own_states import OwnState
 from pyharness.model.symbols import SYMBOLS, Recorder, Symbol, recorded_twice
 from pyharness.model.tape import N_INPUTS, TIME, Tape, evaluate, float_outputs
 from pyharness.model.torque_law import FRAMES, TorqueLaw, body_torque, law_value, to_body
-from pyharness.model.values import Triple, converted, number_list, three_floats, triple
+from pyharness.model.values import Triple, are_several, converted, three_floats, triple
 
 Function = Callable[..., Any]
 _MOST_REPLAYED = 1_000_000  # operations of a torque of this project
@@ -219,7 +219,9 @@ def recorded(function: Function, states: Sequence[str] = ()) -> StateTorque:
     >>> total.at(0.0, (1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0))
     (0.5, -1.0, -1.5)
     """
-    names: tuple[Any, ...] = tuple(number_list("states", states, "allowed: a list of names"))
+    if not are_several(states):
+        raise InputError(f"states is {kind_of(states)}; allowed: a list of names")
+    names = tuple(states)
     if not all(isinstance(each, str) for each in names) or len(set(names)) < len(names):
         raise InputError(f"states: {list(names)!r}; allowed: different names, as texts")
     if names:

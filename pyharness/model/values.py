@@ -114,6 +114,12 @@ def finite(where: str, value: object) -> float:
     return found
 
 
+def are_several(names: object) -> bool:
+    """Return whether names are an iterable that is no text and no array without a dimension."""
+    is_whole = isinstance(names, (str, bytes)) or getattr(names, "shape", None) == ()
+    return isinstance(names, Iterable) and not is_whole
+
+
 def number_list(where: str, values: object, allowed: str) -> Iterable[object]:
     """Return an iterator over a user's ordered collection."""
     if not isinstance(values, (str, bytes, bytearray, Mapping, Set)):

@@ -30,7 +30,7 @@ from pyharness.model.effort import check_steps
 from pyharness.model.errors import InputError, kind_of, known, unknown
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset, switchable
 from pyharness.model.scene import Scene, checked_scene
-from pyharness.model.values import boolean, number_list
+from pyharness.model.values import are_several, boolean
 from pyharness.thesis.in_word import compiled_words
 from pyharness.thesis.programs import (
     BINARY64,
@@ -223,11 +223,11 @@ def compare_methods(
     """
     checked_scene(scene, any_state=True)
     attitude = boolean("attitude", attitude)
-    if isinstance(methods, str):
-        raise InputError(f"methods is text; allowed: a list of names, as in ['{methods}']")
+    if not are_several(methods):
+        raise InputError(f"methods is {kind_of(methods)}; allowed: a list, as in ['auto', 'rk45']")
     attitude = attitude or scene.torque.needs_attitude
     tolerances = {}
-    for given in number_list("methods", methods, "allowed: a list of names, as in ['auto']"):
+    for given in methods:
         name = known("method", given, METHODS)
         chosen = METHODS[name]
         found = requested_tolerance(name, None if chosen.is_fixed_step else tolerance)

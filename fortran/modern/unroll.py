@@ -45,6 +45,7 @@ MODULES = (
     "many_circular",
     "many_columns",
     "many_orbits",
+    "many_growth",
     "many_turns",
     "many_free",
     "many_fixed",

@@ -1,6 +1,7 @@
 module many_columns
   !! Bodies as the kernels for ensembles read them: each body in a lane, its three components in
   !! columns.
+  use, intrinsic :: iso_fortran_env, only: int64
   use bodies, only: bodies_t, i1, LANES
   use kinds, only: dp
   implicit none(type, external)
@@ -14,7 +15,10 @@ module many_columns
     logical :: in_row           !! whether the bodies are consecutive
   end type block_t
 
-  public :: columns_of, equations_of, next_block, odd_axes, put_back, times_of, turn_axes, turn_back
+  integer, parameter, public :: IN_ORDER(3) = [1, 2, 3]
+
+  public :: any_above_zero, columns_of, equations_of, next_block, odd_axes, put_back, times_of, &
+            turn_axes, turn_back, turned_order
 
 contains
 
@@ -52,35 +56,32 @@ contains
     block%there = there
   end subroutine next_block
 
-  pure subroutine columns_of(source, block, m, columns)
+  pure subroutine columns_of(source, block, m, columns, order)
     !! Copy three numbers of each body of a block into its lane. Lanes without a body repeat the
     !! last body.
     real(dp), intent(in), contiguous :: source(:, :)
     type(block_t), intent(in) :: block
     integer, intent(in) :: m         !! number of lanes to fill
     real(dp), intent(inout) :: columns(LANES, 3)
-    integer :: first, i, j, there
+    integer, intent(in) :: order(3)  !! column of each number
+    integer :: i, j, there
 
     there = min(m, block%there)
     if (size(source, 2) == 1) then
       do j = 1, 3
         do i = 1, m
-          columns(i, j) = source(j, 1)
+          columns(i, order(j)) = source(j, 1)
         end do
       end do
       return
     else if (block%in_row) then
-      first = block%at(1) - 1
-      do i = 1, there
-        columns(i, 1) = source(1, first + i)
-        columns(i, 2) = source(2, first + i)
-        columns(i, 3) = source(3, first + i)
-      end do
+      call separate(there, source(:, block%at(1):), columns(:, order(1)), columns(:, order(2)), &
+                    columns(:, order(3)))
     else
-      do i = 1, there
-        columns(i, 1) = source(1, block%at(i))
-        columns(i, 2) = source(2, block%at(i))
-        columns(i, 3) = source(3, block%at(i))
+      do j = 1, 3
+        do i = 1, there
+          columns(i, order(j)) = source(j, block%at(i))
+        end do
       end do
     end if
     do j = 1, 3
@@ -89,6 +90,35 @@ contains
       end do
     end do
   end subroutine columns_of
+
+  pure subroutine separate(n, source, first, second, third)
+    !! Copy the numbers of consecutive bodies. As the shape is known, this becomes vector code.
+    integer, intent(in) :: n
+    real(dp), intent(in) :: source(3, n)
+    real(dp), dimension(n), intent(inout) :: first, second, third
+    integer :: i
+
+    do i = 1, n
+      first(i) = source(1, i)
+      second(i) = source(2, i)
+      third(i) = source(3, i)
+    end do
+  end subroutine separate
+
+  pure function any_above_zero(n, x) result(found)
+    !! Return whether one of n numbers is above 0; unlike that of maxval, the loop is vector code.
+    integer, intent(in) :: n
+    real(dp), intent(in) :: x(n)
+    logical :: found
+    integer(int64) :: one
+    integer :: i
+
+    one = 0
+    do i = 1, n
+      one = ior(one, merge(1_int64, 0_int64, x(i) > 0.0_dp))
+    end do
+    found = one /= 0
+  end function any_above_zero
 
   pure subroutine times_of(times, block, m, t)
     !! Copy the time of each body of a block into its lane.
@@ -107,28 +137,39 @@ contains
     end if
   end subroutine times_of
 
-  pure subroutine put_back(block, columns, results)
+  pure subroutine put_back(block, columns, results, order)
     !! Copy three numbers of each body from its lane to its column of the results.
     type(block_t), intent(in) :: block
     real(dp), intent(in) :: columns(LANES, 3)
     real(dp), intent(inout), contiguous :: results(:, :)
-    integer :: first, i
+    integer, intent(in) :: order(3) !! column of each number
+    integer :: i, j
 
     if (block%in_row) then
-      first = block%at(1) - 1
-      do i = 1, block%there
-        results(1, first + i) = columns(i, 1)
-        results(2, first + i) = columns(i, 2)
-        results(3, first + i) = columns(i, 3)
-      end do
+      call join(block%there, columns(:, order(1)), columns(:, order(2)), columns(:, order(3)), &
+                results(:, block%at(1):))
     else
-      do i = 1, block%there
-        results(1, block%at(i)) = columns(i, 1)
-        results(2, block%at(i)) = columns(i, 2)
-        results(3, block%at(i)) = columns(i, 3)
+      do j = 1, 3
+        do i = 1, block%there
+          results(j, block%at(i)) = columns(i, order(j))
+        end do
       end do
     end if
   end subroutine put_back
+
+  pure subroutine join(n, first, second, third, results)
+    !! Undo `separate`.
+    integer, intent(in) :: n
+    real(dp), dimension(n), intent(in) :: first, second, third
+    real(dp), intent(inout) :: results(3, n)
+    integer :: i
+
+    do i = 1, n
+      results(1, i) = first(i)
+      results(2, i) = second(i)
+      results(3, i) = third(i)
+    end do
+  end subroutine join
 
   pure subroutine equations_of(bodies, block, m, a, moments)
     !! Compute A, B, C of equations 13-15, and the divisors of a torque: the moments, or 1 if the
@@ -141,11 +182,11 @@ contains
     integer :: i
 
     if (.not. bodies%by_moments) then
-      call columns_of(bodies%body, block, m, a)
+      call columns_of(bodies%body, block, m, a, IN_ORDER)
       moments(:m, :) = 1.0_dp
       return
     end if
-    call columns_of(bodies%body, block, m, moments)
+    call columns_of(bodies%body, block, m, moments, IN_ORDER)
     do i = 1, m
       ! Moments that are not all above 0 give NaN, which every later check of a body finds.
       least = min(moments(i, 1), moments(i, 2), moments(i, 3))
@@ -175,6 +216,16 @@ contains
       if (min(with1, with2, with3) > 0.0_dp) odd(i) = 0.0_dp
     end do
   end subroutine odd_axes
+
+  pure function turned_order(odd) result(order)
+    !! Return the column to which turn_axes moves each axis.
+    real(dp), intent(in) :: odd
+    integer :: order(3)
+
+    order = [2, 3, 1]
+    if (odd > 1.0_dp) order = IN_ORDER
+    if (odd > 2.0_dp) order = [3, 1, 2]
+  end function turned_order
 
   pure subroutine turn_axes(m, odd, v)
     !! Permute the axes cyclically, so that the odd axis becomes the second column.

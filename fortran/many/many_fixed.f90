@@ -8,8 +8,8 @@ module many_fixed
   use bodies, only: A_GROUP, bodies_t, i1, LANES, NEEDS_FALLBACK
   use interruption, only: interrupt_raised
   use kinds, only: dp
-  use many_columns, only: block_t, columns_of, equations_of, next_block, odd_axes, put_back, &
-                          times_of, turn_axes, turn_back
+  use many_columns, only: block_t, columns_of, equations_of, IN_ORDER, next_block, odd_axes, &
+                          put_back, times_of, turn_axes, turn_back
   use methods, only: IMPROVED_EULER, RK4, TAYLOR_3
   use statuses, only: COMPLETE
   implicit none(type, external)
@@ -64,9 +64,9 @@ contains
       if (block%there == 0) exit
       m = PAIR*((block%there + PAIR - 1)/PAIR)
       call equations_of(bodies, block, m, a, moments)
-      call columns_of(bodies%constant, block, m, constant)
+      call columns_of(bodies%constant, block, m, constant, IN_ORDER)
       constant(:m, :) = constant(:m, :)/moments(:m, :)
-      call columns_of(bodies%omega0, block, m, w)
+      call columns_of(bodies%omega0, block, m, w, IN_ORDER)
       call times_of(bodies%times, block, m, t)
       call odd_axes(m, a, s%odd)
       call turn_axes(m, s%odd, a)
@@ -79,7 +79,7 @@ contains
       call lengthen(m, last, s)
       call advance(method, m, 1_int64, s)
       call scale_back(m, last, s, w)
-      call put_back(block, w, omega)
+      call put_back(block, w, omega, IN_ORDER)
       do i = 1, block%there
         status(block%at(i)) = merge(int(COMPLETE, i1), NEEDS_FALLBACK, &
                                     abs(w(i, 1)) + abs(w(i, 2)) + abs(w(i, 3)) <= huge(h))

@@ -7,8 +7,8 @@ module many_free
   use bodies, only: A_GROUP, bodies_t, i1, LANES, NEEDS_FALLBACK, put_estimates, with_attitude
   use kinds, only: dp
   use many_circular, only: sine_cosine_lanes
-  use many_columns, only: block_t, columns_of, equations_of, next_block, odd_axes, put_back, &
-                          times_of, turn_axes, turn_back
+  use many_columns, only: any_above_zero, block_t, columns_of, equations_of, IN_ORDER, next_block, &
+                          odd_axes, put_back, times_of, turn_axes, turn_back, turned_order
   use many_growth, only: ask_again, bound_phase, ROUNDING, UNSURE
   use many_orbits, only: LEVELS, orbits_t
   use many_turns, only: put_attitudes, turns_t, turn_bodies
@@ -39,39 +39,42 @@ contains
     real(dp), dimension(LANES, 3) :: a, w, moments
     real(dp) :: t(LANES)
     type(block_t) :: block
-    logical :: is_first, is_turned, is_estimated
+    logical :: is_first, is_turned, is_estimated, each_own
+    integer :: order(3) ! column of each component; with one body's moments, axes need no turn
     integer :: i, m
 
     call c_f_pointer(bodies_at, bodies)
     block%last = 0
     is_first = .true.
+    each_own = size(bodies%body, 2) > 1
+    order = IN_ORDER
     is_turned = with_attitude(bodies)
     is_estimated = size(bodies%estimates) > 0
     do
       call next_block(n, status, bodies%mark, block)
       if (block%there == 0) exit
       m = A_GROUP*((block%there + A_GROUP - 1)/A_GROUP)
-      if (is_first .or. size(bodies%body, 2) > 1) then
+      if (is_first .or. each_own) then
         call equations_of(bodies, block, m, a, moments)
         call odd_axes(m, a, o%odd)
+        if (.not. each_own) order = turned_order(o%odd(1))
         call turn_axes(m, o%odd, a)
         if (is_turned) call turn_axes(m, o%odd, moments)
       end if
-      call columns_of(bodies%omega0, block, m, w)
-      call turn_axes(m, o%odd, w)
+      call columns_of(bodies%omega0, block, m, w, order)
+      if (each_own) call turn_axes(m, o%odd, w)
       if (is_first .or. size(bodies%times) > 1) call times_of(bodies%times, block, m, t)
       is_first = .false.
       call begin(m, bodies%tolerance, a, w, o)
-      call climb(m, o)
       call turn(m, t, o)
-      if (maxval(o%unsure(1:m)) > 0.0_dp) call bound_phase(m, bodies%tolerance, a, t, o)
+      if (any_above_zero(m, o%unsure)) call bound_phase(m, bodies%tolerance, a, t, o)
       if (is_turned) then
         turns%sine(:m) = o%sine(:m)
         turns%cosine(:m) = o%cosine(:m)
       end if
       call descend(m, o)
       call finish(m, o, w)
-      if (is_estimated .or. maxval(o%unsure(1:m)) > 0.0_dp) then
+      if (is_estimated .or. any_above_zero(m, o%unsure)) then
         call ask_again(m, bodies%tolerance, a, w, t, o)
       end if
       if (is_turned) then
@@ -79,12 +82,12 @@ contains
         call turn_back(m, o%odd, turns%vector)
         call put_attitudes(m, bodies, block, turns, o%error)
       end if
-      call turn_back(m, o%odd, w)
-      call put_back(block, w, omega)
+      if (each_own) call turn_back(m, o%odd, w)
+      call put_back(block, w, omega, order)
       do i = 1, block%there
         if (.not. o%error(i) <= bodies%tolerance) o%unsure(i) = 1.0_dp
       end do
-      if (block%in_row .and. .not. maxval(o%unsure(:block%there)) > 0.0_dp) then
+      if (block%in_row .and. .not. any_above_zero(block%there, o%unsure)) then
         status(block%at(1):block%at(block%there)) = COMPLETE
       else
         do i = 1, block%there
@@ -152,9 +155,7 @@ contains
       gap = abs(gap)
       o%a(i, 0) = sqrt(o%modulus(i))
       o%b(i, 0) = sqrt(s2*gap)
-      ! Where cancellation makes the gap small, the frequency has the relative rounding error of the
-      ! gap.
-      o%error(i) = ERROR*(left + right)/gap
+      o%error(i) = ERROR*(left + right)
       if (.not. o%odd(i) > 0.0_dp) o%error(i) = NEVER
       ! In units of the square roots of the coefficients, the symmetric part of the Jacobian matrix
       ! has the norm (s1 s3)**(1/2) omega2. The amplification is at most the exponential of its
@@ -167,37 +168,41 @@ contains
     end do
   end subroutine begin
 
-  pure subroutine climb(m, o)
-    !! Compute the arithmetic-geometric mean, with the same number of levels for all lanes.
-    integer, intent(in) :: m
-    type(orbits_t), intent(inout) :: o
-    integer :: i, n
-
-    do i = 1, m
-      !GCC$ unroll 5
-      do n = 1, LEVELS
-        o%a(i, n) = 0.5_dp*(o%a(i, n - 1) + o%b(i, n - 1))
-        if (n < LEVELS) o%b(i, n) = sqrt(o%a(i, n - 1)*o%b(i, n - 1))
-      end do
-      o%half(i) = 0.5_dp*(o%a(i, LEVELS - 1) - o%b(i, LEVELS - 1))
-    end do
-  end subroutine climb
-
   pure subroutine turn(m, t, o)
-    !! Compute sine and cosine of the phase, with the effect of the modulus that remains: sn : cn is
+    !! Compute the arithmetic-geometric mean, with the same number of levels for all lanes, and sine
+    !! and cosine of the phase, with the effect of the modulus that remains: sn : cn is
     !! tan (1 + k**2/4), dn is 1 - k**2/2 sin**2.
     integer, intent(in) :: m
     real(dp), intent(in) :: t(LANES) !! s
     type(orbits_t), intent(inout) :: o
-    real(dp) :: last, inverse, square, error
-    integer :: i
+    real(dp) :: gap, mean, inverse, q, part, last, square, error
+    integer :: i, n
 
     do i = 1, m
-      last = o%a(i, LEVELS)
-      inverse = 1.0_dp/last
-      square = (o%half(i)*inverse)*(o%half(i)*inverse)
-      error = o%error(i)
-      if (.not. o%half(i) <= NEARLY_CIRCULAR*last) error = NEVER
+      !GCC$ unroll 4
+      do n = 1, LEVELS - 1
+        o%a(i, n) = 0.5_dp*(o%a(i, n - 1) + o%b(i, n - 1))
+        if (n < LEVELS - 1) o%b(i, n) = sqrt(o%a(i, n - 1)*o%b(i, n - 1))
+      end do
+      ! Square roots and divisions take most of the time: one division serves both the gap and the
+      ! mean, and the last geometric mean is the series of mean (1 - q)**(1/2).
+      gap = abs(o%gap(i))
+      mean = o%a(i, LEVELS - 1)
+      inverse = 1.0_dp/(gap*mean)
+      ! Where cancellation makes the gap small, the frequency has the relative rounding error of the
+      ! gap.
+      error = o%error(i)*(inverse*mean)
+      if (.not. o%error(i) < NEVER) error = NEVER
+      inverse = inverse*gap
+      q = 0.5_dp*(o%a(i, LEVELS - 2) - o%b(i, LEVELS - 2))*inverse
+      q = q*q
+      part = q*(0.25_dp + q*(0.0625_dp + q*(0.03125_dp + q*0.01953125_dp)))
+      inverse = inverse*(1.0_dp + part*(1.0_dp + part*(1.0_dp + part*(1.0_dp + part))))
+      last = mean - part*mean
+      o%b(i, LEVELS - 1) = last - part*mean
+      o%a(i, LEVELS) = last
+      square = (part*mean*inverse)*(part*mean*inverse)
+      if (.not. part*mean <= NEARLY_CIRCULAR*last) error = NEVER
       o%numerator(i) = 0.5_dp*square
       o%denominator(i) = inverse*(1.0_dp + 0.25_dp*square)
       ! One more level of the mean would subtract this term.

@@ -19,7 +19,6 @@ module many_orbits
     real(dp), dimension(LANES) :: unsure    !! 1 if no bound of the amplification suffices so far
     real(dp), dimension(LANES) :: growth    !! last bound of the amplification, if it was computed
     real(dp), dimension(LANES, 0:LEVELS) :: a, b !! the two means, level by level
-    real(dp), dimension(LANES) :: half      !! half of the difference of the last means but one
     real(dp), dimension(LANES) :: mean      !! the mean in the limit
     real(dp), dimension(LANES) :: phase     !! at the end, rad
     real(dp), dimension(LANES) :: sine, cosine !! in the ratio of sn and cn

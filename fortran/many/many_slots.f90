@@ -3,7 +3,7 @@ module many_slots
   use, intrinsic :: iso_fortran_env, only: int64
   use bodies, only: acts, bodies_t, i1, LANES, MOST_WAVES, of_body, with_attitude
   use kinds, only: dp
-  use many_columns, only: block_t, columns_of, equations_of, next_block, times_of
+  use many_columns, only: block_t, columns_of, equations_of, IN_ORDER, next_block, times_of
   use problem, only: problem_t
   use series, only: LONG, MOST_ORDER
   use taylor_plan, only: add_wave_rates, first_step, local_tolerance_of, steady_rates
@@ -117,9 +117,9 @@ contains
     r%taken = 0
     if (r%block%there == 0) return
     tolerance = bodies%tolerance
-    call columns_of(bodies%omega0, r%block, LANES, r%w)
-    call columns_of(bodies%constant, r%block, LANES, r%constant)
-    call columns_of(bodies%rate, r%block, LANES, r%rate)
+    call columns_of(bodies%omega0, r%block, LANES, r%w, IN_ORDER)
+    call columns_of(bodies%constant, r%block, LANES, r%constant, IN_ORDER)
+    call columns_of(bodies%rate, r%block, LANES, r%rate, IN_ORDER)
     call equations_of(bodies, r%block, LANES, r%a, moments)
     r%constant = r%constant/moments
     r%rate = r%rate/moments

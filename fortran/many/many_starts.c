@@ -60,10 +60,10 @@ static int enter(const many_starts *self, PyArrayObject *packed, int n, const do
 {
   const int n_packed = (int)PyArray_DIM(packed, 0);
   const double *numbers = PyArray_DATA(packed);
-  int given_up = 0, raised = 0, is_complete = 1;
+  int given_up = 0, raised = 0, others = 0;
   self->address(numbers, &n_packed, &n, start, &n_times, times, &given_up, omega, status, &raised);
-  for (int i = 0; i < n && is_complete; i++) is_complete = status[i] == COMPLETE;
-  return is_complete;
+  for (int i = 0; i < n; i++) others |= status[i] ^ COMPLETE;
+  return others == 0;
 }
 
 static PyObject *call(PyObject *object, PyObject *const *given, size_t n_given, PyObject *names)

@@ -118,9 +118,9 @@ def test_loops_over_bodies_are_vector_code() -> None:
     there = {int(n) for n in re.findall(rf"{name}:(\d+):\d+: optimized: loop vec", done.stderr)}
     scalar, loops, place = set(), 0, ""
     for number, line in enumerate((build / name).read_text().splitlines(), 1):
-        if found := re.match(r" *(?:pure )?subroutine (\w+)", line):
+        if found := re.match(r" *(?:pure )?(?:subroutine|function) (\w+)", line):
             place = found[1]
-        elif line.strip() == "do i = 1, m":
+        elif line.strip() in {"do i = 1, m", "do i = 1, n"}:
             loops += 1
             scalar |= set() if number in there else {place}
     assert loops > 20

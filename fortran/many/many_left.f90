@@ -3,6 +3,7 @@ module many_left
   !! other.
   use, intrinsic :: iso_fortran_env, only: int64
   use bodies, only: acts, bodies_t, coefficients_of, i1, NEEDS_FALLBACK, of_body, put_estimates
+  use interruption, only: interrupt_raised
   use kinds, only: dp
   use nearness, only: bring_near_one
   use many_kinds, only: is_sphere, single_code
@@ -26,6 +27,8 @@ module many_left
   real(dp), parameter :: COARSE = 1e-3_dp, LITTLE_WORK = 5e-3_dp
   real(dp), parameter :: HARDLY_ANY = 1e300_dp ! steps: so many that their roundings average out
 
+  integer, parameter :: BETWEEN_LOOKS = 1024 ! bodies between polls for an interrupt
+
   public :: solve_left, solve_left_with_attitude
 
 contains
@@ -47,6 +50,8 @@ contains
     raised = 0
     is_estimated = size(bodies%estimates) > 0
     do i = 1, bodies%n
+      if (mod(i, BETWEEN_LOOKS) == 0) raised = interrupt_raised()
+      if (raised /= 0) return
       if (status(i) /= NEEDS_FALLBACK) cycle
       time = bodies%times(of_body(size(bodies%times), i))
       if (size(packed) > 0) then
@@ -70,7 +75,6 @@ contains
       end if
       status(i) = int(ended, i1)
       if (ended == INTERRUPTED) raised = 1
-      if (raised /= 0) return
     end do
   end subroutine solve_left
 
@@ -90,6 +94,8 @@ contains
     raised = 0
     is_estimated = size(bodies%estimates) > 0
     do i = 1, bodies%n
+      if (mod(i, BETWEEN_LOOKS) == 0) raised = interrupt_raised()
+      if (raised /= 0) return
       if (status(i) /= NEEDS_FALLBACK) cycle
       call pack(bodies, i, code, own, n_own)
       if (.not. is_body(bodies, i, own(:n_own - 1))) then
@@ -114,7 +120,6 @@ contains
       bodies%attitude(:, i) = state(4:)
       status(i) = int(ended, i1)
       if (ended == INTERRUPTED) raised = 1
-      if (raised /= 0) return
     end do
   end subroutine solve_left_with_attitude
 

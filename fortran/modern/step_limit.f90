@@ -63,8 +63,9 @@ contains
     if (real(steps, dp) >= limit%most_steps &
         .or. (steps == 1 .and. .not. is_cut .and. ahead > HOPELESS*limit%most_steps)) then
       status = GAVE_UP
-    else if (interrupt_raised() /= 0) then
-      status = INTERRUPTED
+    else if (steps > 1) then
+      ! A poll takes as long as a step or two.
+      if (interrupt_raised() /= 0) status = INTERRUPTED
     end if
   end subroutine check_steps
 

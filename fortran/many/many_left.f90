@@ -27,7 +27,7 @@ module many_left
   real(dp), parameter :: COARSE = 1e-3_dp, LITTLE_WORK = 5e-3_dp
   real(dp), parameter :: HARDLY_ANY = 1e300_dp ! steps: so many that their roundings average out
 
-  integer, parameter :: BETWEEN_LOOKS = 1024 ! bodies between polls for an interrupt
+  integer, parameter :: BETWEEN_LOOKS = 64 ! bodies between polls for an interrupt
 
   public :: solve_left, solve_left_with_attitude
 
@@ -45,14 +45,16 @@ contains
     real(dp) :: found(2), time
     integer(int64) :: steps
     logical :: is_estimated
-    integer :: ended, i, n_own
+    integer :: alone, ended, i, n_own
 
     raised = 0
+    alone = 0
     is_estimated = size(bodies%estimates) > 0
     do i = 1, bodies%n
-      if (mod(i, BETWEEN_LOOKS) == 0) raised = interrupt_raised()
-      if (raised /= 0) return
       if (status(i) /= NEEDS_FALLBACK) cycle
+      alone = alone + 1
+      if (mod(alone, BETWEEN_LOOKS) == 0) raised = interrupt_raised()
+      if (raised /= 0) return
       time = bodies%times(of_body(size(bodies%times), i))
       if (size(packed) > 0) then
         call solve_prepared(packed, size(packed), bodies%omega0(:, i), time, omega(:, i), ended, &
@@ -89,14 +91,16 @@ contains
     real(dp) :: start(7), state(7), found(2), time
     integer(int64) :: steps
     logical :: is_estimated
-    integer :: ended, i, n_own, power
+    integer :: alone, ended, i, n_own, power
 
     raised = 0
+    alone = 0
     is_estimated = size(bodies%estimates) > 0
     do i = 1, bodies%n
-      if (mod(i, BETWEEN_LOOKS) == 0) raised = interrupt_raised()
-      if (raised /= 0) return
       if (status(i) /= NEEDS_FALLBACK) cycle
+      alone = alone + 1
+      if (mod(alone, BETWEEN_LOOKS) == 0) raised = interrupt_raised()
+      if (raised /= 0) return
       call pack(bodies, i, code, own, n_own)
       if (.not. is_body(bodies, i, own(:n_own - 1))) then
         status(i) = int(REFUSED, i1)

@@ -93,7 +93,7 @@ contains
     real(dp), intent(in) :: sizes(:)
     type(transitions_t), intent(in) :: transitions
     real(dp), intent(out) :: growth, blur !! relative
-    real(dp) :: unit(ROWS, MOST_UNKNOWNS), open_block(ROWS, MOST_UNKNOWNS)
+    real(dp) :: unit(ROWS, MOST_UNKNOWNS), open_block(ROWS, MOST_UNKNOWNS), weights(ROWS)
     integer :: i, m
 
     associate (n => transitions%n)
@@ -102,10 +102,12 @@ contains
         unit(i, i) = 1.0_dp
       end do
       open_block(:, :n) = padded(n, matrix)
+      weights = 0.0_dp
+      where (sizes(:n) > 0.0_dp) weights(:n) = 1.0_dp/sizes(:n)
       growth = 1.0_dp
       blur = 0.0_dp
-      call grow(transitions%closed, open_block, sum_of_squares(n, unit, sqrt(noise), sizes) &
-                + sum_of_squares(n, open_block, sqrt(noise), sizes))
+      call grow(transitions%closed, open_block, sum_of_squares(n, unit, sqrt(noise), weights) &
+                + sum_of_squares(n, open_block, sqrt(noise), weights))
     end associate
     do m = 1, transitions%closed
       if (transitions%has_row(m)) call grow(m, unit, 0.0_dp)
@@ -124,15 +126,15 @@ contains
       associate (t => transitions, n => transitions%n)
         product = behind
         squares = noise_behind
-        growth = max(growth, norm(n, product, sizes))
+        growth = max(growth, norm(n, product, sizes, weights))
         do m = last, 1, -1
           if (growth >= LARGEST) exit
           ! The errors of a block are at its beginning or its end.
           noise_of_block(:n) = sqrt(t%noise(:n, m))
-          squares = squares + sum_of_squares(n, product, noise_of_block, sizes)
+          squares = squares + sum_of_squares(n, product, noise_of_block, weights)
           product(:, :n) = bounded(composed(n, product, t%matrices(:, :, m)))
-          squares = squares + sum_of_squares(n, product, noise_of_block, sizes)
-          growth = max(growth, norm(n, product, sizes))
+          squares = squares + sum_of_squares(n, product, noise_of_block, weights)
+          growth = max(growth, norm(n, product, sizes, weights))
         end do
         blur = max(blur, min(LARGEST, sqrt(squares)))
       end associate
@@ -140,28 +142,26 @@ contains
 
   end subroutine find_growth
 
-  pure real(dp) function norm(n, a, sizes)
+  pure real(dp) function norm(n, a, sizes, weights)
     !! Return nearly the largest singular value of a matrix of relative perturbations; 1 for a
     !! rotation, and for damped motions.
     integer, intent(in) :: n
     real(dp), intent(in) :: a(ROWS, MOST_UNKNOWNS)
-    real(dp), intent(in) :: sizes(:)
+    real(dp), intent(in) :: sizes(:), weights(ROWS)
 
-    norm = real(1 - count(sizes(:n) > 0.0_dp), dp) + sum_of_squares(n, a, sizes, sizes)
+    norm = real(1 - count(sizes(:n) > 0.0_dp), dp) + sum_of_squares(n, a, sizes, weights)
     norm = min(LARGEST, sqrt(max(1.0_dp, norm)))
   end function norm
 
-  pure real(dp) function sum_of_squares(n, a, perturbations, sizes)
+  pure real(dp) function sum_of_squares(n, a, perturbations, weights)
     !! Return the square of the relative perturbation to which a matrix changes independent ones.
     integer, intent(in) :: n
     real(dp), intent(in) :: a(ROWS, MOST_UNKNOWNS)
     real(dp), intent(in) :: perturbations(:)
-    real(dp), intent(in) :: sizes(:)
-    real(dp) :: weights(ROWS), squares(SIDE)
+    real(dp), intent(in) :: weights(ROWS) !! of the rows, which make the unknowns comparable
+    real(dp) :: squares(SIDE)
     integer :: first, j
 
-    weights = 0.0_dp
-    where (sizes(:n) > 0.0_dp) weights(:n) = 1.0_dp/sizes(:n)
     squares = 0.0_dp
     do j = 1, n
       do first = 0, n - 1, SIDE

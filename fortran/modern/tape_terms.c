@@ -21,7 +21,8 @@ struct block {
   double sizes[SIDE_BY_SIDE];
 };
 
-enum { FIRST_CHECKED = 5 }; /* term of a perturbation: most steps need it and the next one */
+/* Terms of a perturbation that are first checked: most steps need them and the next one. */
+enum { FIRST_CHECKED = 5, FIRST_OF_LONG = 8 };
 enum { SMALL_TERMS = 3, MOST_TRIES = 60 }; /* last terms of derivatives that are small; cuts of a step */
 #define SHORTER 0.7        /* factor of a cut */
 #define DECAYED 1e-100     /* largest perturbation beside which the error counts */
@@ -64,6 +65,9 @@ void OF_LEVEL(begin_work, LEVEL)(const struct tape *tape, int n_slots)
               tape->starts[tape->n_combinations] - 1);
   work->n_items = work->n_products = work->n_pairs = work->n_groups = 0;
   work->n_slots = n_slots;
+  /* Of three unknowns, perturb_with leaves lanes out that sum_perturbations reads. */
+  if (IN_REGISTER < SIDE_BY_SIDE && tape->n_unknowns == 3 && tape->v)
+    memset(perturbations_of(tape) + FIRST_UNKNOWN, 0, 3 * sizeof(perturbations));
   if (tape->leaves) return;
   work->combinations[0].slots = work->slots;
   work->combinations[0].coefficients = work->coefficients;
@@ -657,7 +661,7 @@ int OF_LEVEL(perturb_tape, LEVEL)(const struct tape *tape, int number, double h,
     else perturb_all(n, FEW_NODES, v, jacobian, k++);
     power *= factor;
     was_small = is_small;
-    is_small = k >= FIRST_CHECKED && are_small(tape, k, weights, power, limits, count);
+    is_small = k >= (is_long ? FIRST_OF_LONG : FIRST_CHECKED) && are_small(tape, k, weights, power, limits, count);
     /* Every other term may be zero. */
     is_short = !(is_small && was_small);
   } while (is_short && k < order);

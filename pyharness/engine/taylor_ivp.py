@@ -14,6 +14,7 @@ from numpy.polynomial.polynomial import polyval
 from scipy.integrate import DenseOutput, OdeSolver
 
 from pyharness.engine.recorded import LONGEST_TRIAL, Step, kernel_tape, taylor_step
+from pyharness.model.arrays import numbers_of
 from pyharness.model.errors import InputError
 from pyharness.model.numpy_calls import called_once, symbol_array
 from pyharness.model.symbols import Recorder, recorded_twice
@@ -222,8 +223,8 @@ def _tolerances(rtol: Any, atol: Any, n: int) -> tuple[Array, Array]:
     found = []
     for name, value in (("rtol", rtol), ("atol", atol)):
         try:
-            given = np.asarray(value, dtype=float)
-        except (OverflowError, TypeError, ValueError):
+            given = numbers_of(name, value)
+        except InputError:
             raise InputError(f"{name} is {value!r}; allowed: a number, or {n} numbers") from None
         if given.shape not in ((), (n,)):
             raise InputError(f"{name} has shape {given.shape}; allowed: a number, or shape ({n},)")

@@ -44,6 +44,7 @@ IN_SPACE = replace(PUSHED, torque=TorqueLaw((1.0, 2.0, 3.0), frame="space"))
 RECORDED = replace(FREE, torque=torques.wheels((1.0, 2.0, 3.0)))
 SPHERE = replace(CROWDED, moments=(40.0, 40.0, 40.0))
 BUSY = replace(FREE, torque=TorqueLaw(cosines=_waves(300)), step_size=1e-6, steps=1_000_000)
+UNIT = (1.0, 0.0, 0.0, 0.0)
 TIMES = [0.001 * n for n in range(1, 50_000)]
 
 
@@ -75,6 +76,12 @@ def _bodies(method: str, threads: int) -> object:
     )
 
 
+def _alone(attitude: object) -> object:
+    """Return bodies that the single-body kernel solves in one step each."""
+    starts = np.full((3000, 3), CROWDED.omega)
+    return solve_many(CROWDED, 1e-3, omega=starts, tolerance=1e-12, threads=1, attitude=attitude)
+
+
 LONG: dict[str, Callable[[], object]] = {
     "taylor": _method(PUSHED, "taylor", 1e5),
     "taylor-waves": _method(CROWDED, "taylor", 1e5),
@@ -101,6 +108,7 @@ LONG: dict[str, Callable[[], object]] = {
     "bodies-recorded": lambda: solve_many(
         RECORDED, 200.0, omega=np.full((60_000, 3), RECORDED.omega), tolerance=1e-6, threads=1
     ),
+    **{f"bodies-alone-{name}": partial(_alone, q) for name, q in (("omega", None), ("q", UNIT))},
     "linear-solver": _linear,
     "dop853": _method(PUSHED, "dop853", 1e4, 1e-3),
     "lsoda": _method(PUSHED, "lsoda", 1e4, 1e-3),

@@ -279,7 +279,7 @@ class _Equations:
 
     `velocity` adds dV/dt = F/m - omega x V, with force F and mass m; an attitude adds dq/dt =
     q (0, omega)/2. For a changing inertia I and a torque N the equations are (I omega)' = N - omega
-    x (I omega), without `coefficients` (A, B, C).
+    x (I omega); otherwise `coefficients` are A, B, C. `TapeSeries` explains `change`, `results`.
     """
 
     def __init__(

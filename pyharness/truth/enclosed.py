@@ -120,7 +120,7 @@ def _decimal(x: Fraction, digits: int) -> str:
 
 
 def scales_of(coefficients: Sequence[Fraction]) -> list[float]:
-    """Return the units in which proofs measure errors of the components of omega, at most 1.
+    """Return the units in which proofs measure errors of the components of omega.
 
     They are the square roots of abs(A), abs(B) and abs(C) over the largest of these, but at least
     0.01. If all are above 0.01, the logarithmic norm of the Jacobian is 0 for rotations about the

@@ -279,10 +279,10 @@ def _pivoting(matrix: Fractions, order: Sequence[int], sizes: Fractions) -> tupl
 def _columns(
     matrix: Fractions, order: Sequence[int] | None = None
 ) -> Iterator[tuple[int, dict[int, Fraction], Fractions]]:
-    """Eliminate a matrix exactly; yield pivot row, candidates and rows before each column.
+    """Eliminate a matrix exactly; before each column, yield the pivot's row number and all rows.
 
-    A candidate is an element's magnitude over the largest in its row of `matrix`. Without `order`,
-    the largest candidate becomes the pivot, as in LEQT1F.
+    The candidates between them are elements' magnitudes over the largest in their rows of `matrix`.
+    `order` has the pivots' rows; by default the largest candidate is the pivot, as in LEQT1F.
     """
     rows = matrix.copy()
     scale = 1 / abs(matrix).max(axis=1)

@@ -70,7 +70,7 @@ class Conditioning:
     largest: float  # largest abs(omega) until the end (rad/s)
 
     def limit(self, made: float, steps: float = 0.0) -> float:
-        """Return the largest final error that omega may have, over `largest`."""
+        """Return the largest error of omega at the end, relative to `largest`."""
         allowed = made * self.amplification + self.rounding + steps * self.storing
         # NaN allows no error.
         return 0.0 if math.isnan(allowed) else min(2.0, allowed)

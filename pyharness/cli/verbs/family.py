@@ -22,8 +22,8 @@ OPTIONS = {
     "--corrections K": "Number of times that each step corrects its first estimate, 0 to 100 "
     "(default 1).",
     "--lost": "Instead of measuring orders, try mistakes that may explain the failure of three "
-    "programs that the thesis does not print (section IV.2). The list begins with the mistakes "
-    "that make the most of the three fail.",
+    "programs that the thesis does not print (section IV.2). Mistakes that make more of the three "
+    "fail come first.",
     "--word W": "Floating-point arithmetic of the programs of --lost: "
     f"{', '.join(WORD_NAMES)} (default {WORD_NAMES[0]}). cdc48 is the arithmetic of CDC computers, "
     "which truncates results; cdc48-rounded rounds them.",

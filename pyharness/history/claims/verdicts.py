@@ -157,9 +157,9 @@ def growing(lab: Laboratory, case: int) -> Judged:
 
 
 def search(lab: Laboratory, case: int) -> Judged:
-    """Return "not testable" for the claim that Runge-Kutta was searched for an error.
+    """Return "not testable" for the claim that the author searched Runge-Kutta for a fault.
 
-    The number is the original program's error divided by the corrected program's.
+    The number is the original program's numerical error divided by the corrected program's.
     """
     run = lab.run("runge-kutta", case)
     best = Laboratory(False, lab.assumptions).run("runge-kutta", case)

@@ -20,7 +20,7 @@ module many_free
   ! Bound of the relative rounding error of the frequency; measured errors are at most a quarter of
   ! it.
   real(dp), parameter :: ERROR = 8.0_dp*2.0_dp**(-53)
-  real(dp), parameter :: FAR = 1e100_dp ! products of moduli from 1/FAR to FAR are finite
+  real(dp), parameter :: FAR = 1e100_dp ! products of numbers from 1/FAR to FAR are finite
   real(dp), parameter :: UNLIKE = 100.0_dp ! largest ratio of coefficients for the exponential bound
   real(dp), parameter :: NEVER = huge(1.0_dp) ! error that leaves the body to the single-body kernel
 
@@ -165,6 +165,7 @@ contains
       if (.not. s2 > 0.0_dp) o%error(i) = NEVER
       if (.not. o%modulus(i) <= FAR) o%error(i) = NEVER
       if (.not. o%modulus(i) >= 1.0_dp/FAR) o%error(i) = NEVER
+      if (.not. gap <= FAR) o%error(i) = NEVER
     end do
   end subroutine begin
 

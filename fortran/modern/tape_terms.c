@@ -65,9 +65,6 @@ void OF_LEVEL(begin_work, LEVEL)(const struct tape *tape, int n_slots)
               tape->starts[tape->n_combinations] - 1);
   work->n_items = work->n_products = work->n_pairs = work->n_groups = 0;
   work->n_slots = n_slots;
-  /* Of three unknowns, perturb_with leaves lanes out that sum_perturbations reads. */
-  if (IN_REGISTER < SIDE_BY_SIDE && tape->n_unknowns == 3 && tape->v)
-    memset(perturbations_of(tape) + FIRST_UNKNOWN, 0, 3 * sizeof(perturbations));
   if (tape->leaves) return;
   work->combinations[0].slots = work->slots;
   work->combinations[0].coefficients = work->coefficients;

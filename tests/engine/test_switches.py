@@ -486,6 +486,16 @@ def test_a_pulse_between_two_switches_is_not_lost(gap: float, tolerance: float) 
     assert np.abs(found.omega[0] - wanted).max() <= 0.1 * (tolerance + 4e-15 * found.growth)
 
 
+@pytest.mark.usefixtures("level")
+@pytest.mark.parametrize("height", [1.0 - 1e-9, 1.0, 1.0 + 1e-9])
+def test_a_touch_keeps_the_error_amplification(height: float) -> None:
+    def torque(t: Any, w: Any) -> Any:
+        return [0.0, w[1] + 1e-5 * np.where(np.cos(t - 2.0) > height, 1.0, 0.0), 0.0]
+
+    found = solve(_ball(torque, (1.0, 0.0, 0.0)), 8.0, tolerance=1e-9)
+    assert found.growth == pytest.approx(math.exp(8.0), rel=1e-3)
+
+
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9, 1e-12])
 @pytest.mark.parametrize("gap", [1e-14, 1e-11, 1e-9])
 @pytest.mark.parametrize("push", [1e-1, 1e-3, 1e-5, 3e-7])

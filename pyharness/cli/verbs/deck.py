@@ -12,7 +12,7 @@ from pyharness.thesis.decks import DIALECTS, SYSTEMS, deck_text, job_text
 
 FORMATS = ("table", "json")
 OPTIONS = {
-    "--program P": f"Write the deck of this program: {', '.join(PROGRAMS)} (required).",
+    "--program P": f"Write the deck of this program: {', '.join(PROGRAMS)}.",
     "--case N": "Put the data of this case of Table 1 of the thesis, 1 to 7, on the cards "
     "(default: the published data, Case 5 for runge-kutta and Case 2 for the others).",
     **{each: shared.LISTING[each] for each in list(shared.LISTING)[:5]},

@@ -18,7 +18,7 @@ _MOST_WORKERS = 1024
 OPTIONS = {
     "file FILE.toml": "Sweep file (TOML): a scene, the axes of a parameter grid, a solver, and "
     "the quantities to store for each scene (format: docs/how-to/sweeps.md).",
-    "--out STORE": "Store the results in this folder, in the Zarr format (required). After an "
+    "--out STORE": "Store the results in this folder, in the Zarr format. After an "
     "interruption, the same command computes only the missing results.",
     "--repair": "Recompute damaged chunks (parts of the grid that are stored together), and "
     "rewrite damaged metadata.",

@@ -66,7 +66,7 @@ end subroutine taylor_rows
 
 subroutine choose_instructions(highest, taken)
   ! Select the kernels of one instruction set, for tests: 0 plain, 1 AVX2, 2 AVX-512. If the
-  ! processor lacks this set, `taken` is the best set below it.
+  ! processor lacks this set, `taken` is the best set below it. -1 changes nothing.
   use levels, only: choose_level
   implicit none
   integer(4), intent(in) :: highest

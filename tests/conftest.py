@@ -8,12 +8,14 @@ import pytest
 
 from pyharness.cli.main import main
 from pyharness.model.extension import extension
-from tests.instruction_sets import BEST, LEVELS, level_here
+from tests.instruction_sets import BEST, CHOSEN, LEVELS, level_here
 from tests.traps import guard
 
 # `make cross-check` sets this variable; each call of a kernel then takes some microseconds longer.
 if os.environ.get("PYHARNESS_TRAPS"):
     assert guard(extension()) > 0
+
+extension().choose_instructions(CHOSEN)
 
 pytest_plugins = ["tests.tiers"]
 Printed = Callable[[str], str]
@@ -54,6 +56,14 @@ def built_site() -> dict[str, bytes]:
     return build_site()
 
 
+@pytest.fixture
+def best_level() -> Iterator[None]:
+    """Run the test with this processor's registers, as compilers use them."""
+    extension().choose_instructions(BEST)
+    yield
+    extension().choose_instructions(CHOSEN)
+
+
 @pytest.fixture(params=range(len(LEVELS)), ids=LEVELS)
 def level(request: pytest.FixtureRequest) -> Iterator[int]:
     """Run the test with the kernels of one instruction set, if this machine has it."""
@@ -62,4 +72,4 @@ def level(request: pytest.FixtureRequest) -> Iterator[int]:
         pytest.skip(f"no {LEVELS[wanted]} in this build, or in this processor")
     assert extension().choose_instructions(wanted) == wanted
     yield wanted
-    extension().choose_instructions(BEST)
+    extension().choose_instructions(CHOSEN)

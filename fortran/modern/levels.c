@@ -74,9 +74,11 @@ static int level = 0; /* 0 plain, 1 AVX2 with FMA, 2 AVX-512 */
    __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&                 \
    __builtin_cpu_supports("avx512vl"))
 
-/* Choose a level, or the best below it that the processor has. Return the level that was chosen. */
+/* Choose a level, or the best below it that the processor has. Return the level that was chosen.
+   -1 changes nothing. */
 int choose_level(int highest)
 {
+  if (highest < 0) return level;
   level = 0;
 #ifdef WITH_LEVELS
   __builtin_cpu_init();

@@ -109,8 +109,7 @@ def _ask_kernels() -> dict[str, str | None]:
         from pyharness._kernels import arithmetic_faults, choose_instructions
     except ImportError:
         return {"instructions": None, "arithmetic": None}
-    # Loading the extension chooses the best instructions; this call repeats the choice.
-    instructions = _LEVELS[int(choose_instructions(len(_LEVELS) - 1))]
+    instructions = _LEVELS[int(choose_instructions(-1))]
     is_changed, is_flushed = arithmetic_faults((5.0, 0.0, float("nan"), sys.float_info.min))
     faults = []
     if is_changed:

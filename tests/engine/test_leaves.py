@@ -27,6 +27,7 @@ from pyharness.model.constant_body import with_constant_body
 from pyharness.model.extension import extension
 from pyharness.model.principal import principal
 from pyharness.truth.reference import reference
+from tests.instruction_sets import CHOSEN
 
 MOMENTS = (1.0, 1.2, 1.5)
 
@@ -183,6 +184,7 @@ def assert_same(found: list[Any], texts: tuple[str, str] = ("interpreter", "comp
     assert compiled.growth[has] == pytest.approx(interpreted.growth[has], rel=0.01)
 
 
+@pytest.mark.usefixtures("best_level")
 @pytest.mark.parametrize("number", range(4))
 def test_many_bodies_are_those_of_the_interpreter(number: int) -> None:
     scene = scenes(number)
@@ -195,6 +197,7 @@ def test_many_bodies_are_those_of_the_interpreter(number: int) -> None:
         assert (found[0].omega != found[1].omega).any()
 
 
+@pytest.mark.usefixtures("best_level")
 def test_leaves_have_parameters_of_each_body() -> None:
     def torque(t: Any, w: Any, *, k: float = 0.1) -> Any:
         return -k * w * np.sqrt(w @ w + 0.01) + [k, 0.0, k * k * np.sin(t)]
@@ -220,7 +223,7 @@ def test_leaves_for_other_registers_are_not_used() -> None:
         choose(best - 1)
         found = [solve_many(replace(scene), 3.0, omega=omega, compiled=x) for x in (False, True)]
     finally:
-        choose(best)
+        choose(CHOSEN)
     assert found[1].leaves == (
         "interpreter: the compiler does not use the registers of this processor"
     )
@@ -234,6 +237,7 @@ def test_switches_of_many_bodies_are_interpreted() -> None:
     assert found.leaves.startswith("interpreter: switches and torques of")
 
 
+@pytest.mark.usefixtures("best_level")
 def test_ready_torques_have_leaves_that_were_built() -> None:
     three = (0.3, 0.1, 0.2)
     for torque in (
@@ -250,6 +254,7 @@ def test_ready_torques_have_leaves_that_were_built() -> None:
     assert kernel_tape(system_of(scene_of()))[7] == 0.0
 
 
+@pytest.mark.usefixtures("best_level")
 def test_laws_about_space_share_leaves_that_were_built() -> None:
     random = Random(27)
     for number in range(8):

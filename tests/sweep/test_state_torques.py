@@ -212,6 +212,7 @@ def test_torques_are_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert len(list(folder().glob("*.so"))) == 1
 
 
+@pytest.mark.usefixtures("best_level")
 def test_the_report_says_whether_torques_were_compiled(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

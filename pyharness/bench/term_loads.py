@@ -229,7 +229,7 @@ def term_methods(compiled: bool = False) -> list[SceneContender]:
 
 
 def term_leaves(scenes: Sequence[TermScene], compiled: bool) -> Counter[str]:
-    """Return the number of torques by `Solver.leaves`, the origin of the code of their series."""
+    """Return how many of the scenes have each value of `Solver.leaves`."""
     own: Any = partial(prepare, compiled=compiled)
     solvers = [own(each.scene, attitude=each.scene.attitude is not None) for each in scenes]
     return Counter(str(each.leaves) for each in solvers)

@@ -61,11 +61,11 @@ _EFFORT = (
 EFFORT = {"--effort F": _EFFORT.format(" (30 for a program of the thesis)")}
 EFFORT_WITHOUT_PROGRAMS = {"--effort F": _EFFORT.format("")}
 STRICT = {
-    "--strict": "The exit status is 1 if the Fortran and Python versions of a program differ, a "
-    "corrected program misses its order of convergence, or a method of --method misses its "
-    "tolerance or ends although the true solution continues. With --strict, it is 1 also if "
-    "amplified rounding errors of a method may exceed its tolerance, or a method ends before the "
-    "last requested time."
+    "--strict": "Exit with status 1 also if amplified rounding errors of a method may exceed its "
+    "tolerance, or a method ends before the last requested time. Even without --strict, the exit "
+    "status is 1 if the Fortran and Python versions of a program differ, a corrected program "
+    "misses its order of convergence, or a method of --method misses its tolerance or ends "
+    "although the true solution continues."
 }
 ALSO = {
     "--also FILE,...": "Write the result to these files too, each in the format of its ending: "

@@ -40,8 +40,8 @@ _SHOWN = 3
 def context() -> dict[str, Any]:
     """Return the values for the page's template.
 
-    `switches` has defects, readings and conjectures, each kind with its heading. `first` is the run
-    of `DEFAULTS`. `titles` has the names of the cases.
+    `switches` has defects, readings and conjectures, each kind with its heading; `first` is the run
+    with `DEFAULTS`.
     """
     titles, flags = {n: case_scene(n).name for n in case_numbers()}, data()["flags"]
     by_kind = {kind: [flag for flag in flags if flag["kind"] == kind] for kind in _KINDS}

@@ -83,7 +83,8 @@ def solve_many(
     Parameters
     ----------
     scene : Scene, or sequence of Scene
-        One scene, whose values apply where no array is given; or all scenes, without arrays.
+        One scene, whose values apply where no array is given; or one scene for each body, and
+        then no arrays.
     t_end : float, or array of shape (n,)
         Final times, s; positive, negative or 0.
     times : float or iterable of float, shape (m,)

@@ -133,12 +133,12 @@ def _refined(run: StateRun, times: Sequence[float], tolerance: float) -> StateRo
 
 
 def _difference(before: StateRows, after: StateRows) -> float:
-    """Return the largest relative difference of omega, or angle (rad) between attitudes."""
+    """Return the largest relative difference of omega or angle (rad) between the attitudes."""
     n = min(len(before.state), len(after.state))
     found = float(_differences(before, after, n).max(initial=0.0))
     if not (before.solutions and before.is_complete and after.is_complete):
         return found
-    # The interpolants are inaccurate where a torque has a kink.
+    # Where a torque has a kink, SciPy's dense outputs are inaccurate within a step.
     for one in after.solutions:
         ends = one.ts[:-1, None]
         times = (ends + np.diff(one.ts)[:, None] * _WITHIN).ravel()

@@ -87,13 +87,13 @@ def parsed(
 def components(
     texts: Mapping[str, str], inputs: Sequence[Any], constants: Mapping[str, Any]
 ) -> list[Any]:
-    """Return the values of checked expressions, `texts`, for the eight input symbols."""
+    """Return the values of checked expressions, `texts`, as symbols; `inputs` are eight symbols."""
     names = {**dict(zip(INPUTS, inputs, strict=True)), "pi": math.pi, **constants}
     return [_component(text, names, place) for place, text in texts.items()]
 
 
 def text_components(values: Mapping[str, object], inputs: Sequence[Any]) -> list[Any]:
-    """Return numbers unchanged, and the values of expressions for the eight input symbols."""
+    """Return numbers unchanged, and the values of expressions as symbols."""
     found = []
     for place, value in values.items():
         if isinstance(value, str):

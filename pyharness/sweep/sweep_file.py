@@ -93,7 +93,7 @@ def _sweep(data: dict[str, Any], path: Path, text: str, claims: Mapping[str, Cla
 
 
 def _scene(table: object, path: Path) -> tuple[Scene, bytes]:
-    """Return the scene of [scene], then a zero byte and the bytes of its file; without file b""."""
+    """Return the scene of [scene]; for the digest, a null byte and the scene file, if any."""
     if not isinstance(table, dict):
         raise InputError(f"scene is {kind_of(table)}; it must be a table [scene]")
     given = [key for key in ("case", "file") if key in table]

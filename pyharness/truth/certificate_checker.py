@@ -158,7 +158,7 @@ class System:
     def ball(
         self, series: Sequence[list[int]], place: Fraction, radius: int
     ) -> tuple[list[int], Fraction]:
-        """Return middle and radius of omega, times 2**bits, at the fraction `place` of a step."""
+        """Return centre and radius of the ball of omega, times 2**bits, at a fraction of a step."""
         middle, (n, d) = [0, 0, 0], place.as_integer_ratio()
         for i, each in enumerate(series[:3]):
             for x in reversed(each):

@@ -171,7 +171,7 @@ def test_other_moments_in_case_1_have_the_effects_that_the_notes_say() -> None:
     corrected = Listing.corrected("runge-kutta")
     for changes in ([I2_30], [I2_30, WEIGHTS]):
         assert _last_line(1, changes, listing=corrected)[0] == "1.4609"
-    assert "prints U1 = 1.4609 both with and without change 4" in NOTES
+    assert "prints U1 = 1.4609 both with and without change 4" in " ".join(NOTES.split())
     assert _last_line(1, [I3_20])[3] == "57"
     assert "the stop test ends the run at step 57" in " ".join(NOTES.split())
     for change in (MINUS_A, U1_FOR_U3, WEIGHTS):

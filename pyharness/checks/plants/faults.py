@@ -131,7 +131,7 @@ class PlantedTwin(Program):
 
 
 def twin(program: str, name: str, both: bool = True) -> Fault:
-    """Return a fault in a program's Python version; its context yields the program."""
+    """Return the fault `name` of a program's Python version, as a context manager."""
     fault = TWIN_FAULTS[name]
 
     @contextmanager

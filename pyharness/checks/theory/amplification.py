@@ -67,9 +67,9 @@ class Amplification:
         return np.asarray(np.abs(np.linalg.eigvals(self.evaluate(z))).max(axis=-1))
 
     def moving(self) -> "Amplification":
-        """Return the matrix without the row and column of the step's result, if possible.
+        """Return the matrix without the row and column of the step's result.
 
-        It is possible if only the new result depends on the old one, by a constant factor.
+        If the old result affects more than the new one, return the whole matrix.
         """
         column = self.coefficients[:, -1]
         if self.size > 1 and not column[:-1].any() and not column[-1, 1:].any():

@@ -100,8 +100,8 @@ class Solved:
     # the matrix's largest element in it.
     growth: float = math.nan
     order: tuple[int, ...] = ()  # rows in the order of becoming pivots
-    # Largest relative shortfall of a pivot from the best candidate: found, and possible by
-    # rounding.
+    # Relative difference of a pivot from the largest candidate: the largest that occurs, and the
+    # largest that rounding can cause.
     pivoting: tuple[float, float] = (0.0, 0.0)
     # Largest ratios of errors to their bounds (Higham 2002, theorem 9.4): of the residual of A X =
     # B, the elements of X, and the increment of an unknown over a step.

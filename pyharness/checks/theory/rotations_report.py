@@ -178,7 +178,7 @@ def _sphere(axes: "Axes", scene: Scene) -> list[list[Any]]:
 
 
 def _project(points: Array, upward: Array, toward: Array) -> tuple[Array, Array, Array]:
-    """Return the points' coordinates to the right, upwards, and along `toward`, to the viewer."""
+    """Return the points' coordinates rightward, upward and toward the viewer."""
     right = np.cross(upward, toward)
     right /= np.linalg.norm(right)
     return points @ right, points @ np.cross(toward, right), points @ toward

@@ -9,10 +9,9 @@ from pyharness.model.report import Report
 FORMATS = ("table", "json")
 OPTIONS = {
     "name NAME": "Entry to show with its effect in every case of the thesis: its name or its card "
-    "(numbered line of a program), as in stage-base, 1660 or two-term:1660. By default, list the "
-    "defects that change numbers.",
-    "--all": "List all entries, also those that change no number (JSON always has all); not with "
-    "NAME.",
+    "(numbered line of a program), as in stage-base, 1660 or two-term:1660. Without NAME, list the "
+    "entries that change numbers.",
+    "--all": "List also the entries that change no number (JSON always has all); not with NAME.",
     "--kind K": "List only entries of this kind: defect (fault of the author of the programs), "
     "reading (line that can be read in two ways), conjecture (assumption about a missing line), or "
     "another kind that --all shows. Not with NAME.",
@@ -22,7 +21,7 @@ EXAMPLE = "defects stage-base"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the defects, readings and conjectures, or one with its evidence and its effects."""
+    """Print a list of entries, or one entry with its evidence and its effects."""
     listed = entries(options.kind)
     if options.name is None:
         shared.check_outputs(options)

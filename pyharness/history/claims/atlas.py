@@ -62,7 +62,7 @@ class Atlas:
         return sum_of_points([codes[reading, steps] for codes in self.codes.values()])
 
     def none_fails(self, reading: int = 0, steps: int = 0) -> NDArray[np.bool_]:
-        """Return for each start whether no claim fails; the arguments are indices."""
+        """Return for each start whether no claim fails, by indices of the reading and the steps."""
         held = [codes[reading, steps] != FAILS for codes in self.codes.values()]
         return np.asarray(np.all(held, axis=0))
 

@@ -156,8 +156,9 @@ def _by_literals(lab: Laboratory, cases: Sequence[int]) -> dict[str, float]:
 def suffices(
     lab: Laboratory, cases: Sequence[int], terms: Sequence[int], share: float, enough: int
 ) -> Judged:
-    """Judge the claim that a three- or four-term model suffices for most problems.
+    """Judge whether both models have errors of at most `share` in at least `enough` cases.
 
+    The claim: "a three or four term collocation model is probably sufficient for most problems".
     For the original programs, the three-term model is omitted if the torque varies.
     """
     numbers, good = {}, 0

@@ -429,10 +429,12 @@ static inline nodal summed(const double *terms, nodal parts)
   return even + parts * odd;
 }
 
-/* The slope of a root of 0, such as a norm at rest, is 0. */
+/* The slope of a root of 0, such as a norm at rest, is 0; division by 1 sets no flag. */
 static inline nodal slope_of_root(nodal root)
 {
-  return (nodal)((nodal_bits)(0.5 / root) & (root != 0.0));
+  const nodal_bits is_zero = root == 0.0;
+  const nodal one = (nodal){0.0} + 1.0, slope = 0.5 / (root + (nodal)((nodal_bits)one & is_zero));
+  return (nodal)((nodal_bits)slope & ~is_zero);
 }
 
 /* Compute the derivatives of the rates by some unknowns, from `first_column` on, at so many `nodes`, the

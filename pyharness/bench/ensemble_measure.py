@@ -103,7 +103,7 @@ class _Task:
         return self.target is not None or each.setting == "steps"
 
     def error(self, omega: Array) -> float:
-        """Return the largest error of a body: of omega or, if requested, of the attitude (rad).
+        """Return the largest error of omega over all bodies; with attitudes, of the attitude (rad).
 
         The error of omega is relative to the body's largest component at the start or the end.
         """

@@ -24,9 +24,9 @@ class Growth:
     """The Taylor method's error at one time, and the effect of rounding this time."""
 
     time: float  # s
-    # Relative to the largest omega: `error` is the largest difference from the closed form, from
-    # `_STARTS` initial states of the same motion; `conditioning` is the change by a rounding error
-    # of the time.
+    # Relative to the largest omega: `error` is the largest difference from the closed form, for
+    # `_STARTS` initial states of the same motion; `conditioning` is the change of omega in a
+    # rounding error of the time.
     error: float
     conditioning: float
     steps: int  # number of steps of one integration

@@ -55,11 +55,12 @@ LISTING = {
     "--no-stop": "Omit the stop test of --lipschitz.",
 }
 _EFFORT = (
-    "Multiply the work limit of each computation by F, above 0. The default, 1, allows about 10 "
+    "Multiply the work limit of each computation by F, above 0. The default, 1, allows about {} "
     "seconds{}. A computation that exceeds its limit ends with an error."
 )
-EFFORT = {"--effort F": _EFFORT.format(" (30 for a program of the thesis)")}
-EFFORT_WITHOUT_PROGRAMS = {"--effort F": _EFFORT.format("")}
+EFFORT = {"--effort F": _EFFORT.format(10, " (30 for a program of the thesis)")}
+EFFORT_WITHOUT_PROGRAMS = {"--effort F": _EFFORT.format(10, "")}
+EFFORT_OF_PROGRAMS = {"--effort F": _EFFORT.format(30, "")}
 STRICT = {
     "--strict": "Exit with status 1 also if amplified rounding errors of a method may exceed its "
     "tolerance, or a method ends before the last requested time. Even without --strict, the exit "

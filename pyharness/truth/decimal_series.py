@@ -210,7 +210,7 @@ def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal, leading: i
     """Return the length (s), at most `rest`, of a step whose last two Taylor terms are small.
 
     They are at most `tolerance` times the largest of the first `leading` unknowns or, if these are
-    0, of their first nonzero Taylor terms.
+    0, times one of their next four Taylor terms.
     """
     order = len(coefficients[0]) - 1
     begun = next((j for j in range(order - 1) if _size(coefficients, j, leading)), None)

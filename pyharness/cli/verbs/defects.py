@@ -13,8 +13,9 @@ OPTIONS = {
     "entries that change numbers.",
     "--all": "List also the entries that change no number (JSON always has all); not with NAME.",
     "--kind K": "List only entries of this kind: defect (fault of the author of the programs), "
-    "reading (line that can be read in two ways), conjecture (assumption about a missing line), or "
-    "another kind that --all shows. Not with NAME.",
+    "reading (line that can be read in two ways), conjecture (assumption about a missing line), "
+    "dialect, misreading, missing text, normalization, redundant, unreachable, unread. Not with "
+    "NAME.",
     **shared.outputs(FORMATS, plot=""),
 }
 EXAMPLE = "defects stage-base"

@@ -12,7 +12,7 @@ OPTIONS = {
     "--steps N": "Number of steps of this size, at least 1 (default: the scene's).",
     "--program P": f"Run only this program: {', '.join(PROGRAMS)} (default: all three).",
     "--halvings K": "Number of times that the step size is halved, 1 to 12 (default 6).",
-    **shared.EFFORT,
+    **shared.EFFORT_OF_PROGRAMS,
     **shared.outputs(plot=""),
 }
 USAGE = shared.ONE_SCENE

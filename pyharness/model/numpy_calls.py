@@ -177,6 +177,13 @@ def _clip(x: Any, a_min: Any = None, a_max: Any = None, **named: Any) -> Any:
     return _by_element(_limited, 3)(x, low, high)
 
 
+def _selected(conditions: Any, choices: Any, default: Any = 0) -> Any:
+    found = default
+    for condition, choice in zip(reversed(conditions), reversed(choices), strict=True):
+        found = _CHOICES["where"](condition, choice, found)
+    return found
+
+
 def _arctan2(y: Any, x: Any) -> Any:
     if not isinstance(y, Symbol) and not isinstance(x, Symbol):
         return math.atan2(y, x)
@@ -238,15 +245,27 @@ def _inverse(matrix: Any) -> Any:
     array = np.asarray(matrix)
     if not _has_symbol(array):
         return np.linalg.inv(array.astype(float))
-    if array.shape not in ((1, 1), (2, 2), (3, 3)):
-        raise _symbol_in(array).recorder.refusal(
-            f"the inverse of a matrix of shape {array.shape}", "matrices of at most three rows"
-        )
+    _check_small(array, "inverse")
     cofactors = np.empty(array.shape, dtype=object)
     for i, j in np.ndindex(array.shape):
         minor = np.delete(np.delete(array, i, 0), j, 1)
         cofactors[i, j] = (-1.0) ** (i + j) * _determinant(minor)
     return cofactors.T / (array[0] @ cofactors[0])
+
+
+def _determinant_of(matrix: Any) -> Any:
+    array = np.asarray(matrix)
+    _check_small(array, "determinant")
+    if len(array) == 3:
+        return array[0] @ np.cross(array[1], array[2])
+    return _determinant(array)
+
+
+def _check_small(array: Any, what: str) -> None:
+    if array.shape not in ((1, 1), (2, 2), (3, 3)):
+        raise _symbol_in(array).recorder.refusal(
+            f"the {what} of a matrix of shape {array.shape}", "matrices of at most three rows"
+        )
 
 
 def _determinant(matrix: Any) -> Any:
@@ -310,11 +329,14 @@ _ELEMENTARY = {
     "sinh": math.sinh, "cosh": math.cosh, "tanh": math.tanh, "log": math.log, "log1p": math.log1p,
     "log2": math.log2, "log10": math.log10, "exp2": lambda x: 2.0**x, "expm1": math.expm1,
     "cbrt": lambda x: math.copysign(abs(x) ** (1.0 / 3.0), x), "floor": math.floor,
-    "ceil": math.ceil, "trunc": math.trunc,
+    "ceil": math.ceil, "trunc": math.trunc, "radians": math.radians, "degrees": math.degrees,
 }  # fmt: skip
-_ARCS = {"sin": math.asin, "cos": math.acos, "tan": math.atan, "sinh": math.asinh}
+_ARCS = {
+    "sin": math.asin, "cos": math.acos, "tan": math.atan, "sinh": math.asinh, "cosh": math.acosh,
+    "tanh": math.atanh,
+}  # fmt: skip
 _CHOICES: dict[str, Callable[..., Any]] = {
-    "where": _by_element(select, 3), "clip": _clip,
+    "where": _by_element(select, 3), "select": _selected, "clip": _clip,
     "heaviside": _by_element(lambda x, at_zero: select(x > 0.0, 1.0, 0.0), 2),
     "maximum": _by_element(_largest, 2), "minimum": _by_element(_smallest, 2),
     "fmax": _by_element(_largest, 2), "fmin": _by_element(_smallest, 2),
@@ -322,6 +344,8 @@ _CHOICES: dict[str, Callable[..., Any]] = {
     "amin": _extreme(_smallest), "interp": _interp, "arctan2": _by_element(_arctan2, 2),
     "hypot": _by_element(lambda x, y: (x * x + y * y) ** 0.5, 2),
     "sign": _of_symbol("sign", np.sign), "fabs": _by_element(abs, 1),
+    "copysign": _by_element(lambda x, y: select(y < 0.0, -abs(x), abs(x)), 2),
+    "fmod": _by_element(lambda x, y: x - y * (x / y).trunc(), 2),
     "logical_and": _by_element(operator.and_, 2), "logical_or": _by_element(operator.or_, 2),
     "logical_not": _by_element(negated, 1),
 }  # fmt: skip
@@ -329,14 +353,15 @@ _OF_NUMPY = (
     {name: _of_symbol(name, each) for name, each in _ELEMENTARY.items()}
     | {f"arc{name}": _of_symbol(f"arc{name}", each) for name, each in _ARCS.items()}
     | {"rint": _of_symbol("rint", round)}
+    | {"deg2rad": _of_symbol("radians", math.radians)}
+    | {"rad2deg": _of_symbol("degrees", math.degrees)}
     | _CHOICES
 )
 _OF_MATH = (
     {name: _of_symbol(name, each) for name, each in _ELEMENTARY.items() if hasattr(math, name)}
     | {f"a{name}": _of_symbol(f"arc{name}", each) for name, each in _ARCS.items()}
-    | {"atan2": _CHOICES["arctan2"], "fabs": _CHOICES["fabs"], "hypot": _CHOICES["hypot"]}
-    | {"pow": _by_element(operator.pow, 2)}
-    | {"fmod": _by_element(lambda x, y: x - y * (x / y).trunc(), 2)}
+    | {name: _CHOICES[name] for name in ("copysign", "fabs", "fmod", "hypot")}
+    | {"atan2": _CHOICES["arctan2"], "pow": _by_element(operator.pow, 2)}
 )
 # The functions of scene files, of numbers and symbols.
 ELEMENTARY: dict[str, Callable[..., Any]] = {
@@ -350,7 +375,9 @@ ELEMENTARY: dict[str, Callable[..., Any]] = {
     "heaviside": lambda x: select(x > 0.0, 1.0, 0.0), "min": _smallest, "max": _largest,
     "clip": _limited, "where": select,
 }  # fmt: skip
-_OF_LINALG: dict[str, Callable[..., Any]] = {"norm": _norm, "solve": _solve, "inv": _inverse}
+_OF_LINALG: dict[str, Callable[..., Any]] = {
+    "norm": _norm, "solve": _solve, "inv": _inverse, "det": _determinant_of,
+}  # fmt: skip
 _TARGETS = {"zeros": 0.0, "empty": 0.0, "ones": 1.0}
 # By module and name: a function from the original to its replacement.
 _REPLACEMENTS: list[tuple[Any, dict[str, Callable[..., Any]]]] = [

@@ -173,6 +173,10 @@ _COMPOSED: dict[str, Callable[[Any], Any]] = {
     "cbrt": lambda x: x.sign() * (abs(x).log() / 3.0).exp(),
     "arccos": lambda x: 0.5 * math.pi - x.arcsin(),
     "arcsinh": lambda x: (x + (x * x + 1.0).sqrt()).log(),
+    "arccosh": lambda x: (x + (x * x - 1.0).sqrt()).log(),
+    "arctanh": lambda x: 0.5 * ((1.0 + x) / (1.0 - x)).log(),
+    "radians": lambda x: x * (math.pi / 180.0),
+    "degrees": lambda x: x * (180.0 / math.pi),
     "rint": lambda x: (x + 0.5).floor(),
     "sinh": lambda x: 0.5 * (x.exp() - (-x).exp()),
     "cosh": lambda x: 0.5 * (x.exp() + (-x).exp()),
@@ -338,10 +342,13 @@ class Symbol:
         return self._root()
 
     def arctan2(self, x: Any) -> "Symbol":
-        """Return the angle (rad) of the point (x, self); undefined where x < 0 and self = 0."""
-        # Half the angle, because a quotient by x would not be defined where x is 0.
-        half: Symbol = self / ((self * self + x * x).sqrt() + x)
-        return 2.0 * half.arctan()
+        """Return the angle (rad) of the point (x, self), -pi to pi; undefined at the origin."""
+        is_right = x > 0.0
+        # Half the angle to the x axis, because a quotient by x would not be defined where x is 0.
+        half = self / ((self * self + x * x).sqrt() + select(is_right, x, -x))
+        angle = 2.0 * half.arctan()
+        found: Symbol = select(is_right, angle, select(self < 0.0, -math.pi, math.pi) - angle)
+        return found
 
     def switch(self) -> "Condition | bool":
         """Return the condition that this symbol is positive; a bool if it is constant."""

@@ -292,6 +292,13 @@ CASES: list[Torque] = [
     lambda t, w: np.interp([w[0], 5.0, -5.0], [0, 1], [2, 3], left=7.0, right=8.0),
     lambda t, w: np.where(~(np.array([w[0], 1.0, 0.0]) > 0.5), 1.0, 2.0),
     lambda t, w: np.maximum(w, 0.5),
+    lambda t, w: [np.arctan2(w[0], -w[1]), np.arctan2(-w[1], -w[0]), np.arctan2(-w[2], w[0])],
+    lambda t, w: [np.arctan2(0.0, -w[0]), np.arctan2(1.0, -w[1]), np.arctan2(w[2], -1.0)],
+    lambda t, w: [np.arccosh(2 + w[0]), np.arctanh(w[1] / 2), np.linalg.det(np.outer(w, w) + t)],
+    lambda t, w: [np.deg2rad(w[0]), np.degrees(w[1]), np.fmod(-w[2], 0.07)],
+    lambda t, w: [math.radians(w[0]), math.copysign(w[1], -w[2]), np.copysign(0.3, w[0])],
+    lambda t, w: np.select([w > 0.5, w > 0.2], [w, t * w], -1.0),
+    lambda t, w: np.linalg.det(np.array([[w[0], t], [w[1], w[2]]])) * np.rad2deg(w),
 ]  # fmt: skip
 
 
@@ -435,6 +442,26 @@ def test_a_branch_that_begins_on_a_level_has_switches_of_its_own() -> None:
 
     scene = Scene("", (0.3, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=torque)
     assert solve(scene, [2.0]).omega[0, 0] == pytest.approx(2.3)
+
+
+@pytest.mark.parametrize("method", ["taylor", "dop853"])
+def test_an_angle_jumps_from_pi_to_minus_pi(method: str, level: int) -> None:
+    """The body rotates about one axis, past the half turn, under a torque -k times the angle."""
+    k = 0.05
+
+    def torque(t: Any, w: Any, q: Any) -> Any:
+        yaw = np.arctan2(2.0 * (q[0] * q[3] + q[1] * q[2]), 1.0 - 2.0 * (q[2] ** 2 + q[3] ** 2))
+        return [0.0, 0.0, -k * yaw]
+
+    scene = Scene(
+        "", (0.0, 0.0, 1.0), (1.0, 1.0, 1.0), torque=torque, attitude=(1.0, 0.0, 0.0, 0.0)
+    )
+    root = math.sqrt(k)
+    half_turn = math.asin(math.pi * root) / root
+    found = solve(scene, [-8.0, 3.0, 8.0], method, 1e-10)
+    after, speed = root * (8.0 - half_turn), math.cos(root * half_turn)
+    end = speed * math.cos(after) + math.pi * root * math.sin(after)
+    assert found.omega[:, 2] == pytest.approx([end, math.cos(3.0 * root), end], abs=1e-9)
 
 
 def test_a_direction_is_guarded_at_rest() -> None:

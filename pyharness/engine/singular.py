@@ -57,6 +57,8 @@ def undefined_operation(
 
     live = live_slots(tape, lambda slot: None, lambda slot: bool(values[slot]))
     derivatives = {each.operands[1] for each in tape.operations if each.kind in WITH_DERIVATIVE}
+    slopes = (each.operands[1] for each in tape.operations if each.kind == "asin")
+    roots_of_arcs = {x for n in slopes for x in tape.operations[n - tape.n_inputs].operands}
     # The operation may belong to a branch that begins here.
     for slot in [*live, *range(tape.n_inputs, tape.n_inputs + len(tape.operations))]:
         kind, operands, *_ = tape.operations[slot - tape.n_inputs]
@@ -70,6 +72,11 @@ def undefined_operation(
                 "function, such as (x**2 + e**2)**(p/2) for abs(x)**p"
             )
         if kind == "sqrt" and (values[operands[0]] < 0.0 or vanishes(operands[0])):
+            if slot in roots_of_arcs:
+                return (
+                    "the arcsine or arccosine of a number that becomes 1 or -1; write the angle as "
+                    "arctan2(y, x)"
+                )
             return (
                 "the square root of a number that becomes 0 or negative; write a smooth function, "
                 "such as x*tanh(x/e) for sqrt(x**2)"

@@ -12,6 +12,9 @@ module prepared_scale
   ! solution is in range.
   real(dp), parameter :: LARGE = 2.0_dp**300
   integer, parameter :: MOST_POWER = 1000
+  ! Change of omega in the new units that a rate must not cause by underflow. Other torques
+  ! underflow only if the time overflows.
+  real(dp), parameter :: FELT = 1e-12_dp
 
   public :: bring_near_one, is_result, LARGE, scale_back
 
@@ -28,6 +31,7 @@ contains
     integer, intent(out) :: power      !! omega is 2**power times its value in the new units
     real(dp) :: reach      ! bound of omega0 and of what the torque adds, rad/s
     real(dp) :: share      ! part of its amplitude that a wave reaches
+    real(dp) :: lost       ! change of omega by rates that underflow
     integer :: code, i
 
     reach = max(abs(omega0(1)), abs(omega0(2)), abs(omega0(3)))
@@ -60,9 +64,13 @@ contains
       copy(i) = scale(packed(i), -power)
       if (mod(i - WAVES, 4) /= 3) copy(i) = scale(copy(i), -power)
     end do
+    lost = 0.0_dp
+    do i = RATE, RATE + 2
+      lost = lost + abs(scale(packed(i)*t_end*t_end, -power) - copy(i)*time*time)
+    end do
     ! If the time or a torque is out of range then, the time is so short that products do not
-    ! matter.
-    if (.not. (all(abs(copy) <= huge(time)) .and. abs(time) <= huge(time) &
+    ! matter, or so long that there is no result.
+    if (.not. (lost <= FELT .and. all(abs(copy) <= huge(time)) .and. abs(time) <= huge(time) &
                .and. (abs(time) >= tiny(time) .or. .not. abs(t_end) > 0.0_dp))) power = 0
     do i = 1, 3
       start(i) = scale(omega0(i), -power)

@@ -31,6 +31,7 @@ _MULTIPLE = 16
 _SAMPLES = 9  # times at which a torque that depends on the state is evaluated
 # Omega (rad/s) up to which, and above whose inverse, products of components keep their digits.
 _LARGE = 2.0**300
+_FELT = 1e-12  # change of omega, relative to its size, that a torque must not cause by underflow
 
 
 def scaled(scene: Scene, factor: float) -> Scene:
@@ -103,8 +104,8 @@ def rescaling_factor(scene: Scene, time: float) -> float:
     if is_ordinary(scene.omega):
         return 1.0
     torque = scene.torque if isinstance(scene.torque, StateTorque) else None
-    by_torque = omega_by_torque if torque is None else _omega_by_state_torque
-    largest = max(max(map(abs, scene.omega)), by_torque(scene, time))
+    by_torque = (omega_by_torque if torque is None else _omega_by_state_torque)(scene, time)
+    largest = max(max(map(abs, scene.omega)), by_torque)
     if not (0.0 < largest < math.inf) or 1.0 / _LARGE <= largest <= _LARGE:
         return 1.0
     # With a larger exponent the factor would overflow or underflow.
@@ -123,6 +124,10 @@ def rescaling_factor(scene: Scene, time: float) -> float:
         sizes += [*(abs(f) * factor for _, f in waves), shortest]
     is_short = shortest < sys.float_info.min or 0.0 < sizes[0] < sys.float_info.min
     fits = all(map(math.isfinite, sizes)) and not is_short
+    if fits and torque is None:
+        # A torque that underflows must not be felt.
+        kept = omega_by_torque(scaled(scene, factor), time / factor)
+        fits = abs(kept - by_torque * factor) <= _FELT
     return factor if fits and (torque is None or _tape(torque, factor) is not None) else 1.0
 
 

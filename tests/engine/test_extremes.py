@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import InputError, Scene, TorqueLaw, prepare, solve
+from pyharness import InputError, Scene, TorqueLaw, prepare, solve, solve_many
 from pyharness.engine.registry import FIXED_STEP
 from pyharness.engine.solver import PREPARED
 
@@ -115,3 +115,18 @@ def test_scipy_gives_up_by_what_it_costs(monkeypatch: pytest.MonkeyPatch) -> Non
         scene = Scene("", (1.0, 1.0, 9.0), moments=(4.0, 7.0, 8.5), torque=law)
         with pytest.raises(InputError, match=f"after {most} "):
             solve(scene, [0.7], method, 1e-9)
+
+
+@pytest.mark.parametrize("constant", [REST, (5e163, 2e163, 0.0)])
+def test_a_torque_that_underflows_in_other_units_is_not_ignored(constant: Any) -> None:
+    """Regression test: the body stayed at rest, as the rate times a factor cubed became 0."""
+    law = TorqueLaw(constant, rate=(1e244, -2e244, 0.0))
+    scene = Scene("", REST, (4.0, 3.0, 2.0), torque=law)
+    with pytest.raises(InputError, match="work limit"):
+        solve(scene, [7.0])
+    solver = prepare(scene)
+    assert np.isnan(solver(REST, 7.0)).all()
+    assert solver.status != "complete"
+    found = solve_many([scene], 7.0)
+    assert np.isnan(found.omega).all()
+    assert not found.has_result.any()

@@ -24,7 +24,7 @@ Maker = Callable[[float, float], Ready]
 
 @dataclass(frozen=True)
 class Contender:
-    """A solver in a benchmark, with its kind of setting."""
+    """A solver in a benchmark."""
 
     name: str
     setting: str  # "tolerance", "steps" or "none"
@@ -38,7 +38,7 @@ class Contender:
 
 @dataclass(frozen=True)
 class SceneContender(Contender):
-    """A contender that integrates omega of one scene and, where it can, the attitude."""
+    """A contender that integrates omega and, where it can, attitude of one scene."""
 
     # Prepares what does not depend on the end time and the setting.
     prepare: Callable[[Scene], Maker]
@@ -73,7 +73,7 @@ def refuse_rounding(solver: str, setting: float) -> None:
 
 
 def prepared_maker(name: str, scene: Scene, compiled: bool = False) -> Maker:
-    """Return a function that prepares runs of the solver `name`; `compiled` is as in `prepare`."""
+    """Return a maker for the solver `name`; `compiled` is as in `prepare`."""
 
     def make(horizon: float, setting: float) -> Ready:
         attitude = scene.attitude is not None

@@ -23,7 +23,7 @@ _HARDEST = 1.0  # largest torque about an axis over the moment about this axis, 
 
 
 def coefficients() -> list[float]:
-    """Return the coefficients A, B, C of Euler's equations for `MOMENTS`."""
+    """Return Euler's coefficients A, B, C for `MOMENTS`."""
     return [float(each) for each in exact_coefficients(Scene("", (0.0, 0.0, 0.0), MOMENTS))]
 
 
@@ -50,7 +50,7 @@ class EnsembleLoad:
 
     @property
     def acceleration(self) -> Array:
-        """Return torques divided by moments, shape (n, 3), in rad/s2."""
+        """Return torques divided by moments (rad/s2), shape (n, 3)."""
         if self.torque is None:
             return np.zeros_like(self.omega0)
         return np.asarray(self.torque / np.array(MOMENTS))
@@ -63,10 +63,7 @@ class EnsembleLoad:
         return replace(self, **own)
 
     def ends(self) -> Array:
-        """Return omega at the end time (rad/s), shape (n, 3), by `solve` with tolerance 1e-15.
-
-        If attitudes are requested, return their quaternions, shape (n, 4).
-        """
+        """Return omega (rad/s) or, if requested, the attitude of all bodies at the end time."""
         found = []
         for scene in self.scenes():
             attitude = scene.attitude is not None
@@ -75,7 +72,7 @@ class EnsembleLoad:
         return np.array(found)
 
     def scenes(self) -> Iterator[Scene]:
-        """Yield the scene of each body."""
+        """Yield each body's scene."""
         for i, start in enumerate(self.omega0.tolist()):
             law = TorqueLaw() if self.torque is None else TorqueLaw(self.torque[i].tolist())
             attitude = None if self.attitude0 is None else self.attitude0[i].tolist()

@@ -1,8 +1,8 @@
 """Measurements of many bodies at once: speed at a target error, time by number of bodies, memory.
 
 Each contender uses the coarsest setting whose error on a sample is at most the target. Calls are
-interleaved in several rounds; the shortest time counts, as other work of the machine can only
-lengthen it. Calls on one core are timed in processor time.
+interleaved in several rounds; the shortest time counts, as other work of the machine only lengthens
+it. Calls on one core are timed in processor time.
 """
 
 import subprocess
@@ -49,7 +49,7 @@ _GROWTH_ROUNDS = 5
 
 @dataclass(frozen=True)
 class Rate:
-    """The speed of one contender on one load, with a number of threads."""
+    """The speed of one contender on one load."""
 
     load: str
     target: float | None  # None where the steps were prescribed
@@ -103,10 +103,7 @@ class _Task:
         return self.target is not None or each.setting == "steps"
 
     def error(self, omega: Array) -> float:
-        """Return the largest error of omega over all bodies; with attitudes, of the attitude (rad).
-
-        The error of omega is relative to the body's largest component at the start or the end.
-        """
+        """Return the largest error of all bodies: omega's, relative, or the attitude's (rad)."""
         n = min(len(omega), len(self.ends))
         ends, starts = self.ends[:n], self.sample.omega0[:n]
         if self.load.attitude0 is not None:
@@ -140,7 +137,7 @@ def measure_ensembles(
     """Return the measured speed of each contender on each load, at each target error.
 
     On the last load, RK4 contenders also run `STEPS` steps. `seed`, which determined the loads, is
-    only recorded. A call solves at least `least` bodies, or all if the load has fewer.
+    only recorded. A call solves at least `least` bodies, or all if fewer.
     """
     found = Rates(seed, loads[0].n)
     tasks: list[_Task] = []
@@ -216,7 +213,7 @@ def clock_of(threads: int) -> Clock:
 
 @dataclass(frozen=True)
 class Size:
-    """The run times per body (s), by method, in one call for `bodies` bodies on one core."""
+    """The run times per body (s), by method, of a call for `bodies` bodies on one core."""
 
     bodies: int
     seconds: dict[str, float]
@@ -233,15 +230,14 @@ class Memory:
 
     @property
     def ratio(self) -> float | None:
-        """Return the peak over the size of the arrays."""
+        """Return the peak over the arrays' size."""
         return None if self.peak is None else self.peak / self.arrays
 
 
 def sizes(seed: str, most: int, progress: Progress = no_progress) -> list[Size]:
     """Return the run times per body (s) for 1, 10, 100, ... up to `most` bodies.
 
-    The closed form is measured without torque, by `solve_many` and, as "prepared", by a prepared
-    solver; the other methods with a torque.
+    The closed form runs without torque; "prepared" is the same by a prepared solver.
     """
     free, pushed = draw(seed, most)
     found: list[Size] = []
@@ -269,7 +265,7 @@ def _prepared(load: EnsembleLoad) -> Callable[[], object]:
 def memory(bodies: int) -> list[Memory]:
     """Return the memory that a call of each of our methods takes.
 
-    Each runs in a new process, because peak memory never decreases.
+    Each call runs in a new process, because peak memory never decreases.
     """
     found = []
     for method in own_ensembles():

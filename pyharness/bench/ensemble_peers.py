@@ -51,10 +51,7 @@ def ensemble_peers() -> list[EnsembleContender]:
 def heyoka_batch(
     load: EnsembleLoad, setting: float, threads: int, size: int = BATCHES[0]
 ) -> Callable[[], Array]:
-    """Return an integration by heyoka in batches of `size` bodies; `threads` has no effect.
-
-    It returns attitudes, shape (n, 4), if the load requests them.
-    """
+    """Return an integration by heyoka in batches of `size` bodies; `threads` has no effect."""
     of_state = isinstance(load.scene.torque, StateTorque)
     scene = load.scene if of_state else None
     with_attitude = load.attitude0 is not None
@@ -213,8 +210,8 @@ def numba_rk4(
 ) -> Callable[[], Array]:
     """Return an integration by RK4, compiled by numba.
 
-    If `in_blocks`, each step is a loop over the bodies of a block; otherwise each body is
-    integrated to the end before the next.
+    If `in_blocks`, each step is a loop over a block's bodies; otherwise one body after another is
+    integrated to the end.
     """
     blocks, bodies = _numba_kernels()
     kernel = blocks if in_blocks else bodies

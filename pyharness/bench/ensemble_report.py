@@ -20,7 +20,7 @@ _STYLES = {"prepared": "D-.", "closed-form": "o-", "taylor": "s--", "rk4": "^:"}
 
 @dataclass(frozen=True)
 class Ensembles:
-    """The speeds of all solvers; our methods' run times by number of bodies, and memory."""
+    """The results of `bench --ensemble`."""
 
     rates: Rates
     sizes: Sequence[Size]
@@ -28,7 +28,7 @@ class Ensembles:
 
 
 def ensemble_report(found: Ensembles, packages: Iterable[str], command: str) -> Report:
-    """Return the report: speeds, times per body, and memory."""
+    """Return the report of speeds, times per body, and memory."""
     text = [*_make_tables(found), _notes(found)]
     pictures = {"growth": partial(size_picture, found.sizes)}
     report = Report("bench", text, partial(_record, found), _data(found.rates), pictures=pictures)
@@ -36,7 +36,7 @@ def ensemble_report(found: Ensembles, packages: Iterable[str], command: str) -> 
 
 
 def ours_over(rows: Sequence[Rate], row: Rate) -> float | None:
-    """Return our fastest speed, with equal threads, over the speed in `row`; None without ours."""
+    """Return our highest speed with equal threads, over that of `row`; None without ours."""
     rates = [each.rate for each in rows if each.method in _STYLES and each.threads == row.threads]
     return max(rates) / row.rate if rates else None
 
@@ -125,7 +125,7 @@ def _record(found: Ensembles) -> dict[str, Any]:
 
 
 def size_picture(sizes: Sequence[Size]) -> Picture:
-    """Return the picture of the time per body (ns) against the number of bodies."""
+    """Return the picture of time per body (ns) against number of bodies."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.5, 4.5), dpi=110, layout="constrained")

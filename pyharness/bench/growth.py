@@ -1,7 +1,7 @@
 """Growth of errors with time: the Taylor method against the closed form, up to 1e5 s.
 
-Errors are compared with 2**-53 t |omega'|, the change of the solution that the rounding of the time
-t (s) causes in any method.
+Errors are compared with 2**-53 t |omega'|, the change of the solution when the time t (s) is
+rounded.
 """
 
 from collections.abc import Sequence

@@ -13,7 +13,7 @@ Say = Callable[[str], None]  # receives the name of the current part
 
 
 class Task(Protocol):
-    """A unit of measurement, such as a workload; `place` is its name in messages."""
+    """A unit of measurement, such as a workload; messages name it by `place`."""
 
     @property
     def place(self) -> str: ...  # noqa: D102
@@ -40,9 +40,9 @@ def timed(
     statistic: Callable[[Sequence[float]], float] = statistics.median,
     slow: float = SLOW,
 ) -> Iterator[_Row]:
-    """Yield a row for each call that `calls` prepares for each task, with its time.
+    """Yield a row for each call that `calls` prepares for each task.
 
-    `length`, `rounds`, `statistic` and `slow` are as in `checks.compare.timing.seconds`.
+    The last four arguments are as in `checks.compare.timing.seconds`.
     """
     for number, task in enumerate(tasks):
 

@@ -1,8 +1,8 @@
 """Run time against error, for our and third-party solvers, in one process.
 
-Every contender has settings from coarse to fine. A call with each setting is compared with the
-reference. Batches of all calls are then timed in interleaved rounds, so that other work of the
-machine affects all alike; the median time counts.
+A call with each setting of a contender, from coarse to fine, is compared with the reference.
+Batches of all calls are then timed in interleaved rounds, so that other work of the machine affects
+all alike; the median time counts.
 """
 
 import math
@@ -74,7 +74,7 @@ class Workload:
 
     @property
     def group(self) -> str:
-        """Return the name of the workload's group, over which ratios are averaged.
+        """Return the name of the group over which ratios are averaged.
 
         A group has one end time. At 3 s, or with attitudes, workloads with and without torque are
         separate groups.
@@ -86,7 +86,7 @@ class Workload:
 
 @dataclass(frozen=True)
 class Row:
-    """Run time and error of one contender and setting on one workload."""
+    """The run time and error of one contender and setting on one workload."""
 
     workload: Workload
     method: str
@@ -114,7 +114,7 @@ class Refusal:
 
 @dataclass(frozen=True)
 class Finding:
-    """The results of a run: times, errors, and failed attempts."""
+    """The results of a run."""
 
     workloads: list[Workload]
     rows: list[Row]
@@ -135,11 +135,10 @@ class Finding:
 def workloads(
     case: int | None = None, horizon: float | None = None, attitude: bool = False
 ) -> list[Workload]:
-    """Return cases of Table 1 with end times T.
+    """Return cases of Table 1, each to 3 s and some also to 100 s.
 
-    By default T is 3 s in Cases 2 to 7, and also 100 s in Cases 3 and 4. With `attitude`, T is 3 s
-    in Cases 1 to 7, and also 100 s in all but Case 6; the bodies are initially aligned with the
-    axes of space. `case` and `horizon` (s) select one case and one time.
+    With `attitude`, the bodies are initially aligned with the axes of space. `case` and `horizon`
+    (s) select one case and one end time.
     """
     usual, long = (_TURNING_CASES, _LONG_TURNING_CASES) if attitude else (_CASES, _LONG_CASES)
     cases = usual if case is None else (case,)
@@ -205,7 +204,7 @@ def measure(
 def error_of(end: End, truth: Reference, scale: float = 0.0) -> float | None:
     """Return the larger of the errors of omega (relative) and of the attitude (rad).
 
-    Return None if the result is not finite, or if the attitude is required but missing.
+    Return None if the result is not finite, or lacks a required attitude.
     """
     error = relative_error(end.omega, truth, scale)
     if error is None or truth.attitude is None:
@@ -220,9 +219,9 @@ def error_of(end: End, truth: Reference, scale: float = 0.0) -> float | None:
 
 
 def relative_error(omega: Array, truth: Reference, scale: float = 0.0) -> float | None:
-    """Return the error of omega over `scale` (rad/s) or, if larger, the largest true component.
+    """Return omega's error over `scale` (rad/s) or, if larger, the largest true component.
 
-    The result is None if the error is not finite, or the reference does not reach the end time.
+    Return None if the error is not finite, or the reference ends before the end time.
     """
     if len(truth.omega) == 0:
         return None

@@ -62,7 +62,7 @@ def peers() -> list[SceneContender]:
 def heyoka_maker(
     scene: Scene, formula: Formula | None = None, *, variational: bool = False
 ) -> Maker:
-    """Return a function that prepares heyoka integrations, compiled once for each tolerance.
+    """Return a maker of heyoka integrations, compiled once for each tolerance.
 
     `formula` is as in `heyoka_equations`; `variational` adds the derivatives of the solution with
     respect to the initial state.
@@ -166,7 +166,7 @@ def heyoka_equations(scene: Scene, formula: Formula | None = None) -> list[tuple
     """Return pairs (unknown, derivative) for omega and, if the scene has one, the attitude.
 
     A torque that depends on the state is computed by `formula`, or else from its tape (the recorded
-    operations). Raise InputError if the torque is not recorded, or has a table or a floor function.
+    operations). Raise InputError for an unrecorded torque, or one with a table or floor function.
     """
     import heyoka
 
@@ -194,7 +194,7 @@ def heyoka_equations(scene: Scene, formula: Formula | None = None) -> list[tuple
 
 
 def heyoka_functions() -> Functions[Any]:
-    """Return the functions that evaluate a tape in heyoka's arithmetic."""
+    """Return functions that evaluate a tape in heyoka's arithmetic."""
     import heyoka
 
     def table(_: Table, time: Any) -> Any:
@@ -216,7 +216,7 @@ def heyoka_functions() -> Functions[Any]:
 
 
 def numba_fixed(method: str, scene: Scene) -> Maker:
-    """Return a function that prepares numba runs by "rk4" or "dop8" (order 8, in DOP853)."""
+    """Return a maker of numba integrations by "rk4" or "dop8" (order 8, in DOP853)."""
     import numba
 
     formula: Tableau = RK4
@@ -245,7 +245,7 @@ def numba_fixed(method: str, scene: Scene) -> Maker:
 
 
 def compiled_function(source: str) -> Any:
-    """Return the function named `function` that a Python source defines."""
+    """Return the function named `function` in a Python source."""
     names: dict[str, Any] = {}
     exec(compile(source, "<bench>", "exec"), {"sin": np.sin, "cos": np.cos}, names)
     return names["function"]
@@ -256,8 +256,8 @@ def rates(
 ) -> list[str]:
     """Return the right-hand sides of omega's components as Python source.
 
-    `time` (an expression) and `state` (names) occur in it. `coefficients` are A, B, C, by default
-    the scene's.
+    The source contains `time` (an expression) and `state` (names). `coefficients` are A, B, C, by
+    default the scene's.
     """
     x, y, z = state
     moments = scene.moments or (1.0, 1.0, 1.0)
@@ -291,8 +291,7 @@ def end_of(state: Array, evaluations: int | None = None) -> End:
 def steps_source(scene: Scene, formula: Tableau) -> str:
     """Return the Python source of a Runge-Kutta integration with unrolled stages.
 
-    Its function takes the initial omega, the end time (s), the number of steps, and the array for
-    the final omega.
+    Its function takes the end time in s, and writes the final omega into its last argument.
     """
     stages, weights, nodes = formula
     step = ["t = step * h"]

@@ -120,7 +120,7 @@ def draw_slopes(axes: "Axes") -> None:
 
 
 def growth_picture(found: "Mapping[int, Sequence[Growth]]") -> Picture:
-    """Return the picture of the Taylor method's error and the effect of rounding the time."""
+    """Return the picture of the Taylor method's error and the effect of rounding time."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(4.5 * len(found), 4.0), dpi=110, layout="constrained")

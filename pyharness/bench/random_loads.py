@@ -1,7 +1,7 @@
 """Random scenes of several kinds, on which no method was tuned.
 
 Torques and frequencies scale with the initial angular velocity, so that they affect slow and fast
-bodies alike. A seed and a number determine a scene.
+bodies alike.
 """
 
 import math
@@ -40,10 +40,10 @@ KINDS = ("all", *LAWS, *SPEEDS, *BODIES, *_LENGTHS)
 def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
     """Return the workload that `seed` and `number`, from 1 on, determine.
 
-    The kind of torque changes with the number. A scene is drawn again if, by the second reference
-    (`integer_series`), its error amplification is `MOST_GROWTH` or more, or the body makes less
-    than 1 or more than 300 revolutions. With `attitude`, the body is initially aligned with the
-    axes of space, and the workload has no `truth`, because `integer_series` has no attitude.
+    The kind of torque changes with the number. A scene with too large an error amplification, or
+    too few or too many revolutions, is drawn again. With `attitude`, the body is initially aligned
+    with the axes of space, and the workload has no `truth`, because `integer_series` has no
+    attitude.
     """
     source = Random(f"bench/{seed}/{number}")
     place = number - 1
@@ -80,7 +80,7 @@ def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
 def by_torque(source: Random, name: str, law: str, speed: str, body: str) -> tuple[Scene, float]:
     """Return a random scene, and the time (s) of roughly 1 to 300 revolutions.
 
-    `law`, `speed` and `body` are elements of `LAWS`, `SPEEDS` and `BODIES`.
+    `law`, `speed` and `body` are in `LAWS`, `SPEEDS` and `BODIES`.
     """
     mass = _log(source, 1.0, 50.0)
     moments = [mass * each for each in BODIES[body](source)]

@@ -1,6 +1,6 @@
 """The reports of `bench`.
 
-A ratio is the run time of the baseline solver divided by that of another solver, at equal error.
+A ratio is the baseline solver's run time divided by another solver's, at equal error.
 """
 
 import math
@@ -40,11 +40,10 @@ _DRIFT = (
 def measured_report(
     title: str, worth: str, found: Report, packages: Iterable[str], command: str
 ) -> Report:
-    """Return the report `found` of a benchmark, with machine and build added, and a Markdown page.
+    """Return a benchmark's report, with machine and build added, and a Markdown page.
 
-    `title` is the page's heading; `worth` says how comparable the numbers are. The text of `found`
-    has titled tables, then the notes. The page lists the versions of `packages`, and the `command`
-    that repeats the benchmark.
+    The text of `found` has titled tables, then the notes. The page adds `worth` (how comparable the
+    numbers are), the versions of `packages`, and the `command` that repeats the benchmark.
     """
     here, built = machine(packages), build()
     *parts, notes = found.text
@@ -81,10 +80,7 @@ def grouped(reasons: Iterable[tuple[str, str, str]], most: int | None = None) ->
 
 
 def bench_report(finding: Finding, packages: Iterable[str], command: str) -> Report:
-    """Return the report: a table for each workload, and mean ratios.
-
-    For random scenes, the tables show distributions of ratios instead.
-    """
+    """Return the report: times and mean ratios or, for random scenes, distributions of ratios."""
     drawn, data = _random(finding), _data(finding)
     title = "# Run time against error" + (" of omega and attitude" if finding.attitude else "")
     text = [*(_spread_parts if drawn else _make_tables)(finding), _notes(finding)]
@@ -124,7 +120,7 @@ def _data(finding: Finding) -> Table:
 
 
 def savings_report(found: Sequence[Saving]) -> Report:
-    """Return the report of run times with and without each computation that can be omitted."""
+    """Return the report of run times with and without computations that can be omitted."""
     time = digits(".3g", 1e6)
     columns = (
         *words("skipped where"), Column("us with it", time, unit="s", full=time),
@@ -192,7 +188,7 @@ def microseconds(seconds: float | None) -> str:
 
 
 def ratio(value: float | None) -> str:
-    """Return a ratio as text with about three digits; "-" for None."""
+    """Return a ratio with about three digits; "-" for None."""
     if value is None:
         return "-"
     if value >= 99.95:
@@ -265,7 +261,7 @@ def _notes(finding: Finding) -> list[str]:
 
 
 def not_measured(finding: Finding) -> list[str]:
-    """Return a line for each reason why results are missing, with the first examples."""
+    """Return a line for each reason why results are missing, with examples."""
     # Reasons that differ only in the expected time or last step at their end share a line.
     came: list[tuple[Row | Refusal, str]] = [
         (each, each.reason.split(", a call would take")[0]) for each in finding.refused

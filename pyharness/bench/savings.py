@@ -21,7 +21,7 @@ _SECONDS = 2e-3  # duration (s) of a batch
 
 @dataclass(frozen=True)
 class Saving:
-    """Median run times (s) with and without a computation that a plan can omit."""
+    """The median run times (s) with and without a computation that a plan can omit."""
 
     part: str  # as the plan names it
     where: str  # name of the scene or program
@@ -30,16 +30,12 @@ class Saving:
 
     @property
     def ratio(self) -> float:
-        """Return the time with the part over the time without."""
+        """Return the time with the part over that without."""
         return self.with_it / self.without
 
 
 def savings(t_end: float = 3.0, tolerance: float = 1e-9) -> list[Saving]:
-    """Return the run times with and without each computation that can be omitted.
-
-    These are the integration (replaced by a closed form), the time dependence of the torque, dense
-    output, the velocity, and the imports of SciPy and of the reference.
-    """
+    """Return the run times with and without each computation that can be omitted."""
     constant = case_scene(5)
     times = [t_end * k / 100.0 for k in range(1, 101)]
     rows = prepare(constant, "taylor", tolerance)
@@ -79,5 +75,5 @@ def _python(code: str) -> None:
 def measured_saving(
     part: str, where: str, with_it: Callable[[], object], without: Callable[[], object]
 ) -> Saving:
-    """Return the run times of calls with and without the computation `part`."""
+    """Return the saving of `part`, from calls with and without it."""
     return Saving(part, where, *seconds([with_it, without], _SECONDS, _BATCHES))

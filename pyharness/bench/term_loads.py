@@ -57,19 +57,16 @@ _PUSH = (0.05, 0.02, 0.1)
 
 @dataclass(frozen=True)
 class TermScene:
-    """A scene whose torque is of the `kind` READY (ready-made) or EXPRESSION (recorded function).
-
-    `formula` is an independent implementation of a ready-made torque; None for an expression.
-    """
+    """A scene with a ready-made torque (READY) or a recorded function (EXPRESSION)."""
 
     kind: str
     scene: Scene
-    formula: Formula | None = None
+    formula: Formula | None = None  # independent implementation of a ready-made torque
 
 
 @dataclass(frozen=True, eq=False)
 class TermBodies(EnsembleLoad):
-    """Bodies with different initial omegas that share a torque, which depends on the state."""
+    """Bodies with different initial omegas and one torque, which depends on the state."""
 
     body: Scene  # body, torque and initial attitude of all
 
@@ -79,7 +76,7 @@ class TermBodies(EnsembleLoad):
         return self.body
 
     def scenes(self) -> Iterator[Scene]:
-        """Yield the scene of each body."""
+        """Yield each body's scene."""
         for start in self.omega0.tolist():
             yield replace(self.body, omega=start)
 
@@ -222,14 +219,14 @@ def _in_space(t: Any, w: Any, q: Any, sin: Any, cos: Any) -> Sequence[Any]:
 
 
 def term_methods(compiled: bool = False) -> list[SceneContender]:
-    """Return our contender for single bodies, `auto`, without coarse tolerances."""
+    """Return our contender for single bodies, without coarse tolerances."""
     own = (each for each in list_own_contenders() if each.name == OURS)
     prepare = partial(prepared_maker, OURS, compiled=compiled)
     return [replace(each, prepare=prepare, settings=_TOLERANCES[:-1]) for each in own]
 
 
 def term_leaves(scenes: Sequence[TermScene], compiled: bool) -> Counter[str]:
-    """Return how many of the scenes have each value of `Solver.leaves`."""
+    """Return the number of scenes with each value of `Solver.leaves`."""
     own: Any = partial(prepare, compiled=compiled)
     solvers = [own(each.scene, attitude=each.scene.attitude is not None) for each in scenes]
     return Counter(str(each.leaves) for each in solvers)
@@ -238,7 +235,7 @@ def term_leaves(scenes: Sequence[TermScene], compiled: bool) -> Counter[str]:
 def term_peers(scenes: Sequence[TermScene]) -> list[SceneContender]:
     """Return heyoka, heyoka with variational equations, and DOP853, installed or not.
 
-    heyoka computes a ready-made torque by its formula, and an expression from its tape.
+    heyoka computes a ready-made torque by its formula, an expression from its tape.
     """
     formulas = {each.scene.name: each.formula for each in scenes}
 

@@ -1,6 +1,6 @@
 """The report of `bench --terms`.
 
-A ratio is heyoka's run time divided by our run time, at equal error.
+A ratio is heyoka's run time divided by our time, at equal error.
 """
 
 import statistics
@@ -131,7 +131,7 @@ def _over(finding: Finding, load: Workload, peer: str) -> float | None:
 
 
 def _preparing(finding: Finding, load: Workload, method: str) -> float | None:
-    """Return how long a method prepares for a scene's shortest end time (s); None if unknown."""
+    """Return a method's time (s) to prepare for a scene's shortest end time; None if unknown."""
     first = next(each for each in finding.workloads if each.label == load.label)
     times = [row.preparing for row in _rows(finding, first, method)]
     return (times[0] if method == OURS else statistics.median(times)) if times else None

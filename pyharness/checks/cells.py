@@ -1,12 +1,12 @@
 """Checks that the Fortran port of each program and its Python twin agree bit for bit.
 
 A cell is a combination of a program, a case of Table 1 of the thesis, defects and readings
-(interpretations of doubtful cards). Cells are also checked in our arithmetic of other number
-formats, such as the CDC's with 48 bits.
+(interpretations of doubtful cards). Our arithmetic of other number formats, such as the CDC's with
+48 bits, is checked too.
 
-A deck, compiled from the author's cards, shares no code with port and twin. Its TAPE5, the file of
-all steps, and its printed page must equal the port's. After an overflow the port ends its run; the
-deck continues, but must not produce finite omega.
+A deck is compiled from the author's cards and shares no code with port and twin. Its TAPE5 (the
+file of all steps) and its printed page must equal the port's. After an overflow the deck continues,
+unlike the port, but must not produce finite omega.
 """
 
 from collections.abc import Iterator, Sequence
@@ -42,7 +42,7 @@ _EVALUATIONS = {"two-term": 3, "four-term": 5, "runge-kutta": 4}
 
 
 def cells(chosen: Selection) -> Iterator[Attempt]:
-    """Yield a deferred check for each listing and case, or for a few if `chosen.thin`."""
+    """Yield a check for each listing and case, or for a few if `chosen.thin`."""
     divergences = facts("divergences")["divergence"]
     listed = {entry["cell"] for entry in divergences if entry["kind"] == "cross-language"}
     for listing, case in all_cells():
@@ -54,12 +54,12 @@ def cells(chosen: Selection) -> Iterator[Attempt]:
 
 
 def of_cell(suite: str, listing: Listing, case: int) -> Name:
-    """Return the name of a listing's check in a case; `suite` is its kind."""
+    """Return the name of a check of the kind `suite`."""
     return Name(suite, listing.program, f"case-{case}", listing_name(listing))
 
 
 def random_programs(chosen: Selection) -> Iterator[Attempt]:
-    """Yield a deferred check for each draw of a random scene, listing and stop test."""
+    """Yield checks of random scenes, listings and stop tests."""
     for number in range(chosen.draws):
         yield Attempt(chosen.name_draw(number, "program"), partial(_of_draw, chosen.seed, number))
 
@@ -73,10 +73,8 @@ def _of_draw(seed: str, number: int, name: Name) -> Check:
 def _agreement(
     listing: Listing, scene: Scene, is_listed: bool, options: Sequence[Any], name: Name
 ) -> Check:
-    """Return the check that Fortran and Python agree, or differ if `is_listed` as a divergence.
-
-    `options` has the constant of the stop test (1/s), and whether the test may end the run.
-    """
+    """Return the check that Fortran and Python agree or, if `is_listed`, differ."""
+    # The options are the constant of the stop test (1/s), and whether the test may end the run.
     run = PROGRAM_REGISTRY[listing.program].run
     compiled, twin = (run(scene, listing, language, *options) for language in ("fortran", "python"))
     found = differences(compiled, twin)
@@ -101,12 +99,12 @@ _VECTORS = Basis(
 
 
 def words(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of our arithmetic of machine words, bit for bit.
+    """Yield checks of our arithmetic of machine words, bit for bit.
 
     The first check compares CDC instructions with their expected results. In each case and listing,
-    our arithmetic with 53 bits must agree with floats; in other arithmetics the compiled program
-    must agree with its Python version. If `chosen.only` is empty, only the original and corrected
-    listings are checked; against floats also those with a single defect or reading.
+    our arithmetic with 53 bits must agree with floats; in other arithmetics, the compiled program
+    must agree with its Python version. By default only the original and corrected listings are
+    checked; against floats, also those with a single defect or reading.
     """
     yield Attempt(Name("words", "vectors"), _vectors)
     for listing, case in all_cells():
@@ -144,7 +142,7 @@ _THIN = ("two-term/case-3/original", "four-term/case-7/corrected", "runge-kutta/
 
 
 def listings(program: str) -> list[Listing]:
-    """Return the original and corrected listings, and with one defect or card's reading changed."""
+    """Return the original and corrected listings, and each with one defect or reading changed."""
     names = frozenset(switches(program))
     found = [Listing.original(program), Listing.corrected(program)]
     found += [Listing(program, frozenset([name])) for name in switches(program)]
@@ -155,7 +153,7 @@ def listings(program: str) -> list[Listing]:
 
 
 def decks(chosen: Selection) -> Iterator[Check]:
-    """Yield checks of the author's cards, compiled, against the port; none without a compiler."""
+    """Yield checks of the compiled decks against the port; none without a compiler."""
     every = product(chain.from_iterable(map(listings, PROGRAMS)), case_numbers())
     some = [cell for cell in every if not chosen.thin or cell_name(*cell) in _THIN]
     named = [(of_cell("decks", *cell), *cell) for cell in some]

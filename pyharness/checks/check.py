@@ -35,19 +35,14 @@ BITS = Basis(
 
 @dataclass(frozen=True)
 class Name:
-    """The name of a check. Its id joins the parts by slashes, as in ``cells/two-term``.
+    """The name of a check; its id joins the parts by slashes, as in ``cells/two-term``."""
 
-    `suite` is a kind of checks of `verify`, or a trial of `stress`; `subject` is a program or
-    method. `circumstance` names the problem; `scene` is its scene, if any. `setting` is a
-    tolerance, step size or listing, `quantity` the compared number. `command` (``verify`` or
-    ``stress``), the id and `options` repeat the check.
-    """
-
-    suite: str
-    subject: str = ""
-    circumstance: str = ""
-    setting: str = ""
-    quantity: str = ""
+    suite: str  # kind of check of `verify`, or trial of `stress`
+    subject: str = ""  # program or method
+    circumstance: str = ""  # problem
+    setting: str = ""  # tolerance, step size or listing
+    quantity: str = ""  # compared number
+    # Command (``verify`` or ``stress``) and options that repeat the check.
     command: str = field(default="verify", kw_only=True)
     options: str = field(default="", kw_only=True)
     scene: Scene | None = field(default=None, kw_only=True, compare=False, repr=False)
@@ -91,13 +86,13 @@ class Name:
         return Check(self, bool(passed), value, limit, basis, note)
 
     def described(self, value: float | None, note: str = "") -> "Check":
-        """Return a check without limit, which reports `value` and can't fail."""
+        """Return a check without limit, which can't fail."""
         return Check(self, True, None if value is None else float(value), None, None, note)
 
 
 @dataclass(frozen=True)
 class Check:
-    """The result of one check: a value, its limit, and whether it passed."""
+    """The result of one check."""
 
     name: Name
     passed: bool
@@ -124,7 +119,7 @@ class Check:
 
     @property
     def suite(self) -> str:
-        """Return the kind of the check."""
+        """Return the check's kind."""
         return self.name.suite
 
     @property
@@ -138,7 +133,7 @@ class Check:
         return self.again or self.name.replay
 
     def record(self) -> dict[str, Any]:
-        """Return the check as a dictionary for JSON, with the fields of a subclass."""
+        """Return the fields as a dictionary for JSON."""
         head = {"id": self.id, "passed": self.passed, "value": self.value, "limit": self.limit}
         more = {each.name: getattr(self, each.name) for each in fields(self)[_OF_ANY:]}
         bound = None if self.reference_bound is None else self.reference_bound()
@@ -152,7 +147,7 @@ _OF_ANY = len(fields(Check))
 
 @dataclass(frozen=True)
 class Sample(Check):
-    """A check in a random scene, with three fields by which reports group checks."""
+    """A check in a random scene, with fields by which reports group checks."""
 
     entrance: str = ""  # call that solved the scene, as in ``solve-taylor``
     tolerance: float = math.nan
@@ -163,7 +158,7 @@ class Sample(Check):
 class Attempt:
     """A deferred computation of all checks whose ids begin with the id of `name`.
 
-    ``make(name)`` is called only if one of them is requested.
+    ``make(name)`` is called only if such a check is requested.
     """
 
     name: Name
@@ -178,7 +173,7 @@ def make_checks(
 ) -> Iterator[Check]:
     """Yield the finished checks in `attempts`, and the deferred ones that `only` requests.
 
-    An exception becomes a failed check, unless `raised` has its type.
+    An exception becomes a failed check, unless its type is in `raised`.
     """
     for each in attempts:
         if isinstance(each, Check):
@@ -210,8 +205,8 @@ def run_suites(
 ) -> Iterator[Check]:
     """Yield the requested checks of all suites (kinds of checks).
 
-    An exception becomes a failed check, except NotBuiltError, and InputError in the suites
-    `of_the_user`, which read the user's files.
+    An exception becomes a failed check, except NotBuiltError and, in the suites `of_the_user`,
+    which read the user's files, InputError.
     """
     for suite, attempts in suites.items():
         raised = (NotBuiltError, InputError) if suite in of_the_user else (NotBuiltError,)
@@ -223,12 +218,12 @@ def run_suites(
 
 
 def requested_suites(suites: Iterable[str], only: Sequence[str]) -> list[str]:
-    """Return the kinds of checks that may contain a requested check."""
+    """Return the suites that may contain a requested check."""
     return [suite for suite in suites if may_hold(suite, only)]
 
 
 def severity(check: Check) -> tuple[bool, float]:
-    """Return a sort key: passed before failed, then by the ratio of value to limit."""
+    """Return a sort key: passed before failed, then the ratio of value to limit."""
     if check.value is None or check.limit is None or check.value == check.limit == 0.0:
         return not check.passed, 0.0
     ratio = abs(check.value) / check.limit if check.limit else math.inf
@@ -263,7 +258,7 @@ class Selection:
         return may_hold(id, self.only)
 
     def name_draw(self, number: int, subject: str = "") -> Name:
-        """Return the name of the check of `subject` in draw `number`."""
+        """Return the name of `subject`'s check in draw `number`."""
         draws = f" --draws {self.draws}" if self.draws > DRAWS else ""
         options = f"{draws} --seed {shlex.quote(self.seed)}"
         return Name("random", subject, str(number), options=options)

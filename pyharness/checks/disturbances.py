@@ -1,8 +1,9 @@
 """Amplification of perturbations by the programs, and step sizes of divergence.
 
-The amplification by a step, measured in a run, may differ only by rounding errors from the exact
-one of `theory.amplification`. The step sizes of divergence are compared with those that linear
-stability predicts. J is the Jacobian of Euler's equations (13-15 of the thesis).
+The amplification by a step, measured in a run, may differ from the exact one of
+`theory.amplification` by rounding errors only. The step size at which a run diverges is compared
+with that predicted by linear stability. J is the Jacobian of Euler's equations (13-15 of the
+thesis).
 """
 
 import math
@@ -57,7 +58,7 @@ ROUNDED = Basis(
 
 @dataclass(frozen=True)
 class Probe:
-    """A vector or matrix, measured by running a program and derived from theory."""
+    """A vector or matrix, both measured by running a program and derived from theory."""
 
     found: Array  # measured
     derived: Array  # derived, of the same shape
@@ -81,22 +82,22 @@ def steady_scene(coefficients: Triple, omega: Triple, step: float) -> Scene:
 
 
 def jacobian(scene: Scene, omega: Sequence[float]) -> Exact:
-    """Return the exact Jacobian of Euler's equations at `omega`, times the scene's step size."""
+    """Return the exact Jacobian of Euler's equations at `omega`, times the step size."""
     a, b, c = (Fraction(each) * Fraction(scene.step_size) for each in scene.euler_coefficients)
     x, y, z = map(Fraction, omega)
     return [[Fraction(0), a * z, a * y], [b * z, Fraction(0), b * x], [c * y, c * x, Fraction(0)]]
 
 
 def eigenvalues(scene: Scene) -> Array:
-    """Return the eigenvalues of the Jacobian at the initial omega, times the step size."""
+    """Return the eigenvalues of the initial Jacobian, times the step size."""
     return np.asarray(np.linalg.eigvals(np.array(jacobian(scene, scene.omega), dtype=float)))
 
 
 def first_step(scene: Scene, listing: Listing) -> Probe:
-    """Return the 3 x 3 derivative of the first step at a steady rotation, measured and derived.
+    """Return the 3 x 3 derivative of the first step at a steady rotation.
 
-    As a step is a polynomial of omega with known degree, differences over enough neighbours give
-    its derivative exactly, except for rounding.
+    A step is a polynomial of omega with known degree. Differences over enough neighbours therefore
+    give its derivative, exact except for rounding.
     """
 
     def stepped(omega: Array) -> Array:
@@ -111,9 +112,9 @@ def first_step(scene: Scene, listing: Listing) -> Probe:
 
 
 def later_steps(scene: Scene, listing: Listing) -> Probe:
-    """Return the perturbation of a spinning top after all steps of a scene, measured and derived.
+    """Return the perturbation of a spinning top after all steps of a scene.
 
-    omega3 is the spin; omega1 and omega2 are the perturbation. Euler's coefficient C and the torque
+    The spin is omega3; omega1 and omega2 are the perturbation. Euler's coefficient C and the torque
     are zero, so that the equations are linear and the perturbation may have any size.
     """
     rows = _run(scene, listing)
@@ -135,10 +136,7 @@ def later_steps(scene: Scene, listing: Listing) -> Probe:
 
 
 def complex_step(listing: Listing, step: int, z: complex) -> Probe:
-    """Return the growth factor of a collocation step on x' = z x, measured and derived.
-
-    The step, of 1 s, is number `step` of a run in Python.
-    """
+    """Return the growth factor of a 1 s collocation step, number `step` of a run, for x' = z x."""
     program = listing.program
     moved = _moved(listing, step)
 
@@ -156,11 +154,12 @@ def complex_step(listing: Listing, step: int, z: complex) -> Probe:
 
 
 def observed_boundary(listing: Listing, direction: complex) -> Probe:
-    """Return the distance of z from 0 at which perturbations begin to grow, measured and derived.
+    """Return the distance of z from 0 at which perturbations begin to grow.
 
     z is the step size times an eigenvalue of the Jacobian. The distance is bisected along
-    `direction`, -1 or 1j, in runs of a spinning top. With the defect `base-not-restored`, where a
-    constant part of omega might hide the growth, the change of omega from step to step is measured.
+    `direction`, -1 or 1j, in runs of a spinning top. With the defect `base-not-restored`, a
+    constant part of omega might hide the growth, so the change of omega from step to step is
+    measured.
     """
     matrix = amplification(listing)
     expected, slope = boundary(matrix, direction)
@@ -195,7 +194,7 @@ def _moved(listing: Listing, step: int) -> float:
 
 
 def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
-    """Return the derivative of a collocation step at an unsteady omega, measured and derived.
+    """Return the derivative of a collocation step at an unsteady omega.
 
     A step h takes omega to omega + h F + h**2/2 J F + w h**3 Q(F), where F is the right-hand side,
     J its Jacobian and Q its quadratic part. Only the weight w depends on the collocation points.
@@ -241,10 +240,7 @@ def _differentiated(
 
 
 def _units(scene: Scene, program: str, sizes: Array, moved: float = 1.0) -> Array:
-    """Return a bound on omega's rounding error in a step, in units of 2**-53 rad/s.
-
-    It is proportional to the sum of the magnitudes of the step's terms; `sizes` bounds abs(omega).
-    """
+    """Return a bound on omega's rounding error in a step (2**-53 rad/s), given bounds on omega."""
     on = Numbers(scene, scene.step_size, sizes=True)
     if program == "runge-kutta":
         # In the original program each stage starts from the previous one, so the terms are larger.
@@ -309,7 +305,7 @@ def smallest_divergent(scene: Scene, time: float, runner: Runner, smallest: floa
     """Return the smallest step size (s) with which a run diverges.
 
     In such a run a component of omega exceeds twice its largest true value, or the run ends early.
-    Return 0 if it is at most `smallest` (s), infinity if there is none.
+    Return 0 if the run with steps of `smallest` (s) diverges too, infinity if none does.
     """
     bounds = 2.0 * np.array(_bounds(scene, time))
 
@@ -331,10 +327,8 @@ def smallest_divergent(scene: Scene, time: float, runner: Runner, smallest: floa
 def _doubling(
     matrix: Amplification, rate: float, time: float, smallest: float, missed: float = 0.0
 ) -> float:
-    """Return the smallest step (s) with which, by theory, a wobble grows 2 exp(`missed`) times.
-
-    `missed` allows for a peak between two steps; `rate` is the wobble's angular frequency (1/s).
-    """
+    """Return the smallest step (s) with which, by theory, a wobble grows 2 exp(`missed`) times."""
+    # `rate` is the wobble's angular frequency (1/s); `missed` allows for a peak between two steps.
     wanted, low, high = math.log(2.0) + missed, smallest, time
     for _ in range(200):
         step = math.sqrt(low * high)

@@ -1,6 +1,6 @@
 """Checks of every method against results published by others.
 
-The limit is the sum of the accuracy of the published number, a bound on the method's error, and the
+The limit is the sum of the published number's accuracy, a bound on the method's error, and the
 effect of rounding the problem's numbers to binary64.
 """
 
@@ -156,11 +156,8 @@ def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -
 
 
 def _turns(scene: Scene, times: Sequence[float]) -> Array:
-    """Return the change of attitude (rad) at each time by rounding the scene's numbers.
-
-    It is the sum of the magnitudes of first-order changes; without a solution, the rounding of
-    quaternions alone.
-    """
+    """Return the attitude's change (rad) at each time when the scene's numbers are rounded."""
+    # The rounding of quaternions; the changes that follow are added with positive signs.
     turned = np.full(len(times), 8.0 * _HALF_ULP)
     run = method_candidate("auto", METHODS["auto"].finest).rows
     try:
@@ -198,10 +195,7 @@ def _side(problem: Problem, values: Sequence[Value], only: Sequence[str]) -> Ite
 def _as_far_as_solved(
     solve: Callable[[Sequence[Value]], list[_Row]], values: Sequence[Value]
 ) -> tuple[list[_Row], str]:
-    """Return the results of `solve` for as many values as possible, and its refusal or "".
-
-    If it refuses all values together, it may solve the first ones.
-    """
+    """Return the results of the first values that `solve` accepts, and its refusal or ""."""
     try:
         return solve(values), ""
     except InputError as refusal:
@@ -237,14 +231,7 @@ def _results(problem: Problem, method: str, values: Sequence[Value]) -> list[_Re
 
 
 def _program(problem: Problem, value: Value, program: str) -> _Result | None:
-    """Return omega by a corrected program at the time of `value`, and a bound on its error.
-
-    The step is halved until the estimated error is below a tenth of the published accuracy, or
-    below the rounding error, half a unit in the last place for each step. The estimate is twice the
-    change of the result by the last halving, divided by 2**order - 1. Return None if the
-    collocation matrix is singular in the first two runs. Raise InputError if the last run did not
-    complete.
-    """
+    """Return a corrected program's omega at the time of `value`, and its error bound, or None."""
     scene, time = problem.scene, float(value.time)
     finest_print = min(figure.accuracy for figure in value.omega if figure is not None)
     accuracy = finest_print * UNITS[problem.unit]
@@ -291,10 +278,7 @@ def _scale(scene: Scene, omega: Array) -> float:
 
 
 def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
-    """Return, by printed time, omega's change (rad/s) when a scene's numbers are rounded.
-
-    It is of first order, and zero at times without a solution.
-    """
+    """Return, by printed time, omega's change (rad/s) when the scene's numbers are rounded."""
 
     def solve(values: Sequence[Value]) -> list[Array]:
         times = [float(value.time) for value in values]

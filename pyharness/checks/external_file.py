@@ -47,7 +47,7 @@ class Pointing:
 
 @dataclass(frozen=True)
 class Value:
-    """The published results at one time: omega, an attitude, or both."""
+    """The published results at one time."""
 
     time: str  # as printed (s); taken as exact
     # in the unit of the problem; None where nothing is printed
@@ -57,7 +57,7 @@ class Value:
 
 @dataclass(frozen=True)
 class Problem:
-    """A published problem: a scene, and its results at several times."""
+    """A published scene, and its results at several times."""
 
     name: str  # name of its file
     title: str  # title as a sentence
@@ -68,9 +68,9 @@ class Problem:
 
 
 def figure(where: str, text: object, good_to: float = 0.0) -> Figure:
-    """Return the published number with the digits `text`, and its accuracy.
+    """Return the published number with the digits `text`.
 
-    The accuracy is half a unit of the last digit or, if larger, `good_to`. Raise InputError if
+    Its accuracy is half a unit of the last digit or, if larger, `good_to`. Raise InputError if
     `text` is no number or too large for binary64.
     """
     if not isinstance(text, str):
@@ -94,7 +94,7 @@ def read_problem(path: str | Path) -> Problem:
 
 @cache
 def problems() -> tuple[Problem, ...]:
-    """Return the published problems of the package, ordered by name."""
+    """Return the package's published problems, ordered by name."""
     return tuple(_read(path, None) for path in sorted(_FOLDER.glob("*.toml")))
 
 

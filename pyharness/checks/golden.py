@@ -1,4 +1,4 @@
-"""The golden record: the trajectories of this version, as exact text.
+"""The golden record: recorded trajectories, as exact text.
 
 Each program or method has a file. An entry describes one trajectory: the command that prints it,
 its ending, a digest of all rows, and the first, tenth and last row as hexadecimal floats.
@@ -54,7 +54,7 @@ _KEYS = ("command", "ended", "steps", "evaluations", "stop", "digest")
 
 @dataclass(frozen=True)
 class Recorded:
-    """A trajectory of the golden record, and how to compute it."""
+    """A trajectory of the golden record."""
 
     source: str  # program or method, which is the name of the file
     name: str  # last parts of the check's id, as in ``case-3/original``
@@ -72,7 +72,7 @@ class Recorded:
 
 
 def recorded() -> Iterator[Recorded]:
-    """Yield the trajectories to record, by each method and by each version of each program."""
+    """Yield the trajectories to record."""
     for case in case_numbers():
         scene = case_scene(case)
         command = f"python -m pyharness run --case {case}"
@@ -89,11 +89,11 @@ def recorded() -> Iterator[Recorded]:
 
 
 def golden(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred comparisons with the golden record, if its folder `chosen.record` exists.
+    """Yield comparisons with the golden record, if its folder exists.
 
     Methods with a tolerance must agree within twice the tolerance, because processors and compilers
-    round differently. Programs and other methods must agree bit for bit or, if another mathematical
-    library computes the torque's sines and cosines, within the amplified rounding errors.
+    round differently. Programs and other methods must agree bit for bit. If another mathematical
+    library computes the torque's sines and cosines, the limit is the amplified rounding error.
     """
     if not chosen.record.is_dir():
         return
@@ -164,7 +164,7 @@ def read_record(folder: Path) -> dict[str, dict[str, Any]]:
 def files_made(folder: Path) -> set[str]:
     """Return the names of the files in `folder` that `verify --update` made.
 
-    If there are any, all files with the name of a record count, even damaged ones.
+    If there is such a file, all files with the name of a record are included, even damaged ones.
     """
     found = set()
     for path in folder.glob("*.toml"):
@@ -175,7 +175,7 @@ def files_made(folder: Path) -> set[str]:
 
 
 def update(folder: Path) -> tuple[dict[str, bytes], list[str]]:
-    """Return the files of a new golden record, by name, and its differences from the old one."""
+    """Return a new golden record's files by name, and its differences from the old one."""
     known: dict[str, dict[str, Any]] = {}
     # Beside a damaged old record, every trajectory counts as new.
     with suppress(InputError):
@@ -221,7 +221,7 @@ def _entry(each: Recorded, run: Trajectory) -> dict[str, Any]:
 
 
 def _rows(entry: dict[str, Any]) -> Array:
-    """Return an entry's rows: step, time, time as printed, omega and, for programs, velocity."""
+    """Return rows of step, time, printed time, omega and, for programs, velocity."""
     return np.array([[float(row[0]), *map(float.fromhex, row[1:])] for row in entry["rows"]])
 
 

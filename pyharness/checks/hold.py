@@ -1,8 +1,8 @@
 """Checks of methods against the true solution of a scene, within bounds derived beforehand.
 
 Errors of the programs of the thesis are reported without a bound. `auto`, `quick` and methods
-without a tolerance run as prepared solvers, which report a refused scene in their result; the
-others raise InputError.
+without a tolerance run as prepared solvers, whose results report a refused scene; the others raise
+InputError.
 """
 
 import math
@@ -66,10 +66,8 @@ FORMS = ("closed-form", "auto")
 
 @cache
 def _series(name: str) -> tuple[float, ...]:
-    """Return a method's step for y' = y**2, y(0) = 1, as coefficients of powers of the step size.
-
-    This is each of Euler's equations with A = B = C = 1 and equal components.
-    """
+    """Return a method's step for y' = y**2, y(0) = 1, as a power series in the step size."""
+    # With A = B = C = 1 and equal components, each of Euler's equations is y' = y**2.
     ones = np.ones(3)
     equal = Scene("equal", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))
     found = SCHEMES[name].scheme(Series(equal), constant(ones))[:, 0]
@@ -103,7 +101,7 @@ def check_all(
     checks: Callable[[Name, float], Iterable[Attempt]] | None = None,
     has_programs: Callable[[Circumstance], bool] = lambda each: True,
 ) -> Iterator[Attempt]:
-    """Yield deferred checks of all methods in the extreme scenes of a trial."""
+    """Yield checks of all methods in a trial's extreme scenes."""
     for each in EXTREMES[suite]():
         name = named(suite, "", each.name, scene=each.scene)
         yield from (checks or check_methods)(name, each.time)
@@ -119,7 +117,7 @@ def check_methods(
     tolerances: Callable[[str, Scene, float], Sequence[float | None]] | None = None,
     judged: Judged | None = None,
 ) -> Iterator[Attempt]:
-    """Yield deferred checks of each method's error at `time` (s) in the scene of `name`.
+    """Yield checks of each method's error at `time` (s) in the scene of `name`.
 
     By default, the limit is the sum of the amplified tolerance, the amplified rounding error, and
     the error of the true solution. For fixed steps without torque, a bound from the order replaces
@@ -167,11 +165,7 @@ def refusable(tried: MethodRun, truth: Truth, why: str) -> bool:
 
 
 def _derived(truth: Truth, tried: MethodRun) -> float | None:
-    """Return the limit of a method's error, relative to the largest omega.
-
-    It is None without a bound on the errors of steps, infinite if it leaves fewer than two digits
-    of omega.
-    """
+    """Return the limit of a method's relative error; None without a bound on its steps' errors."""
     made = promised_sum(tried, truth)
     if truth.exact and tried.method in FORMS:
         # A closed form has no steps; only the rounding of A, B and C is added.
@@ -224,9 +218,9 @@ def scene_of(name: Name) -> Scene:
 
 
 def promised_sum(tried: MethodRun, truth: Truth) -> float | None:
-    """Return a bound on the summed errors of steps, relative to the largest omega, or None.
+    """Return a bound on the sum of all steps' errors, relative to the largest omega, or None.
 
-    For fixed steps without torque, it is infinite if the largest Euler coefficient times the
+    For fixed steps without torque, the bound is infinite if the largest Euler coefficient times the
     largest omega times the step is 0.5 rad or more.
     """
     method = tried.method
@@ -246,7 +240,7 @@ def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:
 
     The error is relative to `largest` (rad/s). Energy and squared momentum are sums of q w**2 over
     the components w, where q is the moment or its square. An error e of every component changes
-    such a sum by at most 2 e times the sum of q abs(w), so that the change bounds e from below.
+    such a sum by at most 2 e times the sum of q abs(w), which bounds e from below.
     """
     assert scene.moments is not None
     if not np.isfinite(omega).all():
@@ -264,7 +258,7 @@ def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:
 
 
 def describe_programs(name: Name) -> Iterator[Attempt]:
-    """Yield deferred reports of each program's largest relative error, original and corrected."""
+    """Yield reports of the programs' largest relative errors."""
     scene = scene_of(name)
     every = max(1, scene.steps // _ROWS)
     rows = slice(every - 1, None, every)

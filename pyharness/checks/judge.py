@@ -44,7 +44,7 @@ class Answer:
 
 
 def of_end(method: str, end: End) -> Answer:
-    """Return the answer of `method` from the `End` of its call."""
+    """Return a method's answer from the `End` of its call."""
     if end.is_refused:
         return Answer(refusal=f"{method}: {end.ended}")
     attitude = None if end.attitude is None else end.attitude[None, :]
@@ -54,10 +54,10 @@ def of_end(method: str, end: End) -> Answer:
 
 @dataclass(frozen=True, eq=False)
 class MethodRun:
-    """A deferred run of a method on a scene; `tolerance` is None for a fixed step."""
+    """A deferred run of a method on a scene."""
 
     method: str
-    tolerance: float | None
+    tolerance: float | None  # None for a fixed step
     scene: Scene
     ask: Callable[[], Answer]
 
@@ -87,51 +87,31 @@ def by_rows(method: str, tolerance: float, scene: Scene, times: Sequence[float])
 def by_end(
     method: str, candidate: Candidate, tolerance: float, scene: Scene, time: float
 ) -> MethodRun:
-    """Return a deferred run of a candidate to `time` (s); limits are those of `method`."""
+    """Return a deferred run of a candidate to `time` (s); its limits are those of `method`."""
     return MethodRun(method, tolerance, scene, lambda: of_end(method, candidate.end(scene, time)))
 
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """The true solution of a scene at some times, and its conditioning until the last time.
+    """The true solution of a scene at some times, and its conditioning until the last time."""
 
-    Attributes
-    ----------
-    time, omega : ndarray of shape (n,) and (n, 3)
-        Times (s) and angular velocities (rad/s).
-    error : float
-        Bound on the error of each component of `omega` (rad/s).
-    flow : Conditioning
-        Error amplification and rounding errors of the motion.
-    attitude, angle_error : ndarray of shape (n, 4) or None, float
-        True quaternions, which are compared instead of omega, and a bound on their error (rad).
-    is_signed : bool
-        Whether the sign of a quaternion counts.
-    data : float
-        Change of omega by the rounding of A, B and C, divided by the largest abs(omega).
-    exact : bool
-        Whether the solution is a torque-free closed form, with known `data`, and conserved energy
-        and momentum.
-    scene, reference, effort : Scene, Reference and float, or None
-        The scene, the reference solution and its factor on the work limit, if one was used.
-    """
-
-    time: Array
-    omega: Array
-    error: float
+    time: Array  # shape (n,), s
+    omega: Array  # shape (n, 3), rad/s
+    error: float  # bound on the error of each component of omega, rad/s
     flow: Conditioning
-    attitude: Array | None = None
-    angle_error: float = 0.0
-    is_signed: bool = False
-    data: float = 0.0
-    exact: bool = False
+    attitude: Array | None = None  # shape (n, 4), quaternions to compare instead of omega
+    angle_error: float = 0.0  # bound on the error of the attitude, rad
+    is_signed: bool = False  # whether the sign of a quaternion counts
+    data: float = 0.0  # change of omega by rounding A, B and C, over the largest abs(omega)
+    exact: bool = False  # torque-free closed form, with known `data`
+    # The reference solution, its scene and its factor on the work limit, if one was used.
     scene: Scene | None = None
     reference: Reference | None = None
     effort: float | None = None
 
     @cached_property
     def bound(self) -> ErrorBound | None:
-        """Return the error bound of the reference (relative, or rad), or None."""
+        """Return the error bound (relative, or rad) of the reference, if one was used."""
         if self.scene is None or self.reference is None:
             return None
         bound = bound_of(self.scene, self.reference, any_torque=True, effort=self.effort)
@@ -139,12 +119,12 @@ class Truth:
 
     @property
     def end(self) -> float:
-        """Return the last time of the true solution (s)."""
+        """Return the last time (s)."""
         return float(self.time[-1])
 
     @property
     def relative_error(self) -> float:
-        """Return the bound on the error of the true omega, divided by the largest abs(omega)."""
+        """Return the bound on the error of omega, divided by the largest abs(omega)."""
         return self.error / (self.flow.largest or 1.0)
 
     def error_of(self, answer: Answer) -> float:
@@ -172,10 +152,7 @@ def reference_truth(
     effort: float | None = None,
     flow: Conditioning | None = None,
 ) -> Truth:
-    """Return the reference solution of a scene at all `times` (s).
-
-    Raise InputError if it does not reach all of them.
-    """
+    """Return the reference solution at `times` (s); raise InputError if it does not reach them."""
     flow = flow or conditioning_at(scene, times)
     # The usual reference has errors of 1e-22 in its steps, too large for an amplification above
     # 1e3.
@@ -252,7 +229,7 @@ def judge(name: Name, tried: MethodRun, truth: Truth, policy: Policy) -> Check:
     """Return the check that a method's error is within its limit, or that its refusal is permitted.
 
     Without a limit, a finite error is only reported. `closed-form` fails if it solves a scene
-    that has no closed form.
+    without closed form.
     """
     answer = tried.answer
     if why := answer.refusal:

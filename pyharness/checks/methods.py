@@ -1,11 +1,10 @@
 """Checks of methods against the high-precision reference in the cases of Table 1 of the thesis.
 
-The limit of an error is the requested tolerance. Errors of omega are relative to the largest omega,
+The limit of an error is the requested tolerance. Errors of omega are relative to the largest omega;
 errors of the attitude are angles (rad).
 
-An order is the power of the step size to which errors are proportional. It is measured against
-`solve_ivp` for the programs' omega, against the reference for their translational velocity and for
-methods with a fixed step.
+An order is the power of the step size to which errors are proportional. The programs' omega is
+compared with `solve_ivp`; their translational velocity and fixed-step methods, with the reference.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -61,14 +60,14 @@ _PREPARED_TURNED = ("auto", "taylor")
 
 
 def methods(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of omega by every method, at a case's times and a later time."""
+    """Yield checks of omega by every method, at a case's times and a later time."""
     for case in cases(chosen):
         scene = case_scene(case)
         yield from _solved("methods", case, scene, (*scene.times(), _LATER), _SOLVED, chosen.thin)
 
 
 def prepared(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of prepared solvers, at positive and negative times.
+    """Yield checks of prepared solvers, at positive and negative times.
 
     With a fixed step, they must agree bit for bit with the unprepared method.
     """
@@ -82,7 +81,7 @@ def prepared(chosen: Selection) -> Iterator[Attempt]:
 
 
 def attitudes(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of attitudes, by `solve` and by prepared solvers."""
+    """Yield checks of attitudes, by `solve` and by prepared solvers."""
     for case in cases(chosen):
         scene = replace(case_scene(case), attitude=START)
         times = (*scene.times()[9::10], _LATER)
@@ -141,7 +140,7 @@ def _judged(tried: Callable[[], MethodRun], truth: Callable[[], Truth], name: Na
 
 
 def _same_steps(scene: Scene, name: Name) -> Check:
-    """Return the check that 100 steps of a prepared solver equal those of `solve` or the kernel."""
+    """Return the check that 100 prepared steps equal those of `solve` or the kernel."""
     method, time = name.subject, 100.0 * scene.step_size
     found = prepared_candidate(method, 1.0).end(scene, time).omega
     if method in FIXED_STEP:
@@ -169,7 +168,7 @@ _FEWEST, _MOST = 16, 4096
 
 
 def orders(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of orders; the value is the theoretical minus the measured one."""
+    """Yield checks of orders; the value is the theoretical minus the measured one."""
     for case in cases(chosen, (5,)):
         scene = case_scene(case)
         known = cache(partial(reference, scene, scene.times()))
@@ -216,7 +215,7 @@ def in_few_steps(scene: Scene, time: float) -> Scene:
 
 
 def order_if_seen(scene: Scene, truth: Callable[[], Reference], name: Name) -> Check:
-    """Return the check of the order of the fixed-step method in `name`.
+    """Return the check of a fixed-step method's order.
 
     The order is only reported if the scene is too fast or sensitive for 4096 steps, or if the
     torque has a table, because steps across its changes lower the order.

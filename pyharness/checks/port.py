@@ -38,18 +38,14 @@ _LIBRARY = "the torque has sines or cosines, whose last bits differ between libr
 
 @dataclass(frozen=True, eq=False)
 class Cell:
-    """A run to request from a port.
-
-    `of` is the name of its check; `options`, given to ``verify --port``, request this run alone.
-    `lipschitz` is the constant of the stop test (1/s).
-    """
+    """A run to request from a port."""
 
     name: str
-    of: Name
-    options: str
+    of: Name  # name of the check
+    options: str  # of ``verify --port``, to request this run alone
     listing: Listing
     scene: Scene
-    lipschitz: float = _DECK_LIPSCHITZ
+    lipschitz: float = _DECK_LIPSCHITZ  # constant of the stop test, 1/s
     may_stop: bool = True
 
     @property
@@ -58,21 +54,17 @@ class Cell:
         return request(self.scene, self.listing, self.lipschitz, self.may_stop)
 
     def twin(self) -> Trajectory:
-        """Return the trajectory of the Python version."""
+        """Return the Python version's trajectory."""
         run = PROGRAM_REGISTRY[self.listing.program].run
         return run(self.scene, self.listing, "python", self.lipschitz, self.may_stop)
 
 
 @dataclass(frozen=True)
 class PortCheck(Check):
-    """The comparison of a port with the Python version in one run.
+    """The comparison of a port with the Python version in one run."""
 
-    `difference` has the values of all variables in the first step that differs; `seconds` is the
-    time (s) until the port's answer.
-    """
-
-    seconds: float | None = None
-    difference: dict[str, Any] | None = None
+    seconds: float | None = None  # time until the port's answer, s
+    difference: dict[str, Any] | None = None  # all variables in the first step that differs
 
 
 def port_cells(programs: Sequence[str], cases: Sequence[int], cells: Sequence[str]) -> list[Cell]:
@@ -90,8 +82,8 @@ def random_cells(
 ) -> list[Cell]:
     """Return runs in random scenes, named as in ``random/7/two-term`` and ordered by number.
 
-    `cells` has the beginnings of the requested names, or is empty for all `draws` scenes. A number
-    in `cells` may exceed `draws`.
+    `cells` has the beginnings of the requested names, whose numbers may exceed `draws`. If it is
+    empty, all `draws` scenes are requested.
     """
     named = {int(match[1]) for each in cells if (match := _DRAWN.match(each))}
     found = []
@@ -109,7 +101,7 @@ def random_cells(
 def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Iterator[PortCheck]:
     """Yield checks that a port, started by `command`, agrees bit for bit with the Python version.
 
-    An invalid answer is a failed check and ends the comparison. `patience` is the longest wait (s).
+    An invalid answer, or none within `patience` (s), is a failed check and ends the comparison.
     Raise InputError if `command` is empty.
     """
     name, again = Name("port", "start"), replay_command(command)
@@ -141,7 +133,7 @@ def replay_command(command: str, cell: Cell | None = None) -> str:
 def compared(
     cell: Cell, twin: Trajectory, line: bytes, again: str = "", seconds: float | None = None
 ) -> PortCheck:
-    """Return the check that an answer agrees with `twin`; raise PortError for an invalid answer."""
+    """Return the check that an answer agrees with `twin`; raise PortError for an invalid one."""
     answer = read_answer(line, cell.scene.steps)
     found = differences(twin, answer)
     wanted = _rows(twin)
@@ -155,7 +147,7 @@ def compared(
 
 
 def differences(twin: Trajectory, answer: Answer) -> list[str]:
-    """Return descriptions of a port's differences from the Python version's run."""
+    """Return descriptions of the answer's differences from `twin`."""
     wanted, given = _rows(twin), answer.rows
     found = []
     if difference := _difference(wanted, given):
@@ -171,14 +163,12 @@ def differences(twin: Trajectory, answer: Answer) -> list[str]:
 
 
 def _difference(wanted: Array, given: Array) -> dict[str, Any] | None:
-    """Return the values in the first step that differs, or None.
-
-    They are hexadecimal, because JSON has no inf and nan.
-    """
+    """Return the values in the first step that differs, or None."""
     for step, (due, row) in enumerate(zip(wanted, given, strict=False), 1):
         if ulps(due, row):
             values = []
             for name, x, y in zip(VARIABLES, due.tolist(), row.tolist(), strict=True):
+                # Hexadecimal, because JSON has no inf and nan.
                 pair = {"ours": x.hex(), "theirs": y.hex(), "ulps": ulps(x, y)}
                 values.append({"variable": name, **pair})
             return {"step": step, "values": values}
@@ -225,7 +215,7 @@ def port_report(command: str, checks: Sequence[PortCheck], asked: int, seed: str
 
 
 def step_section(check: PortCheck) -> Section:
-    """Return a table of all variables in the first step that differs, exactly."""
+    """Return a table of the exact values in the first step that differs."""
     assert check.difference is not None
     rows = []
     for each in check.difference["values"]:

@@ -102,7 +102,7 @@ class PortProcess:
         return self
 
     def __exit__(self, *error: object) -> None:
-        """End the port's process and all its child processes."""
+        """End the port and all its child processes."""
         # All processes may have ended; macOS then raises PermissionError.
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(self._process.pid, signal.SIGKILL)
@@ -120,7 +120,7 @@ class PortProcess:
             file.close()
 
     def ask(self, line: bytes) -> bytes:
-        """Send the request `line` and return the answer, both without a line feed.
+        """Send a request and return the answer, both without line feed.
 
         Raise PortError if the answer is late, too long, or longer than one line.
         """

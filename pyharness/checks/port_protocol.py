@@ -25,16 +25,12 @@ ENDINGS = ("complete", "stopped", "overflow")
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """A port's result of one run.
+    """A port's result of one run."""
 
-    `rows` has TIME (s), omega and velocity after each step, shape (n, 7); `ended` is one of
-    `ENDINGS`. `ier` has the error code of each step, or is None for a program that prints none.
-    """
-
-    rows: Array
-    ended: str
+    rows: Array  # TIME (s), omega and velocity after each step, shape (n, 7)
+    ended: str  # one of `ENDINGS`
     stop: Stop | None
-    ier: list[int] | None
+    ier: list[int] | None  # error code of each step; None for a program that prints none
 
 
 def request(
@@ -56,7 +52,7 @@ def request(
 
 
 def requested_scene(scene: Scene) -> dict[str, Any]:
-    """Return the field `scene` of a request."""
+    """Return a request's field `scene`."""
     return {
         **scene_record(scene),
         "masses": scene.masses,
@@ -111,7 +107,7 @@ def _stop(stop: object) -> Stop:
 
 
 def read_list(where: str, value: object) -> list[Any]:
-    """Return a JSON list; raise PortError, naming `where`, for another value."""
+    """Return a JSON list; raise PortError for another value."""
     if not isinstance(value, list):
         raise PortError(f"{where}: {kind_of(value)} where a list belongs")
     return value
@@ -126,14 +122,14 @@ def read_row(where: str, row: object, width: int, told: str) -> list[float]:
 
 
 def read_name(field: str, value: object, allowed: Sequence[str]) -> str:
-    """Return one of the `allowed` texts; raise PortError, naming the field, for another value."""
+    """Return one of the `allowed` texts; raise PortError for another value."""
     if value not in allowed:
         raise PortError(f"{field} is {json.dumps(value)[:60]}; allowed: {', '.join(allowed)}")
     return str(value)
 
 
 def read_whole(where: str, value: object) -> int:
-    """Return a whole number; raise PortError, naming `where`, for another value."""
+    """Return a whole number; raise PortError for another value."""
     if type(value) is not int:
         raise PortError(f"{where}: {kind_of(value)} where a whole number belongs")
     return value

@@ -1,12 +1,11 @@
 """Checks of methods in scenes drawn from a seed, against an independent true solution.
 
 The true omega is from `integer_series`, the true attitude from `reference`. An entry point is
-`solve` or a prepared solver, with one method. The tolerance limits the error of omega, relative to
-the largest omega until the last time, or of the attitude (rad).
+`solve` or a prepared solver, with one method. The tolerance limits the error of the attitude (rad)
+or of omega, relative to the largest omega until the last time.
 
-Torques that depend on omega or attitude are sums of functions whose arithmetic is recorded, or of
-ready-made terms. The reference's series for them (`pyharness.truth.tape_series`) shares no code
-with the methods.
+Torques that depend on omega or attitude are sums of recorded functions or of ready-made terms. The
+reference's series for them (`pyharness.truth.tape_series`) shares no code with the methods.
 """
 
 from collections.abc import Callable, Iterator
@@ -92,9 +91,9 @@ def may_refuse(tried: MethodRun, truth: Truth, why: str) -> bool:
     """Return whether a method may refuse its run `tried` with the message `why`.
 
     `auto` may never refuse, `quick` always, a closed form only near the limits of binary64. Others
-    may refuse the kinds of scenes in `_MAY_REFUSE`, and scenes with an error amplification above
-    10. SciPy's methods may also refuse a tolerance finer than they meet, or one below 1e-9 that
-    takes too much work.
+    may refuse scenes of the kinds in `_MAY_REFUSE`, or with an error amplification above 10.
+    SciPy's methods may also refuse a tolerance finer than they meet, or one below 1e-9 that takes
+    too much work.
     """
     method, kind = tried.method, tried.scene.name
     if method == "auto":
@@ -134,7 +133,7 @@ TORQUE_POLICY = replace(POLICY, may_refuse=_may_refuse_torque)
 
 
 def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
-    """Yield checks of omega by every entry point; without a true solution, a check of the scene."""
+    """Yield checks of omega by every entry point; scenes of `_MAY_REFUSE` may lack a solution."""
     for number in range(chosen.draws):
         if number // 2 % _EVERY or not chosen.may_ask(f"random/{number}"):
             continue
@@ -157,7 +156,7 @@ def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
 
 
 def random_attitudes(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of attitudes, in scenes whose true attitude is known."""
+    """Yield checks of attitudes, in scenes whose true attitude is known."""
     for number in range(0, chosen.draws, _EVERY_ATTITUDE):
         if not chosen.may_ask(f"random/{number}"):
             continue
@@ -231,7 +230,7 @@ def sample(tried: Callable[[], MethodRun], truth: Truth, policy: Policy, name: N
 
 
 def random_torques(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks under torques that depend on the state, with known solutions."""
+    """Yield checks under torques that depend on the state."""
     for number in range(0, chosen.draws, _EVERY_TORQUE):
         if not chosen.may_ask(f"random/{number}"):
             continue

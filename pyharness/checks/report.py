@@ -1,4 +1,4 @@
-"""The report of checks: failures, a summary by kind, the JSON record, and the JUnit cases."""
+"""The report of checks: text, Markdown page, JSON record, and JUnit cases."""
 
 import math
 from collections import Counter
@@ -50,7 +50,7 @@ def summary_page(
     depth: int = 1,
     more: Sequence[Section] = (),
 ) -> list[Section]:
-    """Return a Markdown page: verdict, a table by the first `depth` parts of ids, and failures."""
+    """Return a Markdown page: verdict, a table by the first `depth` parts of ids, failures."""
     failed = [check for check in checks if not check.passed]
     lines: list[str] = []
     for check in failed[:_MOST_ON_PAGE]:
@@ -65,7 +65,7 @@ def summary_page(
 
 
 def _code(text: str) -> str:
-    """Return a text as Markdown code, so that a port's text can't contain links or tags."""
+    """Return Markdown code, so that a port's text can't contain links or tags."""
     return f"`{text.replace('`', chr(39))}`"
 
 
@@ -84,7 +84,7 @@ def marks(checks: Sequence[Check]) -> str:
 
 
 def basis_note(checks: Sequence[Check]) -> list[str]:
-    """Return a legend of the marks, and the number of limits of each; empty without limits."""
+    """Return a legend of the marks, with the number of limits of each; empty without limits."""
     counts = Counter(check.mark for check in checks if check.mark)
     told = ", ".join(f"{counts[mark]} {mark}" for mark in MARKS)
     legend = (
@@ -143,10 +143,10 @@ _SAMPLES = (
 
 
 def samples(checks: Sequence[Check], rounding: float) -> Section:
-    """Return a table of the worst ratios of error to tolerance, by entry point and tolerance.
+    """Return a table of the worst ratios of error to tolerance.
 
-    `rounding` times the error amplification is first subtracted from the error. The columns show
-    the number of samples and the worst ratio for three ranges of the amplification.
+    `rounding` times the error amplification is first subtracted from the error. Rows are entry
+    points and ranges of tolerance; columns are ranges of the amplification.
     """
     cells: dict[tuple[str, str], list[list[float]]] = {}
     for check in checks:

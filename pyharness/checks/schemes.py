@@ -3,10 +3,10 @@
 Fortran and Python could share a fault too small to change the order. Each step of the corrected
 programs is therefore recomputed from the previous state; only rounding errors may differ.
 
-By the stop test of the Runge-Kutta program (equation 19 of the thesis), a run stops if within a
-step the change of K (right-hand side), divided by the change of U (state), exceeds the stop
-constant. These quotients are recomputed too, and the program is run with constants just below and
-above each new maximum of them.
+The stop test of the Runge-Kutta program (equation 19 of the thesis) divides the change of K
+(right-hand side) in a step by the change of U (state). A quotient above the stop constant stops the
+run. The quotients are recomputed too, and the program is run with constants just below and above
+each new maximum.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -50,7 +50,7 @@ _Stages = tuple[_Stage, _Stage, _Stage, _Stage]
 
 
 def schemes(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of the programs' steps.
+    """Yield checks of the programs' steps.
 
     The value is the largest difference from the recomputed step, over its rounding bound.
     """
@@ -121,10 +121,8 @@ def _beginning(scene: Scene, run: Trajectory) -> _Stage:
 
 
 def _stage(scene: Scene, part: float, state: Array) -> _Stage:
-    """Return rates at the fraction `part` of every step, with bounds on their rounding errors.
-
-    They follow from equations 16-18 of the thesis and dV/dt = F/m - omega x V.
-    """
+    """Return rates at the fraction `part` of every step, with bounds on their rounding errors."""
+    # Equations 16-18 of the thesis, and dV/dt = F/m - omega x V.
     omega, velocity = state[:, :3], state[:, 3:]
     times = scene.step_size * (np.arange(len(state), dtype=np.float64) + part)
     torque = np.array([scene.normalized_torque(time) for time in times.tolist()])
@@ -148,7 +146,7 @@ _QUOTIENT = Basis(
 
 @dataclass(frozen=True, eq=False)
 class _Quotients:
-    """The quotients that the program compares with its stop constant, in the program's order."""
+    """The quotients that the program compares with its stop constant, in its order."""
 
     values: Array  # shape (n, m) for n steps, 1/s
     rounding: Array  # shape (n, m): bound on the difference of two computations, 1/s
@@ -156,7 +154,7 @@ class _Quotients:
 
 
 def stops(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of stops, for every combination of the stop test's defects.
+    """Yield checks of stops, for every combination of the stop test's defects.
 
     The value is the largest difference from a recomputed quotient, over its rounding bound.
     """

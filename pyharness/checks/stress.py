@@ -24,15 +24,12 @@ named = partial(Name, command="stress")
 
 @dataclass(frozen=True)
 class Trial:
-    """A group of checks of `stress` under one kind of extreme conditions.
-
-    `bound` describes the limits in words. `attempts` takes the requested beginnings of ids, and may
-    omit other checks.
-    """
+    """A group of checks of `stress` under one kind of extreme conditions."""
 
     name: str
     title: str
-    bound: str
+    bound: str  # describes the limits
+    # From the requested beginnings of ids; other checks may be omitted.
     attempts: Callable[[Sequence[str]], Attempts]
 
 
@@ -44,7 +41,7 @@ def trial(name: str) -> Trial:
 
 
 def stress(only: Sequence[str] = (), trials: Mapping[str, Trial] | None = None) -> Iterator[Check]:
-    """Yield the checks of `stress` whose ids begin with an element of `only`, or all if empty."""
+    """Yield the checks of `stress` whose ids begin with an element of `only`; all if empty."""
     suites = {
         name: lambda name=name: (trials[name] if trials else trial(name)).attempts(only)
         for name in trials or TRIALS

@@ -40,7 +40,7 @@ _COARSE = 1e-6
 
 
 def stress_report(trials: Sequence[Trial], checks: Sequence[Check]) -> Report:
-    """Return the report of `stress`: failures, then a table and a picture for each trial."""
+    """Return the report: failures, then a table and a picture for each trial."""
     text: list[Any] = [listed_singly(checks), [_NOTE, *basis_note(checks)]]
     for each in trials:
         own = [check for check in checks if check.suite == each.name]
@@ -85,15 +85,12 @@ def _size(check: Check) -> float:
 
 
 class _Mark(NamedTuple):
-    """A plotted check, with the properties that determine its position and style.
-
-    `kind` is the circumstance up to its first number. Marks with equal `rank` (tolerance or
-    listing) and `what` (quantity) are one series.
-    """
+    """A plotted check, with the properties that determine its position and style."""
 
     method: str
-    kind: str
+    kind: str  # the circumstance up to its first number
     circumstance: str
+    # Marks with equal `rank` (tolerance or listing) and `what` (quantity) are one series.
     rank: str
     what: str
     check: Check
@@ -116,7 +113,7 @@ def _mark(check: Check) -> _Mark:
 
 
 def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
-    """Return a trial's picture, with values and limits in a panel for each method.
+    """Return a trial's picture: values and limits, in a panel for each method.
 
     Raise InputError if no check has a value.
     """

@@ -1,4 +1,4 @@
-"""Tolerances at which the checks run each method, and limits on its work.
+"""Tolerances at which the checks run each method.
 
 A work limit, in evaluations of the right-hand side, determines which tolerances are affordable.
 """
@@ -59,8 +59,8 @@ def finest_and_middling(name: str, scene: Scene, time: float) -> list[float]:
 def affordable(name: str, scene: Scene, time: float, flow: Conditioning) -> list[float | None]:
     """Return the tolerances at which a method is checked until `time` (s) in a scene.
 
-    These are the finest one within the work limit, and 1e-6 if affordable. For fixed steps and
-    Gauss collocation, None stands for the scene's step size.
+    They are the finest within the work limit, and 1e-6 if affordable. For fixed steps and Gauss
+    collocation, None means the scene's step size.
     """
     if name in FIXED_STEP:
         return [None]
@@ -84,7 +84,7 @@ def affordable(name: str, scene: Scene, time: float, flow: Conditioning) -> list
 
 
 def _cost(name: str, tolerance: float, radians: float, amplification: float) -> float:
-    """Return the estimated work of a method, in right-hand sides; 0 if it has no work limit."""
+    """Return a method's estimated number of right-hand sides; 0 without work limit."""
     if name in GAUSS:
         stages = int(name[-1])
         # Steps of z radians cause an error of amplification times radians times z**order.

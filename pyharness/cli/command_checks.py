@@ -23,7 +23,7 @@ _HIGHEST = 40.0
 
 
 def check_port(options: argparse.Namespace, programs: Sequence[str], cases: Sequence[int]) -> int:
-    """Check the port that `options.port` starts; return 0 if all checks pass, or 1."""
+    """Check the port started by `options.port`; return 1 if a check fails, else 0."""
     shared.refuse(options, "--port", _OF_THE_CHECKS)
     names, seed = shared.names(options.cell), shared.chosen_seed(options)
     count = shared.chosen_count(options.draws, "--draws", 0, 0, shared.CHECKS)
@@ -60,7 +60,7 @@ def _port_self_test(options: argparse.Namespace, cells: Sequence[Cell]) -> int:
 
 
 def check_integrator(options: argparse.Namespace) -> int:
-    """Check the integrator that `options.integrator` starts; return 0 if all checks pass, or 1."""
+    """Check the integrator started by `options.integrator`; return 1 if a check fails, else 0."""
     shared.refuse(options, "--integrator", (*_OF_THE_CHECKS, "port", "program", "case"))
     command = options.integrator
     due = shared.positive(options.order, "--order", 1.0)
@@ -124,9 +124,9 @@ def show_self_test(
     refuse: Callable[[], None] = lambda: None,
     **extra: Any,
 ) -> int:
-    """Write the report of a self-test; return 0 if every outcome passes, or 1.
+    """Write the report of a self-test; return 1 if an outcome fails, else 0.
 
-    `outcomes` has a control without fault, then `count` planted faults. Call `refuse` if the
+    `outcomes` has a control without fault, then `count` planted faults. `refuse` is called if the
     control fails.
     """
     found = []

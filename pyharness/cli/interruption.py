@@ -39,13 +39,11 @@ class _Interruption:
             os._exit(CODE)
 
     def interrupt(self, number: int, frame: FrameType | None) -> None:
-        """Raise KeyboardInterrupt; at the user's third interrupt, end the process at once.
-
-        A timer raises it again until the interrupt is reported.
-        """
+        """Raise KeyboardInterrupt; at the third interrupt, end the process at once."""
         self.count += 1
         if self.count >= _MOST:
             self.leave_at_once()
+        # The timer raises it again until the interrupt is reported.
         signal.signal(signal.SIGALRM, self._again)
         signal.setitimer(signal.ITIMER_REAL, _AGAIN, _AGAIN)
         raise KeyboardInterrupt
@@ -114,7 +112,7 @@ def leave(code: int) -> None:
 
     Python's own exit would wait for threads and free all memory. On Ctrl-C it would ignore the
     interrupt, or end by the signal instead of with status 130. If `code` is 130, child processes
-    are ended first, and cleanup takes at most two seconds.
+    are killed, and cleanup takes at most two seconds.
     """
     if code == CODE:
         # Messages of ending threads and finalizers would follow the report of the interrupt.

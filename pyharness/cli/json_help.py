@@ -9,7 +9,7 @@ from pyharness.model.facts import facts_folder
 
 
 def schema() -> dict[str, Any]:
-    """Return the JSON Schema of all verbs' output; `$defs` has a part `verb-NAME` for each."""
+    """Return the JSON Schema of all verbs' output, with a part `verb-NAME` in `$defs` for each."""
     found: dict[str, Any] = json.loads((facts_folder() / "output.schema.json").read_text())
     return found
 
@@ -28,7 +28,7 @@ def fields(whole: dict[str, Any], part: dict[str, Any], path: str) -> Iterator[t
 
 
 def json_help(verb: str) -> str:
-    """Return the fields of a verb's JSON output as text of at most 100 columns."""
+    """Return the fields of a verb's JSON output as text."""
     whole = schema()
     lines = [f"fields of pyharness {verb} --format json:", ""]
     for path, meaning in fields(whole, whole["$defs"][f"verb-{verb}"], ""):

@@ -46,8 +46,6 @@ VERBS = {verb: about for group in _GROUPS.values() for verb, about in group.item
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line, by default this process's, and return its exit status.
 
-    The status is
-
     - 0 for expected results;
     - 1 for an unexpected result, such as a failed check;
     - 2 for wrong usage or input;
@@ -121,7 +119,7 @@ def _run(arguments: list[str]) -> int:
 
 
 def _complete() -> int:
-    """Print completions for argcomplete; return 1 if not installed."""
+    """Print completions; return 1 without argcomplete."""
     from argparse import ArgumentParser
 
     try:

@@ -97,8 +97,7 @@ SCENES = Cost("random scenes", 8.0, 1e5, 10_000)
 def outputs(formats: Sequence[str] = FORMATS, plot: str = "the results") -> dict[str, str]:
     """Return the help texts of --format, --plot and --out, by option.
 
-    The first of `formats` is the default. `plot` names the content of the picture; if empty, there
-    is no --plot.
+    The first of `formats` is the default. `plot` names the content of the picture; "" omits --plot.
     """
     first, *others = formats
     form = {"--format F": f"Output format: {first} (default), {', '.join(others)}."}
@@ -122,7 +121,7 @@ def chosen_case(options: argparse.Namespace) -> int | None:
 
 
 def chosen_cases(options: argparse.Namespace) -> list[int]:
-    """Return the case of --case, or all cases by default."""
+    """Return the case of --case, by default all."""
     case = chosen_case(options)
     return list(case_numbers()) if case is None else [case]
 
@@ -133,7 +132,7 @@ def chosen_tolerance(options: argparse.Namespace) -> float | None:
 
 
 def chosen_seed(options: argparse.Namespace) -> str | None:
-    """Return --seed, or None; raise InputError if it has unprintable characters."""
+    """Return --seed, or None; raise InputError if it is not printable."""
     if options.seed is not None and not options.seed.isprintable():
         raise InputError(
             "--seed: contains characters that can't be printed; allowed: printable characters"
@@ -149,9 +148,9 @@ def check_known(what: str, name: str | None, allowed: Sequence[str]) -> None:
 
 
 def chosen_names(text: str | None, what: str, allowed: Sequence[str]) -> list[str]:
-    """Return the names in --only; each is the beginning of check ids, as in ``cells/two-term``.
+    """Return the names in --only, beginnings of check ids, as in ``cells/two-term``.
 
-    Raise InputError if the part of a name before the first slash is not in `allowed`.
+    Raise InputError if a name's part before the first slash is not in `allowed`.
     """
     only = names(text)
     for each in only:
@@ -164,8 +163,8 @@ def chosen_scene(options: argparse.Namespace, **allowed: bool) -> Scene:
     """Return the scene of --case or --scene, changed by --omega, --step-size and --steps.
 
     Warn of impossible moments of inertia, and of a normalised attitude. Raise InputError unless
-    exactly one of --case and --scene is given, and if `checked_scene` with the flags `allowed`
-    refuses the scene.
+    exactly one of --case and --scene is given, and `checked_scene` with the flags `allowed` accepts
+    the scene.
     """
     if (options.case is None) == (options.scene is None):
         raise InputError("give either --case N (1 to 7) or --scene FILE")
@@ -198,16 +197,13 @@ def warn_of_attitude(scene: Scene) -> None:
 
 
 def chosen_programs(options: argparse.Namespace) -> tuple[str, ...]:
-    """Return the program of --program, or all three by default."""
+    """Return the program of --program, by default all three."""
     check_known("program", options.program, PROGRAMS)
     return PROGRAMS if options.program is None else (options.program,)
 
 
 def chosen_listing(options: argparse.Namespace) -> Listing:
-    """Return the program version of --listing, --fix, --keep, --reading and --conjecture.
-
-    Warn of readings and conjectures without effect.
-    """
+    """Return the chosen version of --program; warn of readings and conjectures without effect."""
     chosen_programs(options)
     listing = subset(options.program, options.listing, **changes_of(options))
     tell_inactive(options, [listing])
@@ -217,7 +213,7 @@ def chosen_listing(options: argparse.Namespace) -> Listing:
 def changes_of(options: argparse.Namespace) -> dict[str, Any]:
     """Return the names in --fix, --keep, --reading and --conjecture, as arguments of `subset`.
 
-    Raise InputError for defects to fix in the corrected, or to keep in the original program.
+    Raise InputError for defects to fix in the corrected, or keep in the original program.
     """
     if options.listing == "corrected":
         refuse(options, "--listing corrected", ("fix",))
@@ -235,7 +231,7 @@ def changes_of(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def tell_inactive(options: argparse.Namespace, listings: Iterable[Listing]) -> None:
-    """Warn of requested readings of doubtful lines, and conjectures, that no listing uses."""
+    """Warn of requested readings and conjectures that no listing uses."""
     asked = {*names(options.reading), *names(options.conjecture)} - {"none"}
     active = {name for listing in listings for name in listing.active}
     for name in sorted(asked - active - set(names(options.fix))):
@@ -277,12 +273,12 @@ def names(text: str | None) -> list[str]:
 
 
 def numbers(text: str, option: str) -> list[float]:
-    """Return the numbers in a text such as 1,2; raise InputError for any other text."""
+    """Return the numbers in a text such as 1,2; else raise InputError."""
     return [number(part, option) for part in text.split(",")]
 
 
 def number(text: str, option: str) -> float:
-    """Return an option's number; raise InputError unless it is finite."""
+    """Return an option's finite number; else raise InputError."""
     try:
         value = parsed_float(text)
     except ValueError:
@@ -293,7 +289,7 @@ def number(text: str, option: str) -> float:
 
 
 def positive(text: str | None, option: str, default: float) -> float:
-    """Return an option's number, or the default; raise InputError unless it is above 0."""
+    """Return an option's number above 0, or the default; else raise InputError."""
     if text is None:
         return default
     value = number(text, option)
@@ -303,7 +299,7 @@ def positive(text: str | None, option: str, default: float) -> float:
 
 
 def whole(text: str, option: str) -> int:
-    """Return an option's whole number; raise InputError for any other text."""
+    """Return an option's whole number; else raise InputError."""
     try:
         return parsed_whole(text)
     except ValueError:
@@ -311,7 +307,7 @@ def whole(text: str, option: str) -> int:
 
 
 def whole_up_to(most: int, text: str | None, option: str, default: int) -> int:
-    """Return an option's whole number, or the default; raise InputError beyond 1 to `most`."""
+    """Return an option's whole number, 1 to `most`, or the default; else raise InputError."""
     count = default if text is None else whole(text, option)
     if not 1 <= count <= most:
         raise InputError(f"{option}: {count}; allowed: 1 to {most}")
@@ -341,12 +337,12 @@ def chosen_count(text: str | None, option: str, default: int, least: int, cost: 
 
 
 def warn(message: str) -> None:
-    """Print a message as a warning on stderr."""
+    """Print a warning on stderr."""
     say(f"pyharness: warning: {message}\n")
 
 
 def also_files(options: argparse.Namespace) -> dict[str, str]:
-    """Return each --also file's format; raise InputError for unknown endings or a repeated file."""
+    """Return each --also file's format; raise InputError for unknown endings or repeated files."""
     found: dict[str, str] = {}
     for path in names(getattr(options, "also", None)):
         suffix = path[path.rfind(".") :] if "." in path else ""
@@ -418,7 +414,7 @@ def show(
     """Write a report in the format of --format, the picture of --plot, and the files of --also.
 
     `own` maps formats of this report alone, such as "tape5", to functions that return the content.
-    Return the exit status, 1 if `failed`, else 0.
+    Return 1 if `failed`, else 0.
     """
     from pyharness.views.render import render
 

@@ -34,13 +34,10 @@ def check_folder(path: str, names: Iterable[str], option: str) -> None:
 
 
 def _why_not_made(folder: Path) -> str:
-    """Return ": " and the reason why a folder can't be made, or "" if it can.
-
-    The folder is made and removed, because permissions do not show, for example, that a name is too
-    long.
-    """
+    """Return ": " and the reason why a folder can't be made, or "" if it can."""
     if not folder.parent.is_dir():
         return ": there is no such folder"
+    # Permissions do not show, for example, that a name is too long.
     try:
         folder.mkdir()
         folder.rmdir()
@@ -70,16 +67,17 @@ def write_folder(path: str, contents: dict[str, bytes], option: str) -> None:
 def check_tree(path: str, mark: str, option: str, kind: str = "edition") -> None:
     """Raise InputError if `write_tree` may not replace the folder.
 
-    The folder may be missing or empty, or contain only the JSON file `mark`, of schema `kind`, and
-    the files that `mark` lists.
+    A folder that is not empty may contain only the JSON file `mark`, of schema `kind`, and the
+    files that `mark` lists.
     """
     check_replaceable(path, lambda folder: {mark, *_listed(folder / mark, kind)}, option)
 
 
 def check_replaceable(path: str, made: Callable[[Path], set[str]], option: str) -> None:
-    """Raise InputError unless `write_tree` may replace the folder, which may be missing or empty.
+    """Raise InputError if `write_tree` may not replace the folder.
 
-    If it has files, `made(folder)` must contain their paths, as those of files that the verb wrote.
+    The folder may be missing, or contain only files whose paths `made(folder)` returns: those that
+    the verb wrote.
     """
     check_folder(path, (), option)
     folder = Path(os.path.realpath(path))
@@ -131,8 +129,8 @@ def _beside(folder: Path) -> tuple[Path, Path]:
 def write_tree(path: str, contents: dict[str, bytes], option: str) -> None:
     """Replace a folder by one with only the files in `contents`, by path.
 
-    The new folder is complete before the old one is removed. On failure, the old one remains
-    unchanged, and InputError is raised.
+    The new folder is complete before the old one is removed. On failure, the old one remains, and
+    InputError is raised.
     """
     folder = Path(os.path.realpath(path))
     new, old = _beside(folder)

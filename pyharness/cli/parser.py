@@ -17,7 +17,7 @@ _NARROWEST, _WIDEST = 80, 100  # columns
 
 
 class _Formatter(argparse.HelpFormatter):
-    """A help formatter whose usage has only required options; it keeps an example's lines."""
+    """A help formatter whose usage has only required options; it keeps an example's line breaks."""
 
     def _split_lines(self, text: str, width: int) -> list[str]:
         from textwrap import wrap
@@ -87,7 +87,7 @@ class Parser(argparse.ArgumentParser):
         raise InputError(message)
 
     def option_names(self) -> list[str]:
-        """Return the options' long names, as in ``--case``."""
+        """Return the long names, as in ``--case``."""
         return [name for name in self._option_string_actions if name.startswith("--")]
 
     def read(self, verb: str, arguments: Sequence[str]) -> argparse.Namespace:
@@ -103,10 +103,8 @@ class Parser(argparse.ArgumentParser):
         return options
 
     def _joined(self, arguments: Sequence[str]) -> list[str]:
-        """Return the arguments with negative numbers joined to their options, as in --x=-1.
-
-        Argparse would take such numbers for options. Old option names are replaced by new ones.
-        """
+        """Return the arguments, with negative numbers joined to their options, as in --x=-1."""
+        # Argparse would take negative numbers for options. Old option names are replaced.
         result: list[str] = []
         for argument in arguments:
             old, equals, value = argument.partition("=")

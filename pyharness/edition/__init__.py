@@ -1,1 +1,1 @@
-"""The edition of the programs as a static web site, built from data files."""
+"""The edition of the programs as a static web site."""

@@ -1,4 +1,4 @@
-"""The data of the API page: public names with their docstrings."""
+"""The data of the API page: public names and docstrings."""
 
 import inspect
 import re
@@ -23,8 +23,8 @@ class Item(NamedTuple):
 class Entry(NamedTuple):
     """A public name on the API page.
 
-    `kind` is "function", "class" or "property". `summary` is the docstring's first line, `text` its
-    further paragraphs, and `groups` its sections by title.
+    `kind` is "function", "class" or "property". `summary`, `text` and `groups` are the docstring's
+    first line, further paragraphs and sections by title.
     """
 
     name: str
@@ -38,7 +38,7 @@ class Entry(NamedTuple):
 
 
 def entries() -> list[Entry]:
-    """Return the entries of the API page, one for each public name."""
+    """Return an entry for each public name."""
     return [_entry(name, getattr(pyharness, name)) for name in pyharness.__all__]
 
 

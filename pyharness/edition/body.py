@@ -1,4 +1,4 @@
-"""The data of the page that animates a torque-free body, by the closed form of its motion.
+"""The data of the page that animates a torque-free body by its closed form.
 
 Readers without JavaScript see a picture, and a Python program with its output.
 """
@@ -45,11 +45,7 @@ _STYLES = ("-", "--", "-.")
 
 
 def context() -> dict[str, Any]:
-    """Return the values for the page's template.
-
-    `data` is the script's `window.bodyData`, `first` the first scene, and `flip` the time (s)
-    between its flips.
-    """
+    """Return the values for the page's template; `flip` is the time (s) between flips."""
     first = _first()
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
@@ -62,10 +58,7 @@ def context() -> dict[str, Any]:
 
 
 def data() -> dict[str, Any]:
-    """Return the page's bodies, the body shown first, and the largest time (s).
-
-    Moments are in kg m2, omegas in rad/s; a body of the thesis has its case number.
-    """
+    """Return the page's bodies (kg m2, rad/s), the one shown first, and the largest time (s)."""
     known = facts("bodies")
     bodies: list[dict[str, Any]] = []
     for each in known["body"]:
@@ -137,7 +130,7 @@ def _draw_polhode(axes: Any, moments: Array, found: Trajectory) -> None:
 
 
 def _in_plane(found: Trajectory) -> Array:
-    """Return omega's part (rad/s) perpendicular to the momentum, in space, shape (n, 2)."""
+    """Return omega's components (rad/s) in the plane normal to the momentum, (n, 2)."""
     assert found.attitude is not None
     momentum = found.angular_momentum("space")[0]
     up = momentum / np.linalg.norm(momentum)

@@ -1,8 +1,8 @@
 """Bundling of JavaScript (ES) modules into one classic script.
 
-Browsers do not import modules into a page that is opened from a file. In the script, every module
-is a function that returns its exports, and follows the modules that it imports. Only this project's
-forms of import and export are supported.
+Browsers do not import modules into a page opened from a file. In the script, each module is a
+function that returns its exports, after the modules that it imports. Only the project's forms of
+import and export are supported.
 """
 
 import re
@@ -19,10 +19,10 @@ _COMMENT = re.compile(r"^ *//.*\n", re.M)
 
 
 def bundle(entry: Path) -> str:
-    """Return a classic script of the module in the file `entry` with all its imports.
+    """Return the module in `entry` and all its imports as one script without global names.
 
-    It defines no global names. Raise ValueError, with file and line, for an unsupported form, a
-    missing file or name, or circular imports.
+    Raise ValueError, with file and line, for an unsupported form, a missing file or name, or
+    circular imports.
     """
     exports: dict[Path, list[str]] = {}
     parts: list[str] = []
@@ -33,11 +33,7 @@ def bundle(entry: Path) -> str:
 def _add(
     path: Path, importing: tuple[Path, ...], exports: dict[Path, list[str]], parts: list[str]
 ) -> None:
-    """Append a module to `parts`, after the modules that it imports.
-
-    `importing` is the chain of modules up to this import; `exports` collects each module's exported
-    names.
-    """
+    """Append a module to `parts` after its imports; `importing` are the modules that led to it."""
     text = path.read_text(encoding="utf-8")
 
     def declare(found: re.Match[str]) -> str:

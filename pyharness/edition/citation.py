@@ -1,4 +1,4 @@
-"""The citation of edition and thesis, from `codemeta.json`, and the RO-Crate 1.1 of the data."""
+"""The citation of edition and thesis, and the RO-Crate 1.1 of the data."""
 
 import json
 import tomllib
@@ -30,24 +30,24 @@ _OF_SOURCE_CODE = (
 
 @cache
 def codemeta() -> dict[str, Any]:
-    """Return the content of `codemeta.json`; cached, so callers must not change it."""
+    """Return the content of `codemeta.json`; callers must not change it."""
     described: dict[str, Any] = json.loads(shipped("codemeta.json").read_text(encoding="utf-8"))
     return described
 
 
 def release_date() -> str:
-    """Return the date of publication or, before publication, the year of the copyright."""
+    """Return the date of publication or, before it, the year of the copyright."""
     described = codemeta()
     return str(described.get("datePublished", described["copyrightYear"]))
 
 
 def address() -> str:
-    """Return the address of the published pages, ending with a slash; "" before publication."""
+    """Return the published pages' address, ending with a slash; "" before publication."""
     return str(facts("edition")["address"])
 
 
 def check_publishable() -> None:
-    """Raise InputError if the pages have an address, but CITATION.cff still has placeholders."""
+    """Raise InputError if the pages have an address, but CITATION.cff has placeholders."""
     lines = shipped("CITATION.cff").read_text(encoding="utf-8").splitlines()
     for number, line in enumerate(lines, 1):
         found = [each for each in _PLACEHOLDERS if each in line]
@@ -59,9 +59,9 @@ def check_publishable() -> None:
 
 
 def bibtex(place: str = "", path: str = "") -> str:
-    """Return BibTeX entries of the thesis and of the edition, or of a `place` in the edition.
+    """Return BibTeX entries of the thesis, and of the edition or a `place` in it.
 
-    The `path` of the place in the pages is appended to their address, if they have one.
+    The place's `path` is appended to the address of the pages, if they have one.
     """
     described = codemeta()
     version, thesis = described["version"], described["referencePublication"]
@@ -79,7 +79,7 @@ def bibtex(place: str = "", path: str = "") -> str:
 
 
 def csl(place: str = "", path: str = "") -> list[dict[str, Any]]:
-    """Return the records of `bibtex` in the Citation Style Language (CSL-JSON)."""
+    """Return the records of `bibtex` in the Citation Style Language."""
     described = codemeta()
     version, thesis = described["version"], described["referencePublication"]
     dates = (release_date(), thesis["datePublished"])
@@ -97,7 +97,7 @@ def csl(place: str = "", path: str = "") -> list[dict[str, Any]]:
 
 
 def cite_data() -> dict[str, Any]:
-    """Return the data of the script that cites a place, with placeholders for place and path."""
+    """Return the data of the script that cites a place, with placeholders for the place."""
     place = "@PLACE@", "@PATH@"
     return {
         "address": address(), "publish": PUBLISH, "digest": text_digest(),
@@ -110,12 +110,12 @@ def _title(place: str) -> str:
 
 
 def thesis_record() -> dict[str, Any]:
-    """Return the thesis's record in the terms of schema.org."""
+    """Return the thesis's record in terms of schema.org."""
     return {**codemeta()["referencePublication"], "@type": "Report"}
 
 
 def linked_data() -> dict[str, Any]:
-    """Return the software and data records as JSON-LD (schema.org), for search engines."""
+    """Return the records of software and data as JSON-LD for search engines."""
     described = codemeta()
     software = {name: described[name] for name in _OF_SOURCE_CODE if name in described}
     names = {name: described[name] for name in ("version", "license", "copyrightYear")}
@@ -129,12 +129,12 @@ def linked_data() -> dict[str, Any]:
 
 
 def data_name() -> str:
-    """Return the name of the data, for catalogues."""
+    """Return the data's name for catalogues."""
     return f"{facts('account')['edition']['name']}: data"
 
 
 def data_description() -> str:
-    """Return the description of the data, for catalogues."""
+    """Return the data's description for catalogues."""
     thesis = codemeta()["referencePublication"]
     return (
         f"The cards of the three FORTRAN programs in the thesis {thesis['name']} "
@@ -153,10 +153,10 @@ def _entry(kind: str, key: str, fields: dict[str, str]) -> str:
 
 
 class Part(NamedTuple):
-    """A file of the data package.
+    """A file of the data package; `path` is relative to the package.
 
-    `path` is relative to the package; `media_type` is a MIME type, as in ``text/csv``. `content` is
-    empty for the files that describe the others.
+    `media_type` is a MIME type, such as ``text/csv``; `content` is empty for files that describe
+    the others.
     """
 
     path: str
@@ -188,7 +188,7 @@ _DATA = "Software Heritage identifier of the edition's data"
 
 
 def crate_record(parts: Sequence[Part]) -> dict[str, Any]:
-    """Return the RO-Crate record of `parts` and of the files `KEPT`."""
+    """Return the RO-Crate record of `parts` and `KEPT`."""
     software, thesis = codemeta(), thesis_record()
     files = [_file(each) for each in (*parts, *KEPT) if each.path != CRATE]
     people = [{"@id": f"#author-{n}", **each} for n, each in enumerate(software["author"], 1)]

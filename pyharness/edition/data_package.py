@@ -1,7 +1,6 @@
 """The edition as plain data: cards, apparatus, verdicts, runs and printed pages.
 
-The package is an RO-Crate, without times and paths of the machine, so that two runs write the same
-bytes.
+It is an RO-Crate without the machine's times and paths, so that two runs write the same bytes.
 """
 
 from collections.abc import Iterator, Mapping
@@ -79,7 +78,7 @@ def data_package(progress: Progress = no_progress) -> dict[str, bytes]:
 
 
 def archive(content: Mapping[str, bytes], folder: str) -> bytes:
-    """Return a ZIP file, without times, of the files in `content`, under `folder`."""
+    """Return a ZIP file, without times, of `content` in `folder`."""
     found = BytesIO()
     with ZipFile(found, "w") as packed:
         for path, each in content.items():
@@ -154,7 +153,7 @@ def run_parts() -> Iterator[Part]:
 
 @cache
 def _listings() -> dict[tuple[str, str], Listing]:
-    """Return program versions by program and name; those with one defect are in apparatus order."""
+    """Return the original, corrected and one-defect versions, by program and name."""
     found = {}
     for program in PROGRAMS:
         found[program, "original"] = Listing.original(program)
@@ -229,7 +228,7 @@ def machine_parts() -> Iterator[Part]:
 
 
 def outcomes_table() -> str:
-    """Return a Markdown table of the conclusion from each outcome of a run on the machine."""
+    """Return a Markdown table of the outcomes of a run on the machine, with conclusions."""
     rows = [[each["seen"], each["learned"], each["open"]] for each in facts("machine")["outcome"]]
     return table("outcome | what would be learned | what remains open", rows).rstrip()
 
@@ -254,7 +253,7 @@ def _jobs(texts: dict[str, str]) -> Iterator[Part]:
 
 
 def _shared(texts: dict[str, str], rows: list[list[Any]]) -> Iterator[list[str]]:
-    """Yield each page's file, number of rows, and the runs that print it."""
+    """Yield the file and number of rows of each page, and the runs that print it."""
     for name, text in texts.items():
         _, printed = printed_page.split_page(printed_page.printed_numbers(text))
         words: dict[str, list[str]] = {}

@@ -1,7 +1,6 @@
 """The data of the pages that show the listings card by card, with scan and ports.
 
-A note is a numbered entry of the critical apparatus, the list of defects and of deviations of the
-scan.
+A note is a numbered entry of the apparatus, the list of defects and deviations of the scan.
 """
 
 import math
@@ -34,7 +33,7 @@ _ORDER = (
 
 
 class Run(NamedTuple):
-    """Successive characters of a card or of its line in the scan.
+    """Successive characters of a card or its line in the scan.
 
     If card and scan differ here, `entry` identifies the note on the difference.
     """
@@ -44,7 +43,7 @@ class Run(NamedTuple):
 
 
 class Note(NamedTuple):
-    """A numbered note (apparatus entry), with the cards of one program to which it applies.
+    """A numbered note (apparatus entry), and the cards of one program to which it applies.
 
     `cards` is a text, as in ``860-910, 1040-1090``.
     """
@@ -55,15 +54,14 @@ class Note(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """Return the kind of the entry, as in ``defect``."""
+        """The kind of note, such as ``defect``."""
         return str(self.entry["kind"])
 
 
 class Corrected(NamedTuple):
-    """The corrected form of a card.
+    """The corrected form of a card, with the cards `inserted` after it.
 
     `text` is None for a deleted card; `changes` tells whether the card is deleted or replaced.
-    `inserted` has number and text of each card inserted after it.
     """
 
     text: str | None
@@ -75,12 +73,12 @@ class Corrected(NamedTuple):
 class CardView(NamedTuple):
     """A card as shown on a page.
 
-    `card` is our text, in brackets if the scan lacks the card. `witness` is our text with the names
-    as in the scan; it is None if it equals `card`, and empty if the scan lacks the card. `after`
-    has the scan's lines after this card that belong to no card. `scan` is the line of the scan with
-    its blanks, or None. `port` has each line of the Fortran port, the defect or reading on which it
-    depends, and whether it is executed if this is active. `notes` begin with the most important
-    kind. `begins` has the notes with a range of cards that begins here, each with only this range.
+    `card` is our text, in brackets if the scan lacks the card. `witness` is our text with the
+    scan's names: None if equal to `card`, empty if the scan lacks the card. `scan` is the card's
+    line in the scan, or None; `after` has the next lines that belong to no card. `port` has each
+    line of the Fortran port, the defect or reading that switches it, and whether it is executed if
+    this is active. `notes` begin with the most important kind; `begins` has the notes on a range of
+    cards that begins here, each with only this range.
     """
 
     number: int
@@ -96,7 +94,7 @@ class CardView(NamedTuple):
 
 
 class Sheet(NamedTuple):
-    """A printed page: its number from 1 and its cards.
+    """A printed page, with its number from 1.
 
     `moved` is the entry that explains an unexpected place in the scan, or None.
     """
@@ -107,7 +105,7 @@ class Sheet(NamedTuple):
 
 
 def sheets(program: str) -> list[Sheet]:
-    """Return a program's pages, in the order of their lowest cards in the scan."""
+    """Return a program's pages, in the order of their lowest cards."""
     pages = [page for page in facts("cards/scan")["page"] if page["program"] == program]
     found = sorted((first_card(page["lines"]), page.get("moved")) for page in pages)
     ends = [*(first for first, _ in found[1:]), max(deck(program).cards) + 1]
@@ -119,7 +117,7 @@ def sheets(program: str) -> list[Sheet]:
 
 
 def notes(program: str) -> list[Note]:
-    """Return a program's notes by kind; within a kind by size of effect, then by card."""
+    """Return a program's notes by kind, then size of effect, then card."""
     having = [each for each in entries() if each["cards"].get(program)]
 
     def place(entry: dict[str, Any]) -> tuple[float, ...]:
@@ -132,10 +130,7 @@ def notes(program: str) -> list[Note]:
 
 @cache
 def _changes(name: str, program: str) -> tuple[float, float]:
-    """Return by how much the correction of a defect changes the errors of omega and velocity.
-
-    The changes are the largest of all cases (rad/s, m/s), and 0 if `name` is no defect.
-    """
+    """Return the largest changes (rad/s, m/s) of omega and velocity errors by fixing a defect."""
     if name not in names_of("defect", program):
         return 0.0, 0.0
     found = [each for each in effects_of(name) if each.program == program]
@@ -154,7 +149,7 @@ def _change(one: float, other: float) -> float:
 
 
 def card_views(program: str) -> list[CardView]:
-    """Return a view of each card of a program."""
+    """Return the views of a program's cards."""
     found, every = deck(program), notes(program)
     corrected, changed = corrected_cards(program), corrections(program)
     phantoms = _phantoms(program)
@@ -180,7 +175,7 @@ def card_views(program: str) -> list[CardView]:
 
 
 def kinds_of(views: Iterable[CardView]) -> dict[str, int]:
-    """Return the number of cards with a note of each kind, by precedence."""
+    """Return the number of cards with notes of each kind, by precedence."""
     counts = Counter(kind for view in views for kind in view.kinds)
     return {kind: counts[kind] for kind in _ORDER if counts[kind]}
 
@@ -218,7 +213,7 @@ def _scan(card: Card) -> list[Run] | None:
 
 
 def _with_blanks(runs: Sequence[Run], line: str) -> list[Run]:
-    """Return runs with the blanks of `line`, whose other characters are the same."""
+    """Return runs with the blanks of `line`, which otherwise has the same characters."""
     found, at = [], 0
     for run in runs:
         begin, missing = at, len(run.text)

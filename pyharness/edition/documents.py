@@ -1,6 +1,6 @@
-"""The Markdown documents of `docs` as pages of the web site, and as Jupyter notebooks.
+"""The documents of `docs` as pages of the web site and as Jupyter notebooks.
 
-`folder` is the folder of the documents, `name` a path in it.
+`folder` has the documents; `name` is a path in it.
 """
 
 import base64
@@ -40,7 +40,7 @@ _LINK = re.compile(r"(?<!!)\[((?:[^][]|\[[^]]*\])*)\]\([^):]*\)")
 
 
 def documents_folder(given: str | None = None) -> Path:
-    """Return `given` or the checkout's `docs`; raise InputError if documents are missing."""
+    """Return `given` or the checkout's `docs`; raise InputError if a document is missing."""
     folder = shipped("docs") if given is None else Path(given)
     missing = [name for name in _LINKED if not (folder / name).is_file()]
     if not missing:
@@ -56,7 +56,7 @@ def documents_folder(given: str | None = None) -> Path:
 
 
 def documents(folder: Path) -> Iterator[tuple[str, Document]]:
-    """Yield path and rendered text of each document, except those for contributors."""
+    """Yield path and text of each document, except those for contributors."""
     for file in sorted(folder.rglob("*.md")):
         name = file.relative_to(folder).as_posix()
         if not name.startswith(_OFF_SITE):
@@ -65,7 +65,7 @@ def documents(folder: Path) -> Iterator[tuple[str, Document]]:
 
 
 def page_of(name: str) -> str:
-    """Return the path of a document in the site."""
+    """Return a document's path in the site."""
     return f"docs/{name.removesuffix('.md')}.html"
 
 
@@ -86,7 +86,7 @@ def with_notebooks(folder: Path) -> list[Path]:
 
 
 def notebooks(folder: Path) -> dict[str, bytes]:
-    """Return the notebooks by path in the site, with outputs and pictures."""
+    """Return the notebooks, with outputs and pictures, by path in the site."""
     found = {}
     for path in with_notebooks(folder):
         beside = [file for file in path.parent.iterdir() if file.suffix in _PICTURES]
@@ -99,8 +99,8 @@ def notebooks(folder: Path) -> dict[str, bytes]:
 def notebook(text: str, pictures: Mapping[str, bytes]) -> bytes:
     """Return a document as a notebook, JSON in format 4.5.
 
-    `pictures` maps file names to contents. Links to other documents become plain text, because
-    notebooks may be in any folder.
+    `pictures` maps file names to contents. Links to other documents become text, because notebooks
+    may be in any folder.
     """
     cells: list[dict[str, Any]] = []
 
@@ -137,7 +137,7 @@ def _display(form: str, content: bytes) -> dict[str, Any]:
 
 
 def _link(folder: Path, name: str, target: str) -> str | None:
-    """Return a document's link as a link in the site, or None if the site lacks the target."""
+    """Return a document's link as a link in the site; None if the site lacks the target."""
     path, hash_, anchor = target.partition("#")
     if "://" in target or not path:
         return target

@@ -40,8 +40,8 @@ _SHOWN = 3
 def context() -> dict[str, Any]:
     """Return the values for the page's template.
 
-    `switches` has defects, readings and conjectures, each kind with its heading; `first` is the run
-    with `DEFAULTS`.
+    `switches` has defects, readings and conjectures under headings; `first` is the run with
+    `DEFAULTS`.
     """
     titles, flags = {n: case_scene(n).name for n in case_numbers()}, data()["flags"]
     by_kind = {kind: [flag for flag in flags if flag["kind"] == kind] for kind in _KINDS}
@@ -51,7 +51,7 @@ def context() -> dict[str, Any]:
 
 
 def data() -> dict[str, Any]:
-    """Return the data with which the page's script runs any program on any case."""
+    """Return the data with which the page's script runs the programs."""
     cases = {number: case_scene(number) for number in case_numbers()}
     return {
         "scenes": list(map(requested_scene, cases.values())),
@@ -86,13 +86,11 @@ def _printed_parts(program: str) -> dict[str, Any]:
 
 
 def _deck_data() -> dict[str, Any]:
-    """Return the cards that are executed in a step, and their alterations by corrections.
-
-    A pass is a part of a step that is executed once, with constant subscripts.
-    """
+    """Return the cards that are executed in a step, and their alterations by corrections."""
     order = facts("cards/passes")
     found: dict[str, Any] = {}
     for program in PROGRAMS:
+        # A pass is a part of a step that is executed once, with constant subscripts.
         passes = []
         for each in order[program]["pass"]:
             first, last = map(int, each["cards"].split("-"))
@@ -106,7 +104,6 @@ def _deck_data() -> dict[str, Any]:
 
 
 def _statements(program: str, first: int, last: int) -> list[tuple[int, str]]:
-    """Return number and text of each statement, without comments, FORMAT, DO and CONTINUE."""
     found: list[tuple[int, str]] = []
     for number, card in deck(program).cards.items():
         text = card.text.rstrip()

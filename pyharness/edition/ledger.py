@@ -1,8 +1,8 @@
-"""The data of the pages on the claims, the thesis, its figures and the apparatus.
+"""The data of the pages on claims, thesis, figures and apparatus (list of defects).
 
 A claim is a statement of the thesis that we test; a judgement has our verdicts on it, for original
-and corrected programs. The argument `judged` has the judgements of all claims, `told` all sentences
-with their judgements, and `figures` our versions of Figures 6 to 12, by file name without suffix.
+and corrected programs. `judged` are the judgements of all claims, `told` all sentences with
+judgements, and `figures` our Figures 6 to 12, by file name without suffix.
 """
 
 from collections import Counter
@@ -28,7 +28,7 @@ from pyharness.views.pictures import saved
 
 
 class SentenceVerdicts(NamedTuple):
-    """A sentence of the thesis, with the judgements of its claims."""
+    """A sentence of the thesis, and the judgements of its claims."""
 
     sentence: Sentence
     judged: list[Judgement]
@@ -38,9 +38,9 @@ class SentenceVerdicts(NamedTuple):
 class Formula(NamedTuple):
     """A displayed formula of the thesis.
 
-    `number` is a text such as ``34a`` or ``13-15``, or empty; `lines` are MathML; `what` is a
-    sentence on the formula in HTML. `cards` has, by program, the numbers of the cards that compute
-    the formula; `entry` is the identifier of its apparatus entry, or empty.
+    `number`, such as ``34a`` or ``13-15``, may be empty; `lines` are MathML; `what` explains the
+    formula in HTML. `cards` has, by program, the numbers of the cards that compute it; `entry`
+    identifies its apparatus entry, or is empty.
     """
 
     number: str
@@ -52,14 +52,14 @@ class Formula(NamedTuple):
 
     @property
     def title(self) -> str:
-        """Return a title, as in ``Equation 34a, III.1`` or ``Equations 13-15, II.2``."""
+        """The title, as in ``Equation 34a, III.1``."""
         if not self.number:
             return f"Without a number, {self.where}"
         return f"Equation{'s' if '-' in self.number else ''} {self.number}, {self.where}"
 
 
 def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
-    """Return, by verdict, the counts of claims on results of original and corrected programs."""
+    """Return, by verdict, the counts of claims on results, for original and corrected programs."""
     results = [each for each in judged if each.claim["kind"] == "result"]
     pairs = [(each.original.verdict, each.corrected.verdict) for each in results]
     original, corrected = map(Counter, zip(*pairs, strict=True))
@@ -68,11 +68,7 @@ def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
 
 
 def verdicts(judgement: Judgement) -> list[tuple[str, str]]:
-    """Return the verdicts to show, each with a text on the programs that it judges.
-
-    A claim about results has two verdicts; a claim about a design, only the verdict on the programs
-    as printed; any other, only the verdict on the corrected programs.
-    """
+    """Return one or two verdicts to show, each after a text on the programs judged."""
     original, corrected = judgement.original.verdict, judgement.corrected.verdict
     if judgement.claim["kind"] == "result":
         return [("as printed", original), ("corrected", corrected)]
@@ -80,7 +76,7 @@ def verdicts(judgement: Judgement) -> list[tuple[str, str]]:
 
 
 def assumption(case: int, programs: Iterable[str] = (), listing: str = "original") -> str:
-    """Return a text on what we assume in a case of Table 1 and in runs of `programs`, or ""."""
+    """Return a text on our assumptions in a case of Table 1 and in runs of `programs`, or ""."""
     found = ["its initial omega"] if case in open_starts() else []
     start = " and ".join([*found, *(["its cards"] if case_scene(case).torque.varies else [])])
     among = assumed(case_scene(case), map(SETS[listing], programs))
@@ -103,16 +99,17 @@ def counted(judged: Sequence[Judgement]) -> str:
 
 
 def account() -> dict[str, Markup]:
-    """Return texts in HTML by id: those of `data/account.toml`, and effects of single defects."""
+    """Return texts in HTML by id, those of `data/account.toml` and effects of single defects."""
     texts = {each["id"]: each["text"] for each in facts("account")["statement"]}
     texts |= {each["id"]: each["part"] for each in entries() if "part" in each}
     return {name: inline(text) for name, text in texts.items()}
 
 
 def claims_context(judged: Sequence[Judgement], told: Sequence[SentenceVerdicts]) -> dict[str, Any]:
-    """Return the data of the claims page: stories and evidence, mostly as HTML.
+    """Return the data of the claims page.
 
-    `groups` has, by kind in the order of `KINDS`, each claim with verdicts, story and sentences.
+    `groups` has, by kind in the order of `KINDS`, each claim with its verdicts, story and
+    sentences.
     """
     groups: dict[str, list[Any]] = {kind: [] for kind in KINDS}
     for each in judged:
@@ -134,10 +131,7 @@ def thesis(judged: Sequence[Judgement]) -> list[SentenceVerdicts]:
 
 
 def thesis_context(told: Sequence[SentenceVerdicts]) -> dict[str, Any]:
-    """Return the data of the page on the thesis: sentences and formulas by section, and a table.
-
-    The table counts sentences and claims; only claims about results count as reproduced.
-    """
+    """Return the thesis page's data: sentences, formulas and a table of counts, by section."""
     columns = [
         Column("section", left=True), Column("sentences"), Column("that make a claim"),
         Column("results claimed"), Column("reproduced as printed"),
@@ -172,7 +166,7 @@ def formulas() -> dict[str, list[Formula]]:
 
 
 def draw_figures(figures: Mapping[str, FigureFinding]) -> dict[str, bytes]:
-    """Return figures as SVG and CSV, and original and corrected Figure 7 in one, also as PNG."""
+    """Return figures as SVG and CSV, and both versions of Figure 7 in one picture, also as PNG."""
     together = together_picture(figures["figure-07"], figures["figure-07-corrected"])
     files = saved(together, "figure-07-together.svg", "preview.png")
     for stem, each in figures.items():
@@ -183,10 +177,10 @@ def draw_figures(figures: Mapping[str, FigureFinding]) -> dict[str, bytes]:
 def printed_figures(
     figures: Mapping[str, FigureFinding], told: Sequence[SentenceVerdicts]
 ) -> list[dict[str, Any]]:
-    """Return the thesis's figures in order, each with its number, caption and place.
+    """Return the thesis's figures in order, with number, caption and place.
 
-    `drawn` has our drawings of the figure, `says` the thesis's sentences on it, each with its
-    anchor, or "" in sections I to IV. `ours` is our text on a figure that we do not draw.
+    `drawn` has our drawings; `says` has the thesis's sentences on the figure, each with its anchor,
+    or "" in sections I to IV. `ours` is our text on a figure that we do not draw.
     """
     found = []
     for each in facts("figures")["printed"]:
@@ -202,10 +196,7 @@ def printed_figures(
 
 
 def apparatus() -> dict[str, list[tuple[dict[str, Any], Markup]]]:
-    """Return each apparatus entry with its report as HTML, by the programs of its cards.
-
-    The report of an entry that can be switched off includes its effect in every case.
-    """
+    """Return each apparatus entry and its report as HTML, by the programs of its cards."""
     found: dict[str, list[tuple[dict[str, Any], Markup]]] = {name: [] for name in PROGRAMS}
     found |= {"several programs": [], "no card": []}
     for entry in entries():

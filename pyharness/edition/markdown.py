@@ -1,7 +1,7 @@
 """Conversion of the project's Markdown to HTML.
 
-Headings get the anchors that GitHub gives them, formulas become MathML, and links between documents
-become links between pages.
+Headings get GitHub's anchors, formulas become MathML, and links between documents become links
+between pages.
 """
 
 import re
@@ -26,7 +26,7 @@ class Part(NamedTuple):
 
 
 class Document(NamedTuple):
-    """A rendered document: title, HTML without the title, and plain text by heading."""
+    """A rendered document: title, HTML without the title, and text by heading."""
 
     title: str
     html: Markup
@@ -36,8 +36,8 @@ class Document(NamedTuple):
 def document(text: str, link: Callable[[str], str | None]) -> Document:
     """Return a Markdown text, whose first line is the title, as a Document.
 
-    `link` maps the target of a link or picture to its target on the site, or to None. For None a
-    link becomes plain text, and a picture raises ValueError.
+    `link` maps the target of a link or picture to its target on the site, or to None: then a link
+    becomes plain text, and a picture raises ValueError.
     """
     tokens = _parser().parse(text)
     for token in _walk(tokens):
@@ -62,7 +62,7 @@ def inline(text: str) -> Markup:
 
 
 def formula(tex: str, display: bool = False) -> Markup:
-    """Return LaTeX as MathML, as a separate line if `display`."""
+    """Return LaTeX as MathML, on its own line if `display`."""
     return Markup(convert(tex, display="block" if display else "inline"))
 
 

@@ -1,4 +1,4 @@
-"""The data of the page that compares the cards of the three decks, and explains differences.
+"""The data of the page that compares the cards of the three programs.
 
 Within an operation of `data/cards/collation.toml`, cards are aligned by similarity.
 """
@@ -28,41 +28,39 @@ KINDS = (_LABEL, "name", "number", "operator", "punctuation")
 
 
 class _Part(NamedTuple):
-    """A part of a card; the column is counted from 0."""
-
-    column: int
+    column: int  # from 0
     text: str
     kind: str
 
 
 class Cell(NamedTuple):
-    """A card in an aligned row, in pieces; `entry` of a piece is its kind of difference, if any."""
+    """A card in an aligned row, in pieces whose `entry` is their kind of difference, if any."""
 
     card: Card
     runs: list[Run]
 
 
 class AlignedRow(NamedTuple):
-    """Corresponding cards by program, None if missing, and their kinds of differences."""
+    """Corresponding cards by program, and their kinds of differences."""
 
     cells: dict[str, Cell | None]
     differences: list[str]
 
 
 class Operation(NamedTuple):
-    """An operation of the programs: its row of the collation, and the aligned cards."""
+    """An operation of the programs: its row of the collation, and aligned cards."""
 
     row: collation.Row
     aligned: list[AlignedRow]
 
 
 def operations() -> list[Operation]:
-    """Return all operations that have cards, without comments."""
+    """Return the operations that have cards, without comment cards."""
     return [Operation(row, _aligned(row.cards)) for row in collation.rows() if row.cards]
 
 
 def thesis_on(disagreement: Disagreement) -> str:
-    """Return a text on the equations and the place in the thesis that a disagreement concerns."""
+    """Return a text on the equations and place in the thesis that a disagreement concerns."""
     given = ", ".join(disagreement.equations)
     noun = "equations" if "," in given or "-" in given else "equation"
     return "; ".join(filter(None, (given and f"{noun} {given}", disagreement.where)))
@@ -77,11 +75,7 @@ def _aligned(ranges: dict[str, str]) -> list[AlignedRow]:
 
 
 def _merged(rows: Sequence[dict[str, Card]], cards: Sequence[Card]) -> list[dict[str, Card]]:
-    """Return aligned rows with a further deck's cards inserted.
-
-    Of all alignments that keep the order of the cards, the result has the largest sum of
-    similarities.
-    """
+    """Return rows with a deck's cards inserted in order, for the largest sum of similarities."""
     # best[i][j] is the largest sum for the rows from i on and the cards from j on.
     best = [[0.0] * (len(cards) + 1) for _ in range(len(rows) + 1)]
     pairs = [[max(_likeness(x, card) for x in row.values()) for card in cards] for row in rows]
@@ -111,7 +105,7 @@ def _likeness(one: Card, other: Card) -> float:
 
 
 def _compared(row: dict[str, Card]) -> AlignedRow:
-    """Return a row with marks on the parts that differ between any two cards."""
+    """Return a row with marks where any two cards differ."""
     marks: dict[str, dict[int, str]] = {program: {} for program in row}
     parts = {program: _split_card(card) for program, card in row.items()}
     for one, other in combinations(row, 2):
@@ -131,7 +125,6 @@ def _compared(row: dict[str, Card]) -> AlignedRow:
 
 
 def _split_card(card: Card) -> list[_Part]:
-    """Return a card's statement number and parts, without continuation marks."""
     labels = [] if card.continues else _PART.finditer(card.text[:5])
     found = [_Part(each.start(), each[0], _LABEL) for each in labels]
     parts = _PART.finditer(card.text, 6)
@@ -139,7 +132,7 @@ def _split_card(card: Card) -> list[_Part]:
 
 
 def _runs(text: str, parts: Sequence[_Part], marks: dict[int, str]) -> list[Run]:
-    """Return a card's text, without leading blanks, in pieces that begin at columns of `marks`."""
+    """Return a card's text, without leading blanks, divided around the parts in `marks`."""
     found, done = [], 0
     for part in parts:
         if part.column in marks:

@@ -1,6 +1,6 @@
 """The reports of `edition`, and the check of its libraries.
 
-`content` maps the path of each written file to its content.
+`content` maps paths of written files to their contents.
 """
 
 import shlex
@@ -24,18 +24,18 @@ _KINDS = (*words("files"), Column("number"), Column("kB", digits(".0f", 1e-3)))
 
 
 def check_libraries() -> None:
-    """Raise InputError, with the command to install it, if a library is missing."""
+    """Raise InputError if a library is missing, with the command to install it."""
     for name in LIBRARIES:
         check_package(name, "edition", install_command("edition"))
 
 
 def listed(content: Mapping[str, bytes]) -> dict[str, Any]:
-    """Return a record: `build` has versions and compiler, `files` the size (bytes) of each file."""
+    """Return a record of the build and the size (bytes) of each file."""
     return {"build": build_record(), "files": {name: len(each) for name, each in content.items()}}
 
 
 def edition_report(folder: str, content: Mapping[str, bytes]) -> Report:
-    """Return the report on the site's files: number and size (kB) by suffix."""
+    """Return the report on the site's files, with number and size (kB) by suffix."""
     text: list[Section] = [[_sizes(content)], [f"Open {folder}/index.html in a browser."]]
     return Report("edition", text, lambda: {"folder": folder, **listed(content)})
 

@@ -1,7 +1,7 @@
-"""The pages of the web site.
+"""The pages of the web site: templates filled with data and reports.
 
-A page is a template filled with data and reports. It works from a server or a file, under any path
-and without JavaScript, and loads nothing from other sites.
+They work from a server or a file, under any path and without JavaScript, and load nothing from
+other sites.
 """
 
 import json
@@ -50,7 +50,7 @@ MENU = tomllib.loads(Path(__file__).with_name("menu.toml").read_text(encoding="u
 
 
 class Found(NamedTuple):
-    """A place in a page that the search finds, of a `kind` such as ``claim`` or ``card``."""
+    """A place in a page that the search finds, of a `kind` such as ``claim``."""
 
     href: str
     title: str
@@ -59,7 +59,7 @@ class Found(NamedTuple):
 
 
 class Page(NamedTuple):
-    """A page before rendering, with the places that the search finds."""
+    """A page before rendering, and the places that the search finds."""
 
     path: str
     title: str
@@ -72,8 +72,7 @@ class Page(NamedTuple):
 def build_site(progress: Progress = no_progress, docs: Path | None = None) -> dict[str, bytes]:
     """Return all files of the site, content by path.
 
-    `progress` is as in `data_package`; `docs` is by default the folder `docs` of the source
-    checkout.
+    `docs` is by default the folder `docs` of the checkout.
     """
     check_publishable()
     docs = docs or documents.documents_folder()

@@ -1,7 +1,6 @@
-"""The data of the story, the home page: charts and numbers of its seven scenes.
+"""Charts and numbers of the home page, a story in seven scenes, from runs of the Python ports.
 
-They come from runs of the Python ports; when a visitor changes a value, a script runs the programs
-again.
+When a visitor changes a value, a script runs the programs.
 """
 
 import math
@@ -50,7 +49,7 @@ class Chart(NamedTuple):
     """A chart with fixed axes, as numbers for SVG.
 
     `x` and `y` are the ranges of the axes; for a logarithmic `y`, exponents of ten. Ticks are pairs
-    of position and label. If `is_marked`, curves are marks without lines. `marks` distinguish
+    of position and label. If `is_marked`, curves are marks without lines; `marks` distinguish
     curves that coincide.
     """
 
@@ -78,7 +77,7 @@ def data() -> dict[str, Any]:
 
 @cache
 def context() -> dict[str, Any]:
-    """Return the story's charts and numbers, from original and corrected runs of 100 steps."""
+    """Return the story's charts and numbers, from original and corrected runs."""
     stopped = _run(2, "runge-kutta")
     assert stopped.velocity is not None
     velocity = [0.0, *stopped.velocity[:, 1].tolist()]
@@ -138,7 +137,7 @@ def context() -> dict[str, Any]:
 def _run(
     case: int, program: str, listing: str = "original", without: Names = (), may_stop: bool = True
 ) -> Trajectory:
-    """Return a run of a Python port, corrected or original but for the defects in `without`."""
+    """Return a Python port's run, corrected, or original without the defects in `without`."""
     active = set(switches(program)) - set(without) if listing == "original" else set()
     return run_program(case_scene(case), Listing(program, active), "python", may_stop=may_stop)
 
@@ -172,7 +171,6 @@ def _span(case: int) -> Range:
 def _chart_of_case(
     name: str, case: int, runs: Mapping[str, Trajectory], y: Range, in_steps: bool = False
 ) -> Chart:
-    """Return a chart of the true omega1 over time or steps, with runs by program."""
     scene = case_scene(case)
     times = [0.0, *scene.times()]
     x = list(range(len(times))) if in_steps else times
@@ -247,10 +245,10 @@ def _across(chart: Chart, x: float) -> float:
 
 
 def _up(chart: Chart, y: float) -> float:
-    """Return a value's height in the picture, kept near the plot area."""
     _, top, _, bottom = BOX
     value = math.log10(y) if chart.is_logarithmic else y
     share = (value - chart.y[0]) / (chart.y[1] - chart.y[0])
+    # Kept near the plot area.
     return bottom - min(max(share, -1.0), 2.0) * (bottom - top)
 
 

@@ -1,8 +1,7 @@
-"""Sensitivities: the derivatives of a solution with respect to parameters, by Taylor series.
+"""Derivatives of a solution with respect to parameters (sensitivities), by Taylor series.
 
-If the torque jumps at a switch, or the scene has own states (unknowns that `Scene.states` adds),
-they are extrapolated from central differences with decreasing steps (Ridders 1982). Linearised
-equations would ignore that a parameter moves the time of a switch.
+If the torque jumps at a switch, or the scene has own unknowns (`Scene.states`), central differences
+are extrapolated (Ridders 1982): linearised equations ignore that a parameter moves a switch.
 """
 
 import itertools
@@ -61,10 +60,7 @@ States = Callable[[Scene], Array]
 def checked_names(
     scene: Scene, names: Iterable[str], method: str, attitude: bool
 ) -> tuple[str, ...]:
-    """Return the names of parameters without repetitions.
-
-    Raise InputError if a name is unknown, or its sensitivities can't be computed.
-    """
+    """Return distinct parameter names; raise InputError if one is unknown or not allowed."""
     place = "sensitivities"
     if method not in _METHODS:
         raise InputError(f"{place}: the method is {method}; allowed: {', '.join(_METHODS)}")
@@ -102,11 +98,11 @@ def checked_names(
 def sensitivities_at(
     scene: Scene, found: Trajectory, names: Sequence[str], effort: float, states: States
 ) -> dict[str, Array]:
-    """Return the derivatives of k unknowns with respect to each parameter's m numbers, (n, k, m).
+    """Return, by parameter name, derivatives of k unknowns at n times, (n, k, m) for m values.
 
-    `states` returns the unknowns of a changed scene at the n times of `found`. The tolerance is
-    relative to the largest derivative with respect to the same number so far. Raise InputError if
-    the work limit is exceeded, or a derivative overflows.
+    `states` returns the unknowns of a changed scene. The tolerance is relative to the largest
+    derivative with respect to the same value so far. Raise InputError if the work limit is
+    exceeded, or a derivative overflows.
     """
     if not names:
         return {}
@@ -139,7 +135,7 @@ def _by_series(
     scene: Scene, names: Sequence[str], attitude: bool, times: Array, tolerance: float,
     effort: float,
 ) -> tuple[dict[str, slice], Array, Array]:  # fmt: skip
-    """Return columns by parameter, the derivatives, (n, 3 or 7, m), and their values at time 0."""
+    """Return columns by parameter, the derivatives, (n, 3 or 7, m), and those at time 0."""
     equations = varied_equations(scene, names, attitude)
     state, starts = initial_state(scene, equations)
     packed = kernel_tape(equations.tape, len(state))
@@ -245,7 +241,7 @@ def _extrapolate(name: str, moved: Callable[[float], Scene], size: float, states
 
 
 def _moves(scene: Scene, name: str) -> Iterator[tuple[Callable[[float], Scene], float]]:
-    """Yield, for each value of a parameter, a function that changes it, and the size of changes."""
+    """Yield, for each parameter value, a function that changes it by h, and the value's scale."""
     if name == ATTITUDE:
         for axis in np.eye(3):
             yield lambda h, axis=axis: _turned(scene, h * axis), 1.0  # type: ignore[misc]
@@ -285,7 +281,6 @@ def _moves(scene: Scene, name: str) -> Iterator[tuple[Callable[[float], Scene], 
 
 
 def _turned(scene: Scene, turn: Array) -> Scene:
-    """Return the scene after a rotation about body axes by the vector `turn` (rad)."""
     angle = float(np.linalg.norm(turn))
     half = 0.5 * np.sinc(0.5 * angle / np.pi) * turn
     small = (np.cos(0.5 * angle), *half)

@@ -1,4 +1,4 @@
-"""Parameters of a scene, and the derivatives of its equations of motion with respect to them."""
+"""Parameters of a scene, and parameter derivatives of its equations of motion."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -33,12 +33,11 @@ _Body = tuple[Triple | None, Triple | None, tuple[Triple, ...] | None, Changing 
 
 
 class VariedEquations(NamedTuple):
-    """The equations of motion of a scene, and how they depend on parameters.
+    """The equations of motion of a scene, and their parameter derivatives.
 
-    The outputs of `tape` are the partial derivatives of the n rates, then the rates. Each of the m
-    parameter values has a column; `columns` has the columns by parameter name. Element (i, j) of
-    `forcings`, shape (n, m), is the number, from 1, of the output d(rate i)/d(value j), or 0 if
-    this derivative is 0.
+    The outputs of `tape` are the derivatives of the n rates, then the rates. `forcings`, (n, m),
+    has the numbers, from 1, of the outputs d(rate i)/d(value j), or 0 where this derivative is 0.
+    `columns` has the columns j of each parameter.
     """
 
     tape: Tape
@@ -47,10 +46,7 @@ class VariedEquations(NamedTuple):
 
 
 def parameters_of(scene: Scene) -> dict[str, list[float] | None]:
-    """Return the parameters of a scene by name, except the initial state.
-
-    A name that two summands of the torque share has the value None.
-    """
+    """Return parameters by name, except the initial state; None if two summands share it."""
     found: dict[str, list[float] | None] = {}
     if scene.moments is not None:
         found["moments"] = list(scene.moments)
@@ -65,7 +61,7 @@ def parameters_of(scene: Scene) -> dict[str, list[float] | None]:
 
 
 def varied_equations(scene: Scene, names: Sequence[str], attitude: bool) -> VariedEquations:
-    """Return the equations of motion, and their derivatives with respect to the parameters."""
+    """Return the equations of motion, and their parameter derivatives."""
     body = scene.moments, scene.coefficients, scene.inertia, scene.changing
     known = parameters_of(scene)
     values = tuple((name, tuple(known.get(name) or ())) for name in names)
@@ -73,7 +69,7 @@ def varied_equations(scene: Scene, names: Sequence[str], attitude: bool) -> Vari
 
 
 def check_values(scene: Scene, names: Iterable[str]) -> None:
-    """Raise InputError unless each of `names` is a parameter of the torque with a single value."""
+    """Raise InputError unless each name is a torque parameter with one value."""
     known = {
         name.removeprefix(TORQUE): values
         for name, values in parameters_of(scene).items()
@@ -89,7 +85,7 @@ def check_values(scene: Scene, names: Iterable[str]) -> None:
 
 
 def torque_with_values(torque: StateTorque | TorqueLaw, values: Mapping[str, float]) -> StateTorque:
-    """Return a recorded torque with other `values` of its parameters."""
+    """Return a recorded torque with other parameter values."""
     try:
         parts = [_with_values(each, values) for each in _list_summands(torque)]
     except ArithmeticError as error:
@@ -119,10 +115,10 @@ def tape_of_bodies(
     torque: StateTorque | TorqueLaw, body: tuple[Triple, Triple] | None, names: tuple[str, ...],
     attitude: bool,
 ) -> Tape:  # fmt: skip
-    """Return one tape of the equations of motion for bodies that differ in parameters.
+    """Return one tape (recorded equations of motion) of bodies that differ in parameters.
 
-    Further inputs are A, B, C and the reciprocal moments, unless `body` has them for all bodies;
-    and the torque's parameters `names`.
+    Further inputs are A, B, C and the reciprocal moments, unless in `body`, and the torque's
+    parameters `names`.
     """
     n_body = 0 if body else 6
     recorder = Recorder(n_inputs=N_INPUTS + n_body + len(names))
@@ -164,7 +160,6 @@ def _equations(
     values: tuple[tuple[str, tuple[float, ...]], ...],
     attitude: bool,
 ) -> VariedEquations:
-    """Return equations of motion and derivatives; `values` are names and values, by column."""
     # The initial omega and attitude have three columns each, but no values here.
     n = 7 if attitude else 3
     flat = [each for _, listed in values for each in listed]
@@ -200,7 +195,6 @@ def _equations(
 
 
 def _list_summands(torque: StateTorque | TorqueLaw) -> Sequence[StateTorque | TorqueLaw]:
-    """Return the summands of a torque, if possible with named parameters."""
     parts = (torque,) if isinstance(torque, TorqueLaw) else torque.parts or (torque,)
     return [getattr(part, "named", None) or part for part in parts]
 
@@ -219,7 +213,7 @@ def _parameters_of(part: StateTorque | TorqueLaw) -> dict[str, list[float]]:
 def _torque(
     part: TorqueLaw | StateTorque, time: Any, omega: Any, q: Any, given: Mapping[str, list[Any]]
 ) -> Any:
-    """Return a summand of the torque, with the symbols `given` in place of parameters."""
+    """Return a summand of the torque with the symbols `given` as parameters."""
     if isinstance(part, TorqueLaw):
         law: Any = SimpleNamespace(in_space=part.frame == "space")
         for name in ("constant", "rate"):
@@ -248,7 +242,6 @@ def _torque(
 def _rates(
     body: _Body, time: Any, omega: Any, torque: Any, given: Mapping[str, list[Any]]
 ) -> Sequence[Any]:
-    """Return the derivative of omega, with the symbols `given` in place of parameters."""
     own, coefficients, inertia, changing = body
     if changing is not None:
         return rates_of_changing(changing, time, omega, torque)

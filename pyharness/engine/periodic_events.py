@@ -1,4 +1,4 @@
-"""Events of a body without torque, by repetition of the events of one period."""
+"""Events of a body without torque, by repetition of one period's events."""
 
 from collections.abc import Callable, Sequence
 
@@ -21,7 +21,7 @@ _MARGIN = 1e-6
 
 
 def are_of_omega(functions: Sequence[EventFunction]) -> bool:
-    """Return whether all functions can be recorded, and depend on omega and its rate alone."""
+    """Return whether all functions can be recorded, and depend only on omega and its rate."""
     return all(map(_is_of_omega, functions))
 
 
@@ -37,10 +37,9 @@ def _is_of_omega(g: EventFunction) -> bool:
 
 
 def repeated(times: Array, period: float, end: float, where: str) -> tuple[Array, int]:
-    """Return the times (s) of events until `end`, and how many are not repetitions.
+    """Return the times (s) of events until `end`, and how many precede the repeated period.
 
-    `times` (s) are the events of the first three periods. Raise InputError, with `where` in its
-    message, for more than 5 000 000 events.
+    `times` (s) are events of the first three periods. Raise InputError for over 5 000 000 events.
     """
     # An event at the end of a period may be found on either side of it.
     margin = _MARGIN * period
@@ -68,7 +67,7 @@ def repeated(times: Array, period: float, end: float, where: str) -> tuple[Array
 def improved(
     g: EventFunction, times: Array, values: Callable[[EventFunction, Array], Array], period: float
 ) -> Array:
-    """Return the times (s) of events, improved by one Newton step each."""
+    """Return the times (s) of events after one Newton step each."""
     found, probe = times.copy(), _PROBE * period
     for begin in range(0, len(times), _BLOCK):
         block = times[begin : begin + _BLOCK]

@@ -23,7 +23,7 @@ _FEW_DIGITS = 1e-9
 
 
 class Decision(NamedTuple):
-    """The decision whether a part of the solution, such as ``torque``, is computed, and why."""
+    """The decision whether a part of the solution, such as ``torque``, is computed."""
 
     part: str
     kept: bool
@@ -103,7 +103,7 @@ def chosen_method(
 def by_plan(
     scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0, *more: bool
 ) -> Trajectory:
-    """Return the trajectory at `times` (s) by the chosen method; if it refuses, by its fallback."""
+    """Return the trajectory at `times` (s) by the chosen method or, if it refuses, the fallback."""
     name, fallback = chosen_method(scene, closed_form(scene), tolerance, rows=True)
     method = REGISTRY[name]
     more = more if method.gives_steps else ()

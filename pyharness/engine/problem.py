@@ -1,7 +1,7 @@
-"""Conversion of scenes to arguments of the Fortran kernels, and of their results.
+"""Conversion of scenes to arguments of the Fortran kernels, and of results to trajectories.
 
-A torque over moments is four arrays: constant (rad/s2), rate (rad/s3), sines and cosines; a column
-of the last two has three amplitudes (rad/s2) and a frequency (rad/s).
+A torque divided by moments is four arrays: constant (rad/s2), rate (rad/s3), sines and cosines,
+whose columns have three amplitudes (rad/s2) and a frequency (rad/s).
 """
 
 import math
@@ -27,7 +27,7 @@ _NOT_FINITE = (
 
 
 def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
-    """Return A, B, C, and the torque over the moments; raise InputError if one is not finite."""
+    """Return A, B, C, and the torque divided by moments; raise InputError if not finite."""
     law, moments = scene.body_torque, np.array(scene.moments or (1.0, 1.0, 1.0))
     # A wave of amplitude 0 would only take time.
     sines, cosines = (
@@ -46,10 +46,10 @@ def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
 def remainders(scene: Scene) -> Triple:
     """Return the exact coefficients A, B, C minus their values in binary64.
 
-    Without these remainders, a closed form has an error of 1e-10 rad after a phase of 1e6 rad. They
-    are 0 for a body given by coefficients, and under a torque, where no kernel uses them.
+    Without the remainders, a closed form has an error of 1e-10 rad at a phase of 1e6 rad.
     """
     found, moments = scene.euler_coefficients, scene.exact_moments
+    # Under a torque, no kernel uses the remainders.
     if moments is None or not scene.torque.is_zero or not all(map(math.isfinite, found)):
         return 0.0, 0.0, 0.0
     return _exact_remainders(moments, found)
@@ -65,7 +65,7 @@ def _exact_remainders(moments: "Exact", found: Triple) -> Triple:
 
 
 def estimate_or_none(estimate: float) -> float | None:
-    """Return a kernel's estimate, or None for a negative one."""
+    """Return a kernel's estimate; None if negative."""
     return float(estimate) if estimate >= 0.0 else None
 
 
@@ -81,10 +81,7 @@ def trajectory_of(
     attitudes: Array | None = None,
     **more: Any,
 ) -> Trajectory:
-    """Return the trajectory from the first `n_rows` columns of a kernel's omega and attitudes.
-
-    It has no `error` and `growth` if they are negative, or if the last time was not reached.
-    """
+    """Return the trajectory from the first `n_rows` columns of a kernel's results."""
     ended = ENDS[status] if ENDS[status] in (*WITH_ALL_ROWS, "sliding") else "overflow"
     if ended in WITH_ALL_ROWS:
         for name, value in (("error", error), ("growth", growth)):
@@ -99,7 +96,7 @@ def trajectory_of(
 def rows_trajectory(
     times: Sequence[float], omega: Array, evaluations: int, steps: int, ended: str, **more: Any
 ) -> Trajectory:
-    """Return a trajectory from omega (rad/s, shape (n, 3)) at `times` (s), without velocity."""
+    """Return a trajectory from omega (rad/s, shape (n, 3)) at `times` (s)."""
     time = np.array(times, dtype=float)
     return Trajectory(time, time, omega, None, steps, evaluations, ended, **more)
 
@@ -107,7 +104,8 @@ def rows_trajectory(
 def closed_form(scene: Scene) -> str | None:
     """Return the kind of closed form of a scene, or None.
 
-    ``sphere`` has A = B = C = 0, ``symmetric`` two equal moments, ``elliptic`` no equal moments.
+    ``sphere`` has A = B = C = 0, ``symmetric`` two equal moments, ``elliptic`` three different
+    moments.
     """
     law = scene.torque
     if not isinstance(law, TorqueLaw) or law.in_space or scene.changing is not None:

@@ -1,4 +1,4 @@
-"""Scenes and tapes (recorded equations of motion) in the arrays that the kernels read."""
+"""Conversion of scenes and tapes (recorded equations of motion) to arrays for kernels."""
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -46,13 +46,13 @@ LONGEST_TRIAL = 1e3
 
 
 def inputs_of(times: Array, state: Array) -> list[Array]:
-    """Return the eight inputs of a tape, each (n,); states are (n, 7), without attitude (n, 3)."""
+    """Return a tape's eight inputs, shape (n,), from states, (n, 7), without attitude (n, 3)."""
     columns = [times, *state.T]
     return columns + [np.zeros(len(times))] * (N_INPUTS - len(columns))
 
 
 def outputs_at(tape: Tape, times: Array, state: Array) -> Array:
-    """Return the m outputs of a tape at n states, shape (n, m); not finite where singular."""
+    """Return a tape's m outputs at n states, shape (n, m); not finite where singular."""
     with np.errstate(all="ignore"):
         found: Sequence[Any] = evaluate(tape, inputs_of(times, state), ARRAYS)
     # A constant output is a number, without a shape.
@@ -65,12 +65,11 @@ def outputs_at(tape: Tape, times: Array, state: Array) -> Array:
 
 
 def system_of(scene: Scene, attitude: bool | None = None) -> Tape:
-    """Return the equations of motion of a scene with principal axes as a tape.
+    """Return the recorded equations of motion of a scene with principal axes.
 
-    The outputs are the time derivatives of omega (equations 16-18 of Jacobs 1982), the quaternion
-    (q' = q (0, omega)/2), and own states (unknowns that `Scene.states` adds). The quaternion is
-    missing if `attitude` is false; by default, if the scene has none. The inputs are the time and
-    these unknowns. Raise InputError for an opaque torque.
+    The outputs are the derivatives of omega (equations 16-18 of Jacobs 1982), of the quaternion if
+    `attitude` is true (q' = q (0, omega)/2), and of `Scene.states`. Raise InputError for an opaque
+    torque.
     """
     torque = scene.torque
     if not isinstance(torque, StateTorque) or torque.tape is None:
@@ -115,8 +114,7 @@ def is_recorded(scene: Scene) -> bool:
 def slopes_of(scene: Scene) -> Callable[[float, Sequence[float]], list[float]]:
     """Return the right-hand side f(t, state) under a torque that depends on the state.
 
-    The state is omega (rad/s), with or without the quaternion. The result is NaN where the torque
-    is singular.
+    It is NaN where the torque is singular.
     """
     torque = scene.torque
     assert isinstance(torque, StateTorque)
@@ -139,8 +137,8 @@ class Listing(NamedTuple):
     """A tape as lists, with slots and combinations numbered from 1.
 
     A slot is an input or a result of an operation. An operation is a kind of `Operations`, two
-    operands and a result. A (linear) combination is a constant and pairs of slot and coefficient.
-    The last `n_unknowns` combinations are the derivatives of the unknowns.
+    operands and a result. A linear combination is a constant and pairs of slot and coefficient. The
+    last `n_unknowns` combinations are the derivatives of the unknowns.
     """
 
     n_unknowns: int
@@ -156,7 +154,7 @@ _LEAVES = 7
 
 @lru_cache(maxsize=64)
 def listing(tape: Tape, n_unknowns: int | None = None) -> Listing:
-    """Return a tape as lists; its last `n_unknowns` outputs (default: all) are derivatives.
+    """Return a tape as lists; the last `n_unknowns` outputs (default: all) are derivatives.
 
     Sine and cosine of an angle become one operation, because each recurrence needs the other.
     """
@@ -204,7 +202,7 @@ def listing(tape: Tape, n_unknowns: int | None = None) -> Listing:
 
 @lru_cache(maxsize=64)
 def kernel_tape(tape: Tape, n_unknowns: int | None = None) -> Array:
-    """Return a tape as the kernel's array, whose format is in fortran/modern/tape.f90."""
+    """Return a tape as an array in the format of fortran/modern/tape.f90."""
     listed = listing(tape, n_unknowns)
     n_unknowns, n_slots, operations, combinations, tables = listed
     terms = [term for _, each in combinations for term in each]
@@ -237,20 +235,20 @@ def kernel_tape(tape: Tape, n_unknowns: int | None = None) -> Array:
 
 
 def number_of_leaves(packed: Array) -> int:
-    """Return the address or number of the compiled code (leaves) of a packed tape."""
+    """Return the address or number of a packed tape's compiled code (leaves)."""
     at = Places.WAVES + _LEAVES
     return int(packed[at : at + 1].view(np.int64)[0])
 
 
+# The bits of two 32-bit integers are stored as one float.
 def _in_pairs(integers: Sequence[int] | NDArray[np.int64]) -> Array:
-    """Return 32-bit integers as the bits of floats, two in each."""
     pairs = np.zeros(len(integers) + len(integers) % 2, dtype=np.int32)
     pairs[: len(integers)] = integers
     return pairs.view(np.float64)
 
 
 def has_ready_leaves(tape: Tape) -> bool:
-    """Return whether code for the tape was built with the package, as for ready torques."""
+    """Return whether compiled code for the tape was built with the package."""
     return bool(kernel_tape(tape)[_LEAVES] != 0.0)
 
 
@@ -259,7 +257,7 @@ def packed_scene(
 ) -> Array:
     """Return a scene and its method's settings as one array, in the order of `Places`.
 
-    `leaves` is the address of the code compiled for a tape; 0 if built with the package, or none.
+    `leaves` is the address of code compiled for a tape; 0 if built with the package, or none.
     """
     if code == Methods.TAPE:
         tape = system_of(with_constant_body(scene))
@@ -281,7 +279,7 @@ def packed_scene(
 def packed_tape(
     tape: Tape, step_size: float, tolerance: float, effort: float, leaves: int = 0
 ) -> Array:
-    """Return equations of motion and settings as one array, as `packed_scene`."""
+    """Return equations of motion and settings as one array, in the order of `Places`."""
     packed = np.concatenate(
         [_settings(Methods.TAPE, step_size, tolerance, effort), kernel_tape(tape)]
     )
@@ -300,10 +298,10 @@ def _settings(code: int, step_size: float, tolerance: float, effort: float) -> A
 
 
 class Step(NamedTuple):
-    """A step of length `h`, 0 if no step is short enough.
+    """A Taylor step of length `h`, 0 if no step is short enough.
 
     `terms`, shape (order + 1, n), are Taylor coefficients times powers of `h`; `state`, shape (n,),
-    is their sum. `expansions` is the number of series computed.
+    is their sum. `expansions` counts the computed series.
     """
 
     h: float
@@ -321,11 +319,11 @@ def taylor_step(
     trial: float,
     longest: float,
 ) -> Step:
-    """Return a step of the equation y' = tape(t, y) from the time `t` and the state, shape (n,).
+    """Return a step of y' = tape(t, y) from the time `t` and the state, shape (n,).
 
-    `tolerances`, shape (n,), are the largest errors of the components; `relative`, a relative
-    tolerance, determines the order. `trial` is a guess of the step, with the sign of the `longest`
-    step. Raise InputError where a switch would change back and forth without end.
+    `tolerances`, shape (n,), are the components' largest errors; `relative`, a relative tolerance,
+    determines the order. `trial` is a guess of the step, with the sign of `longest`. Raise
+    InputError where a switch would change back and forth without end.
     """
     h, terms, end, order, expansions, status = extension().tape_step(
         tape, t, state, tolerances, relative, trial, longest, Storage.PERTURBATION_LENGTH

@@ -32,7 +32,7 @@ _SCIPY_DEFAULT = 1e-8
 
 @dataclass(frozen=True)
 class Method:
-    """The properties of a method, ours or SciPy's."""
+    """The properties of a method."""
 
     name: str
     title: str
@@ -203,18 +203,15 @@ SCIPY_METHODS = {name: method.scipy for name, method in REGISTRY.items() if meth
 
 
 def requested_tolerance(method: str, tolerance: Number | None) -> float:
-    """Return the tolerance, or the method's default if None; raise InputError if it is no number.
-
-    The range is not checked.
-    """
+    """Return the tolerance, not checked, or the default if None; InputError if no number."""
     chosen = REGISTRY[method]
     return chosen.default if tolerance is None else tolerance_of(tolerance, chosen.finest)
 
 
 def computes_attitude(scene: Scene, method: str, requested: bool | None) -> bool:
-    """Return whether the attitude is computed: as requested, or else if the scene has or needs one.
+    """Return `requested`; if None, whether the scene has or needs an attitude, if computable.
 
-    Raise InputError if it is requested, and the method can't propagate it.
+    Raise InputError if a requested attitude can't be propagated.
     """
     if requested is None:
         able = REGISTRY[method].attitude
@@ -249,7 +246,7 @@ def check_prepared(scene: Scene, method: str) -> None:
 
 
 def check_torque(scene: Scene, method: str, attitude: bool) -> None:
-    """Raise InputError if the method can't solve the scene because of its torque or inertia."""
+    """Raise InputError if the method can't take the scene's torque, inertia or states."""
     torque, chosen = scene.torque, REGISTRY[method]
     if scene.states and method not in PREPARED_FOR_STATE:
         raise InputError(

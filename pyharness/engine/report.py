@@ -50,11 +50,10 @@ def trajectory_report(
     word: str | None = None,
     bound: "ErrorBound | None" = None,
 ) -> Report:
-    """Return the report of a trajectory, with a table of its rows and a picture.
+    """Return the report of a trajectory, with a table and a picture.
 
-    The attitude is written in the `form` ``quaternion``, ``3-1-3``, ``3-2-1`` or ``matrix``. `word`
-    is the arithmetic of a thesis program, None for binary64. `bound` is the error bound of the
-    method `reference`.
+    The attitude's `form` is ``quaternion``, ``3-1-3``, ``3-2-1`` or ``matrix``. `word` is the
+    arithmetic of a thesis program; None is binary64.
     """
     times = np.column_stack([trajectory.time, trajectory.recorded_time])
     blocks: list[tuple[tuple[Column, ...], Array]] = [(_TIMES, times), (_OMEGA, trajectory.omega)]
@@ -152,14 +151,14 @@ def _picture(title: str, trajectory: Trajectory, numbers: Table) -> Picture:
 
 
 def mark_end(axes: "Axes", trajectory: Trajectory, row: int) -> None:
-    """Draw a cross at a component's last omega, or at the edge of the diagram if beyond."""
+    """Draw a cross at a component's last omega, or at the diagram's edge if beyond."""
     bottom, top = axes.get_ylim()
     axes.plot(trajectory.time[-1:], np.clip(trajectory.omega[-1:, row], bottom, top), **_END)
     axes.set_ylim(bottom, top)
 
 
 def plan_report(scene: Scene, plan: "Plan") -> Report:
-    """Return the report of a plan: the method, the computed parts, and the reasons."""
+    """Return the report of a plan."""
     table = Table(
         words("part computed why"),
         [[part, "yes" if kept else "no", why] for part, kept, why in plan.decisions],
@@ -178,10 +177,7 @@ def plan_report(scene: Scene, plan: "Plan") -> Report:
 
 
 def trajectory_bound(scene: Scene, found: Trajectory, effort: float = 1.0) -> "ErrorBound | None":
-    """Return a proved or estimated bound on the error of a trajectory by the method `reference`.
-
-    It is None if not finite.
-    """
+    """Return a `reference` trajectory's error bound, proved or estimated; None if not finite."""
     from pyharness.truth.bounded import error_bound
 
     start = None if found.attitude is None else scene.attitude or IDENTITY

@@ -1,8 +1,8 @@
-"""Rescaled time: conversion of scenes and trajectories to another unit of time.
+"""Conversion of scenes and trajectories to another unit of time.
 
 Products of two components of omega underflow below 1e-154 rad/s and overflow above 1e154 rad/s.
-Methods that form them receive the scene in a unit of time in which omega is near 1: a power of two,
-so that no number is rounded.
+Methods that form products receive scenes with omega near 1, in a unit of time that is a power of
+two, so that no number is rounded.
 """
 
 import math
@@ -35,10 +35,9 @@ _FELT = 1e-12  # change of omega, relative to its size, that a torque must not c
 
 
 def scaled(scene: Scene, factor: float) -> Scene:
-    """Return the scene with rescaled time, whose solution is factor * omega(factor * t).
+    """Return the scene whose solution is factor * omega(factor * t).
 
-    Raise InputError if the torque depends on the state and can't be rescaled, or if the inertia
-    changes with time.
+    Raise InputError if the torque can't be rescaled, or the inertia changes with time.
     """
 
     def times(values: Triple, power: int) -> Triple:
@@ -95,11 +94,10 @@ def integrate(
 
 
 def rescaling_factor(scene: Scene, time: float) -> float:
-    """Return the factor, a power of 2, that brings omega near 1 rad/s.
+    """Return the power of 2 that brings omega near 1 rad/s; 1 if unnecessary or impossible.
 
-    This omega is the larger of the initial omega and a bound on the omega that the torque causes
-    until `time` (s); for a torque that depends on the state, an estimate. The factor is 1 if no
-    rescaling is needed or possible, as for an opaque torque.
+    This omega is the larger of the initial omega and a bound, or under a torque that depends on the
+    state an estimate, of the omega that the torque causes until `time` (s).
     """
     if is_ordinary(scene.omega):
         return 1.0
@@ -132,7 +130,7 @@ def rescaling_factor(scene: Scene, time: float) -> float:
 
 
 def omega_by_torque(scene: Scene, time: float) -> float:
-    """Return a bound on omega (rad/s) after `time` (s) from rest, without gyroscopic torques."""
+    """Return a bound on the omega (rad/s) that the torque alone causes until `time` (s)."""
     law, span = scene.law, abs(time)
     moments = scene.moments or (1.0, 1.0, 1.0)
     if law.in_space:
@@ -153,7 +151,6 @@ def omega_by_torque(scene: Scene, time: float) -> float:
 
 
 def _omega_by_state_torque(scene: Scene, time: float) -> float:
-    """Return an estimate of the |omega| (rad/s) that the torque causes until `time` (s)."""
     torque, moments = scene.torque, scene.moments or (1.0, 1.0, 1.0)
     assert isinstance(torque, StateTorque)
     if torque.tape is None:
@@ -173,10 +170,10 @@ def _tape(torque: StateTorque, factor: float) -> Tape | None:
 
 @lru_cache(maxsize=64)
 def scaled_tape(tape: Tape, exponent: int) -> Tape | None:
-    """Return the tape (recorded operations) of a torque in the unit of time 2**exponent s.
+    """Return a torque's recorded operations in the unit of time 2**exponent s.
 
-    Each slot (input or result) has its own power of two as factor, so that none overflows or
-    underflows; the outputs have 2**(2 * exponent). Return None if a number would be rounded.
+    Each slot (input or result) has its own power of two as factor, the outputs 2**(2 * exponent),
+    so that none overflows or underflows. Return None if a number would be rounded.
     """
     # Slot n becomes slot `places[n]`, times 2**`exponents[n]`.
     operations: list[Operation] = []
@@ -237,16 +234,16 @@ def scaled_tape(tape: Tape, exponent: int) -> Tape | None:
 
 
 def _scaled(values: Any, exponents: Any) -> Any:
-    """Return values * 2**exponents, or raise ArithmeticError if one would be rounded."""
     with np.errstate(all="ignore"):
         found = np.ldexp(values, exponents)
+        # A rounded product is refused.
         if not np.array_equal(np.ldexp(found, -exponents), values):
             raise ArithmeticError("the product underflows or overflows")
     return found
 
 
 def unscaled(trajectory: Trajectory, times: Sequence[float], factor: float) -> Trajectory:
-    """Convert a trajectory of rescaled time to rad/s and s; rows that overflow are left out."""
+    """Return a trajectory of rescaled time in rad/s and s, up to the first overflow."""
     with np.errstate(over="ignore"):
         omega = trajectory.omega / factor
     finite = np.isfinite(omega).all(axis=1)

@@ -1,4 +1,4 @@
-"""Transformations of a scene to other axes, other signs, or another time 0."""
+"""Scenes with other axes, other signs, or another time 0."""
 
 import math
 from collections.abc import Callable
@@ -16,11 +16,10 @@ from pyharness.model.trajectory import Array
 
 
 def rotated(scene: Scene, turn: Callable[[Triple], Triple], body: bool) -> Scene:
-    """Return the scene with the function `turn` applied to omega and to all vectors of the torque.
+    """Return the scene with `turn` applied to omega, torque vectors and, if `body`, moments.
 
-    If `body` is true, `turn` also applies to the moments. The attitude, and a torque about the
-    axes of space, are kept. If the torque depends on the state, `turn` must be a rotation. Raise
-    InputError if the inertia changes with time.
+    Attitudes, and torques about the axes of space, are kept. If the torque depends on the state,
+    `turn` must be a rotation. Raise InputError if the inertia changes with time.
     """
 
     def waves(each: tuple[Wave, ...]) -> tuple[Wave, ...]:
@@ -46,7 +45,7 @@ def axes_of(turn: Callable[[Triple], Triple]) -> Array:
 
 
 def later(torque: StateTorque, by: float) -> StateTorque:
-    """Return the torque of t + `by` (s) as a function of t; raise InputError if it is opaque."""
+    """Return the torque of t + `by` (s) as a function of t; raise InputError if opaque."""
     if torque.tape is None:
         raise InputError(
             "an opaque torque can't be shifted in time; allowed: a torque that can be recorded"
@@ -75,8 +74,8 @@ def restarted_at(
 ) -> Scene:
     """Return the scene whose time 0 is the time `by` (s) of `scene`.
 
-    `omega` (rad/s) and `attitude` are the state at that time; without `attitude`, the initial one
-    is kept. Raise InputError if the torque is opaque, or needs an attitude and `attitude` is None.
+    `omega` (rad/s) and `attitude` are the state then. Raise InputError if the torque is opaque, or
+    needs an attitude and `attitude` is None.
     """
     first, second, third = (float(w) for w in omega)
     torque = scene.torque

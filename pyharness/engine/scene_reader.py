@@ -65,7 +65,7 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
 
 
 def scene_of_file(content: bytes, default_name: str, where: str) -> Scene:
-    """Return the scene of a file's bytes, or raise InputError with `where` before its message."""
+    """Return the scene of a file's bytes; messages of errors begin with `where`."""
     data = toml_of(content, where)
     try:
         return scene_of(data, default_name)

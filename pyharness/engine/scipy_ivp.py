@@ -1,8 +1,8 @@
 """The methods of `scipy.integrate.solve_ivp`.
 
-SciPy controls the local error of a step. Our tolerance limits the error at the requested times,
-which grows in proportion to the phase. The local tolerance therefore follows from the largest
-|omega|, error amplification and phase of a preliminary integration with few digits.
+SciPy controls the local error of a step, but our tolerance limits the error at the requested times,
+which grows with the phase. The local tolerance follows from the largest |omega|, error
+amplification and phase of a preliminary integration with few digits.
 """
 
 import math
@@ -67,7 +67,7 @@ class _Ahead(NamedTuple):
 def steps_sum(name: str, radians: float, growth: float, turned: float = 0.0) -> float:
     """Return a bound on the ratio of the error at the end to the local error.
 
-    `radians` is the phase, `growth` the error amplification, `turned` the body's rotation (rad).
+    `radians` is the phase, `growth` the error amplification, `turned` the rotation (rad).
     """
     found = _SUM[name] + _SUM_A_RADIAN[name] * radians * min(growth, _SENSITIVE)
     return found + _SUM_A_TURN[name] * turned * min(growth, _SENSITIVE)
@@ -156,7 +156,7 @@ def state_of(scene: Scene) -> tuple[float, ...]:
 
 
 def with_attitude(slopes: RightHandSide) -> RightHandSide:
-    """Add the attitude to a right-hand side of omega."""
+    """Return a right-hand side of omega extended by that of the quaternion."""
 
     def both(time: float, state: Sequence[float]) -> list[float]:
         x, y, z, *q = state
@@ -177,13 +177,12 @@ class _Run(Run):
         super().__init__(scene.omega, scene.right_hand_side(), rate, end, name, effort, most)
 
     def _scale_by_torque(self) -> float:
-        """Return a bound on the |omega| (rad/s) that the torque alone causes; 1 if not finite."""
         bound = omega_by_torque(self.scene, self.end)
         return bound if math.isfinite(bound) else 1.0
 
     @np.errstate(over="ignore", invalid="ignore")
     def ahead(self) -> _Ahead:
-        """Integrate with few digits; return the quantities that determine the local tolerance."""
+        """Return what determines the local tolerance, by an integration with few digits."""
         # The absolute tolerance is relative to an estimate of the largest |omega|. For a body at
         # rest, the first estimate may be far too large.
         scale = max(map(abs, self.scene.omega)) or self._scale_by_torque()
@@ -219,7 +218,7 @@ class _Run(Run):
 
 
 def _pushes(scene: Scene) -> list[tuple[float, float]]:
-    """Return each wave's largest ratio of amplitude to moment (rad/s2), and frequency (rad/s)."""
+    """Return each wave's largest amplitude over moment (rad/s2), and frequency (rad/s)."""
     moments = scene.moments or (1.0, 1.0, 1.0)
     return [
         (max(abs(a) / moment for a, moment in zip(amplitude, moments, strict=True)), abs(frequency))

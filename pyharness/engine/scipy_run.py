@@ -1,7 +1,7 @@
-"""Integrations by SciPy's `solve_ivp` under one work limit, and their check by a Taylor series.
+"""Integrations by SciPy's `solve_ivp` under one work limit, and their check by Taylor series.
 
-SciPy may step over a short change of a recorded torque. If its results differ from those of the
-series, the steps of the series limit the steps of SciPy.
+SciPy may step over a short change of a recorded torque. If its results differ from the series, the
+series limits SciPy's steps.
 """
 
 import contextlib
@@ -50,14 +50,14 @@ _FINEST = 1e-13  # tolerance of the steps that end at switches
 
 
 class NoNumberError(Exception):
-    """The exception for an integration that can't continue, such as a NaN in Radau."""
+    """The exception for an integration that can't continue, as after a NaN in Radau."""
 
 
 class Run:
     """The integrations of one problem from 0 to `end` (s) by `solve_ivp`, with one work limit.
 
-    The limit is `most` right-hand sides. The first components of the state are omega (rad/s). The
-    phase (rad) is `rate`, the largest Euler coefficient, times omega and time.
+    The limit is `most` right-hand sides. The state begins with omega (rad/s). The phase (rad) is
+    `rate`, the largest Euler coefficient, times omega and time.
     """
 
     def __init__(
@@ -91,11 +91,10 @@ class Run:
         state: Sequence[float] | None = None,
         with_steps: bool = False,
     ) -> Any:
-        """Return SciPy's result by its method `name`.
+        """Return SciPy's result by its method `name`, with times in units of `self.unit` s.
 
-        The result has dense output if `with_steps` is true or `times` are None. Its times are in
-        units of `self.unit` seconds; the arguments are in s. Raise NoNumberError if Radau's linear
-        algebra refuses a number, or time is NaN.
+        It has dense output if `with_steps` is true or `times` is None. Raise NoNumberError if
+        Radau's linear algebra refuses a number, or the time is NaN.
         """
         from scipy.integrate import solve_ivp
 
@@ -168,10 +167,7 @@ class Run:
 def rows_of(
     times: Sequence[float], rows: Array, evaluations: int, steps: int, ended: str
 ) -> Trajectory:
-    """Return a trajectory from rows of omega, (n, 3), or omega and a quaternion, (n, 7).
-
-    Quaternions are normalised.
-    """
+    """Return a trajectory from rows of omega, or omega and a quaternion, which is normalised."""
     attitude = None
     if rows.shape[1] > 3:
         attitude = rows[:, 3:] / np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)
@@ -186,14 +182,14 @@ class Span(NamedTuple):
 
 
 class Beside(NamedTuple):
-    """The results of the Taylor series, and the limits that they set on SciPy's steps."""
+    """States by Taylor series, and the resulting limits of SciPy's steps."""
 
     rows: Array  # shape (n, 3) or (n, 7)
     spans: list[Span]
 
 
 def bounds_of(scene: Scene, end: float) -> list[float]:
-    """Return `end` and times (s) from 0 to it at which a table or switch of a torque changes.
+    """Return `end`, and times (s) until `end` at which a table or switch of the torque changes.
 
     Raise InputError where a switch would change back and forth without end.
     """
@@ -219,7 +215,7 @@ def bounds_of(scene: Scene, end: float) -> list[float]:
 
 
 def series_beside(scene: Scene, times: Sequence[float], tolerance: float) -> Beside | None:
-    """Return the results of Taylor series at `times` (s); None if they do not reach the last."""
+    """Return states at `times` (s) by Taylor series; None if the last is not reached."""
     end, bounds = times[-1], bounds_of(scene, times[-1])
     attitude = scene.attitude is not None
     rows = [[*scene.omega, *(scene.attitude or ())]] if times[0] == 0.0 else []

@@ -1,7 +1,7 @@
 """SciPy's methods for torques that depend on the state, recorded or opaque.
 
-The error amplification is unknown. Therefore the local tolerance is reduced until the difference of
-two integrations shows that the second meets the tolerance.
+The error amplification is unknown. The local tolerance is therefore reduced until two integrations
+show that the second meets the tolerance.
 """
 
 from collections.abc import Sequence
@@ -41,16 +41,16 @@ def solve_state(
     most: float,
     with_steps: bool = False,
 ) -> Trajectory:
-    """Return the trajectory of a scene whose torque depends on the state, by SciPy's method `name`.
+    """Return the trajectory under a torque that depends on the state, by SciPy's method `name`.
 
-    The error at `times` (s), estimated from two integrations, is at most `tolerance`. `most` is the
-    work limit, as a number of right-hand sides of a body without torque. If the torque is opaque
-    and `with_steps` is true, `sol` of the result has the steps, by SciPy's interpolants.
+    The estimated error at `times` (s) is at most `tolerance`. `most` is the work limit, in
+    right-hand sides of a body without torque. If the torque is opaque and `with_steps` is true,
+    `sol` has SciPy's interpolants.
 
-    The ending is ``overflow`` if omega grows without bound or the torque is singular. It is
-    ``unchecked`` if the Taylor series that checks a recorded torque does not reach the end.
-    Raise InputError if an opaque function fails, the attitude is missing, the tolerance can't be
-    met, or the work limit is exceeded.
+    The ending is ``overflow`` if omega grows without bound or the torque is singular, ``unchecked``
+    if the Taylor series that checks a recorded torque ends early. Raise InputError if an opaque
+    function fails, the attitude is missing, the tolerance can't be met, or the work limit is
+    exceeded.
     """
     run = StateRun(scene, times[-1], name, effort, most)
     run.with_steps = with_steps and not run.is_smooth
@@ -81,10 +81,7 @@ def solve_state(
 
 
 def finest_of_state(name: str, scene: Scene, time: float, most: float) -> float:
-    """Estimate the smallest tolerance that can be met until `time` (s).
-
-    It is 0 if the integration does not reach `time`.
-    """
+    """Return an estimate of the smallest tolerance; 0 if `time` (s) is not reached."""
     run = StateRun(scene, time, name, 1.0, most)
     scale = 0.0 if run.is_singular() else run.expected_omega()
     if scale == 0.0:
@@ -96,7 +93,7 @@ def finest_of_state(name: str, scene: Scene, time: float, most: float) -> float:
 
 
 def _refined(run: StateRun, times: Sequence[float], tolerance: float) -> StateRows:
-    """Return states at `times` (s) whose estimated error meets `tolerance`, or raise InputError."""
+    """Return states at `times` (s) with an estimated error that meets `tolerance`."""
     scale = run.expected_omega()
     if scale == 0.0:
         # The body is at rest, and no torque acts.
@@ -133,7 +130,7 @@ def _refined(run: StateRun, times: Sequence[float], tolerance: float) -> StateRo
 
 
 def _difference(before: StateRows, after: StateRows) -> float:
-    """Return the largest relative difference of omega or angle (rad) between the attitudes."""
+    """Return the largest relative difference of omega, or angle (rad) between attitudes."""
     n = min(len(before.state), len(after.state))
     found = float(_differences(before, after, n).max(initial=0.0))
     if not (before.solutions and before.is_complete and after.is_complete):
@@ -148,7 +145,7 @@ def _difference(before: StateRows, after: StateRows) -> float:
 
 
 def _state_at(rows: StateRows, times: Array) -> Array:
-    """Return the states at n ascending or descending times by SciPy's dense outputs, (n, m)."""
+    """Return the states at n monotonic times by SciPy's dense outputs, shape (n, m)."""
     last = np.array([each.ts[-1] for each in rows.solutions])
     which = np.searchsorted(np.abs(last), np.abs(times)).clip(max=len(last) - 1)
     parts = [rows.solutions[k](times[which == k]).T for k in np.unique(which)]

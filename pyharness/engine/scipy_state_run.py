@@ -1,4 +1,4 @@
-"""One integration by SciPy under a torque that depends on the state."""
+"""Integration by SciPy under a torque that depends on the state."""
 
 import itertools
 import math
@@ -80,9 +80,8 @@ class StateRun(Run):
         self._solutions: list[Any] = []  # SciPy's dense outputs of the last integration
         self.spans = [Span(time, math.inf) for time in bounds_of(scene, end)]
 
+    # Confine tables to the current span, and report failures of opaque functions.
     def _guarded(self, slopes: RightHandSide) -> RightHandSide:
-        """Confine tables to the current span; turn failures of opaque functions into InputError."""
-
         def between(time: float, state: Sequence[float]) -> list[float]:
             low, high = self._between
             return slopes(min(max(time, low), high), state)
@@ -132,7 +131,6 @@ class StateRun(Run):
 
     @np.errstate(all="ignore")
     def _jumps(self) -> bool:
-        """Return whether the right-hand side jumps near the last state."""
         time, low = self._last[0] * self.unit, self._last[1]
         first = self._rates(time, low.tolist())
         high = low + _AHEAD * abs(self.end) * first
@@ -157,7 +155,7 @@ class StateRun(Run):
             )
 
     def after_step(self, time: float, state: Sequence[float]) -> None:
-        """Record the step; raise NoNumberError after over 50 successive steps at the same time."""
+        """Record the step; raise NoNumberError after over 50 steps at the same time."""
         self._stuck = self._stuck + 1 if time == self._reached else 0
         if self._stuck > _MOST_STUCK:
             raise NoNumberError
@@ -170,7 +168,7 @@ class StateRun(Run):
                 self._undefined = None
 
     def is_singular(self) -> bool:
-        """Return whether a rate at time 0 is not finite; SciPy's first step would then not end."""
+        """Return whether a rate at time 0 is not finite; SciPy's first step would not end."""
         return not np.isfinite(self._rates(0.0, self.start)).all()
 
     def expected_omega(self) -> float:
@@ -186,7 +184,7 @@ class StateRun(Run):
         return scale
 
     def _pushed(self) -> float:
-        """Return the |omega| (rad/s) that the largest torque causes from rest to the end, or 1."""
+        """Return the |omega| (rad/s) that the largest torque causes from rest, or 1."""
         times = np.linspace(0.0, self.end, _FEWEST_STEPS + 1).tolist()
         rates = [abs(x) for time in times for x in self._rates(time, self.start)[:3].tolist()]
         omega = max(filter(math.isfinite, rates), default=0.0) * abs(self.end)
@@ -237,7 +235,7 @@ class StateRun(Run):
         return np.empty((0, len(self.start)))
 
     def steps(self, scene: Scene) -> DenseOutput | None:
-        """Return the last integration's steps as dense output; None for 0 or over 20 000 steps."""
+        """Return the last integration's steps as dense output; None for 0 or over 20 000."""
         edges, values = [0.0], []
         for sol in self._solutions:
             for (first, last), step in zip(
@@ -253,7 +251,7 @@ class StateRun(Run):
 
 
 def with_unit_attitude(rows: Array) -> Array:
-    """Normalise the quaternions, if any."""
+    """Return the rows with normalised quaternions, if any."""
     if rows.shape[1] == 3:
         return rows
     unit = rows[:, 3:] / np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)

@@ -43,12 +43,11 @@ def is_sensitive(growth: float | None, tolerance: float, noise: float = 0.0) -> 
 def torque_noise(
     scene: Scene, omega0: Triple, t_end: float, steps: float = math.inf, scale: float | None = None
 ) -> float:
-    """Return the rounding error of torque terms that nearly cancel, divided by omega's.
+    """Return the rounding error of torque terms that nearly cancel, in units of omega's.
 
-    The result is the sum of the omegas that the terms cause alone until `t_end` (s), with rounding
-    in each of `steps` steps, over `scale` (rad/s). By default, `scale` is the larger of the initial
-    |omega| and the omega that the whole torque causes. The result is 0 if no terms nearly cancel,
-    or if the torque depends on the state.
+    It is the |omega| that the terms cause one by one until `t_end` (s), rounded in each of `steps`
+    steps, over `scale` (rad/s). The default scale is the larger of the initial |omega| and the
+    omega that the whole torque causes. The result is 0 if no terms nearly cancel.
     """
     if isinstance(scene.torque, StateTorque) or not (scene.law.sines or scene.law.cosines):
         return 0.0
@@ -69,10 +68,10 @@ def growth_of_rounding(scene: Scene, growth: float | None) -> float | None:
 def closed_form_estimate(
     scene: Scene, omega0: Triple, t_end: float, noise: float = 0.0
 ) -> tuple[float | None, float | None]:
-    """Return the estimated error of a closed form at `t_end` (s), and its error amplification.
+    """Return a closed form's estimated error at `t_end` (s), and the error amplification.
 
-    The error is the larger of the errors of omega, relative to the largest |omega| so far, and
-    attitude (rad). Both results are None if unknown.
+    The error is the larger of omega's, relative to the largest |omega| so far, and the attitude's
+    (rad). None means unknown.
     """
     growth: float | None = 1.0
     # A sphere does not amplify perturbations.
@@ -91,7 +90,7 @@ def closed_form_estimate(
 
 
 def motion_growth(scene: Scene, t_end: float) -> float | None:
-    """Return the error amplification of a motion until `t_end` (s), or None if unknown."""
+    """Return the error amplification until `t_end` (s), or None if unknown."""
     if isinstance(scene.torque, StateTorque):
         with suppress(InputError):
             return taylor(scene, [t_end], _COARSE, _LITTLE_WORK).growth
@@ -112,10 +111,7 @@ def motion_growth(scene: Scene, t_end: float) -> float | None:
 def judge_ending(
     scene: Scene, kind: str, tolerance: float, ending: Any
 ) -> tuple[str, float | None, float | None]:
-    """Return the status, error and error amplification of a call of a prepared solver.
-
-    `kind` is ``closed`` for a closed form, and ``gauss`` for collocation.
-    """
+    """Return the status, error and error amplification of a prepared solver's call."""
     number, steps, of_kernel, grown, omega0, t_end = ending
     status = ENDS[number]
     if status not in WITH_ALL_ROWS:

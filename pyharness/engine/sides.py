@@ -24,10 +24,7 @@ def in_reverse(found: Trajectory) -> Trajectory:
 
 
 def joined(before: Trajectory, after: Trajectory) -> Trajectory:
-    """Return the trajectories before and after time 0, both in ascending order, as one.
-
-    The result has the sums of steps and evaluations, and the worse error, amplification and ending.
-    """
+    """Return the trajectories before and after time 0, both in ascending order, as one."""
     both = before, after
     rows: dict[str, Any] = {
         name: np.concatenate([getattr(x, name) for x in both]) for name in row_names(after)

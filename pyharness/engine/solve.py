@@ -1,7 +1,6 @@
 """The function `solve`, which computes the trajectory of a scene by any method.
 
-It integrates from time 0 in both directions, and rescales time so that products of two components
-of omega neither overflow nor underflow.
+It integrates from time 0 in both directions, in a unit of time that avoids overflow and underflow.
 """
 
 import itertools
@@ -191,7 +190,7 @@ def solve(
 
 
 class _Call(NamedTuple):
-    """The checked arguments of `solve`; `given` is the scene, and `scene` has principal `axes`."""
+    """The checked arguments of `solve`; `scene` is `given` about its principal `axes`."""
 
     given: Scene
     scene: Scene
@@ -204,7 +203,6 @@ class _Call(NamedTuple):
     functions: list[EventFunction] | None
 
     def trajectory(self, values: list[float]) -> tuple[Trajectory, FoundEvents | None]:
-        """Return the trajectory at ascending times (s), and its events if there are functions."""
         given, scene, method, tolerance = self.given, self.scene, self.method, self.tolerance
         chosen = METHODS[method]
         below = [t for t in values if t < 0.0]
@@ -254,7 +252,7 @@ class _Call(NamedTuple):
 
 
 def _to_terminal_events(call: _Call, values: list[float]) -> Trajectory:
-    """Return the trajectory at ascending times (s), computed little beyond a terminal event."""
+    """Return the trajectory, computed little beyond a terminal event."""
     spent, low, high = 0, values[0], values[-1]
     for end in _trial_ends(call, max(-low, high)):
         some = [t for t in values if -end < t < end]
@@ -270,7 +268,7 @@ def _to_terminal_events(call: _Call, values: list[float]) -> Trajectory:
 
 
 def _trial_ends(call: _Call, last: float) -> Iterator[float]:
-    """Yield times (s), well before the `last`, to which the motion is computed on trial."""
+    """Yield the end times (s) of trial integrations, well before `last`."""
     is_terminal = any(g.limit < math.inf for g in call.functions or ())
     if not is_terminal or METHODS[call.method].is_fixed_step:
         return
@@ -295,7 +293,6 @@ def _more_rows(
 
 
 def _states_of_changed(times: Array, effort: float, attitude: bool, scene: Scene) -> Array:
-    """Return the states of a changed scene at n times (s), shape (n, m)."""
     found = solve(scene, times, "taylor", _OF_DIFFERENCES, effort=effort, attitude=attitude)
     if len(found.time) < len(times):
         raise InputError(
@@ -308,8 +305,8 @@ def _states_of_changed(times: Array, effort: float, attitude: bool, scene: Scene
 def finest(method: str, scene: Scene, time: float) -> float:
     """Return the smallest tolerance that a method can meet from 0 to `time` (s).
 
-    For SciPy's methods, whose local errors are at least some 2e-14, the tolerance grows with the
-    phase and the error amplification.
+    For SciPy's methods, with local errors of at least 2e-14, it grows with phase and error
+    amplification.
     """
     claimed = METHODS[method].finest
     if method not in SCIPY_METHODS or time == 0.0:

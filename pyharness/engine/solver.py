@@ -72,8 +72,9 @@ class Solver(BoundKernel[Result]):
     of floats and a unit quaternion. If the kernel could not finish, or an argument is not finite,
     the result is NaN and `status` has the reason.
 
-    Threads may share a solver. The kernel releases the interpreter's lock (GIL), unless the
-    solution takes less time. Solvers can be copied and pickled, without the last call's status.
+    Threads may share a solver. The kernel releases the interpreter's lock (GIL), unless the release
+    takes longer than the solution. Solvers can be copied and pickled, without the last call's
+    status.
 
     Attributes
     ----------

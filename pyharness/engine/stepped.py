@@ -1,4 +1,4 @@
-"""The steps of a motion, and why it ends early."""
+"""The steps of a motion, and the reason if it ends early."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -18,9 +18,9 @@ _MOST_STEPS = 200_000
 def steps_to(
     scene: Scene, attitude: bool, end: float, tolerance: float, most: int = _MOST_STEPS
 ) -> Iterator[tuple[float, Stepper]]:
-    """Yield the beginning (s) of each step from 0 to `end` (s), and the stepper after the step.
+    """Yield the beginning (s) of each step from 0 to `end` (s), and the stepper after it.
 
-    No step follows a singularity or `most` steps.
+    The steps end at a singularity, or after `most` steps.
     """
     stepper = Stepper(with_constant_body(scene), max(tolerance, FINEST), attitude=attitude)
     with suppress(SingularError):
@@ -33,7 +33,7 @@ def steps_to(
 def step_lengths(
     scene: Scene, attitude: bool, end: float, tolerance: float, bounds: Sequence[float]
 ) -> dict[float, float]:
-    """Return the length (s) of each step from 0 to `end` (s), by its end, except at `bounds`."""
+    """Return the length (s) of each step to `end` (s) by its end, except at `bounds`."""
     cuts = frozenset(bounds)
     return {
         stepper.time: abs(stepper.time - before)

@@ -343,8 +343,8 @@ def _check_three(name: str, values: object) -> tuple[float, ...]:
     return tuple(finite(name, each) for each in three_floats(name, values))
 
 
+# Changing a copy would not change the motion; therefore it is read-only.
 def _copy_fixed(values: Array) -> Array:
-    """Return a read-only copy: changing it would not change the motion."""
     found = values.copy()
     found.setflags(write=False)
     return found

@@ -21,9 +21,9 @@ MOST_STEPS = 20_000  # that `sol` has; it limits the memory
 
 
 def rates(scene: Scene, times: Array, state: Array) -> Array:
-    """Return the time derivatives of n states, shape (n, m); not finite at a singular torque.
+    """Return time derivatives of n states, shape (n, m); not finite at a singular torque.
 
-    A state is omega, the quaternion, and the unknowns that `Scene.states` adds.
+    A state is omega, the quaternion, and `Scene.states`.
     """
     bare, axes = principal(scene)
     bare = with_constant_body(bare)
@@ -62,10 +62,7 @@ def steps_output(scene: Scene, pieces: Pieces) -> DenseOutput:
 def transformed_steps(
     sol: DenseOutput | None, states: Callable[[Array], Array], factor: float = 1.0
 ) -> DenseOutput | None:
-    """Return `sol` in a unit of time that is `factor` times shorter, and with transformed states.
-
-    `states` transforms rows of the state, for example to other axes.
-    """
+    """Return `sol` with times multiplied by `factor`, and rows transformed by `states`."""
     if sol is None or not isinstance(sol.states, Pieces):
         return None
     edges, values = sol.states.edges * factor, sol.states.values
@@ -76,7 +73,7 @@ def transformed_steps(
 
 
 def joined_steps(before: DenseOutput | None, after: DenseOutput | None) -> DenseOutput | None:
-    """Return one dense output from those before and after time 0; None if one is missing."""
+    """Return the dense outputs before and after time 0 as one."""
     if before is None or after is None:
         return None
     parts = before.states, after.states

@@ -21,7 +21,7 @@ _NUMBER = re.compile(r"\[switch (\d+)\]")
 
 
 def reason_of(ended: str, time: float, number: int) -> str | None:
-    """Return the reason if a switch caused an ending; `number` counts switches from 1, or is 0."""
+    """Return the reason if switch `number` (from 1; 0: unknown) caused an ending."""
     if ended != "sliding" and not (ended == "sensitive" and number):
         return None
     message = str(TimedError(SLIDING if ended == "sliding" else _TOUCHED, time))
@@ -29,7 +29,7 @@ def reason_of(ended: str, time: float, number: int) -> str | None:
 
 
 def with_text(reason: str | None, scene: Scene) -> str | None:
-    """Return a reason with the formula of its switch in the scene's own axes and names."""
+    """Return a reason with its switch's formula in the scene's axes and names."""
     torque = scene.torque
     found = _NUMBER.search(reason or "")
     if reason is None or found is None:

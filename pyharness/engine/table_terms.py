@@ -1,4 +1,4 @@
-"""Torque terms given by tables over time, and pulses, with components about the body axes.
+"""Torque terms given by tables over time, and pulses, about the body axes.
 
 Taylor series begin a step where a table changes, and are as accurate as for a smooth torque.
 """
@@ -143,8 +143,8 @@ def _ascending(where: str, times: Any) -> Array:
     return found
 
 
+# Iteration over a DataFrame would yield its column names.
 def _as_array(values: Any) -> Any:
-    """Return a DataFrame, whose iterator yields column names, or a Series as an array."""
     return values.to_numpy() if hasattr(values, "to_numpy") else values
 
 
@@ -278,12 +278,12 @@ def _other_number(where: str, what: str, given: int, wanted: int) -> InputError:
 
 
 def _before(first: float, second: float) -> float:
-    """Return the start of a constant piece before `first` that is as long as the first piece."""
+    """Return the start of a constant piece before `first`, as long as the first piece."""
     return min(2.0 * first - second, math.nextafter(first, -math.inf))
 
 
 def _piecewise(times: Array, values: Array, interpolation: str, where: str) -> Table:
-    """Return the table of a function with these values, constant beyond the first and the last."""
+    """Return the table of a function, constant beyond the first and the last value."""
     is_held = interpolation == "held"
     pieces = np.zeros((len(values) - (not is_held), 4))
     pieces[:, 0] = values[: len(pieces)]

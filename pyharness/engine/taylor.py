@@ -29,9 +29,9 @@ def taylor(
 ) -> Trajectory:
     """Return the trajectory of a scene at `times` (s) by Taylor series.
 
-    The integration is repeated if inaccurate; `evaluations` counts the series of all integrations.
-    With `with_steps`, `sol` has the steps if all rows are present and there are at most 20 000.
-    Raise InputError for an opaque torque, and if the work limit is exceeded.
+    The integration is repeated if inaccurate; `evaluations` counts all series. With `with_steps`,
+    `sol` has the steps, unless rows are missing or there are over 20 000 steps. Raise InputError
+    for an opaque torque, and if the work limit is exceeded.
     """
     # The kernel reads the initial attitude in the first column, and writes a column for each time.
     n_attitudes = 0 if scene.attitude is None else len(times)

@@ -188,8 +188,6 @@ class Taylor(OdeSolver):  # type: ignore[misc]
 
 
 class _Series(DenseOutput):  # type: ignore[misc]
-    """The Taylor series of a step, as dense output; `terms` include powers of the step."""
-
     def __init__(self, t_old: float, t: float, terms: Array) -> None:
         super().__init__(t_old, t)
         self._terms = terms

@@ -1,4 +1,4 @@
-"""Reading of the torques that the tables [[torque.terms]] of scene files describe."""
+"""Reading of torques from the tables [[torque.terms]] of scene files."""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,4 @@
-"""Checks of the arguments of torque terms, and the form of terms in scene files.
-
-The message of each InputError begins with `where`.
-"""
+"""Arguments of torque terms, and terms in scene files; error messages begin with `where`."""
 
 from dataclasses import replace
 from typing import Any
@@ -42,7 +39,7 @@ def is_diagonal(matrix: Array) -> bool:
 
 
 def matrix_of(where: str, value: object) -> Array:
-    """Return a matrix, shape (3, 3), from a number, a diagonal or rows, or raise InputError."""
+    """Return a matrix, (3, 3), from a number, a diagonal or rows, or raise InputError."""
     if isinstance(converted(value), float):
         return np.diag([finite(where, value)] * 3)
     allowed = "allowed: a number, three numbers for the axes, or three rows of three numbers"
@@ -59,7 +56,7 @@ def matrix_of(where: str, value: object) -> Array:
 def inertia_of(where: str, value: object) -> Array:
     """Return an inertia matrix (kg m2), shape (3, 3), from three moments or three rows.
 
-    Raise InputError unless the matrix is symmetric and positive definite.
+    Raise InputError unless it is symmetric and positive definite.
     """
     if isinstance(converted(value), float):
         raise InputError(f"{where}: {kind_of(value)}; allowed: three moments, or three rows, kg m2")
@@ -72,7 +69,7 @@ def inertia_of(where: str, value: object) -> Array:
 
 
 def law_of_vector(where: str, value: object, frame: str) -> TorqueLaw:
-    """Return a vector over time, from three numbers or a TorqueLaw with `frame`."""
+    """Return a vector over time from three numbers or a TorqueLaw with `frame`."""
     allowed = f'allowed: three numbers, or a TorqueLaw with frame="{frame}"'
     if isinstance(value, TorqueLaw):
         if value.frame != frame:

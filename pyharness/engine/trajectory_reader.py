@@ -190,7 +190,7 @@ def _check_array(array: Any, kind: str, *shape: int) -> None:
     _require((array.dtype, array.shape) == (kind, shape))
 
 
+# `load` converts the ValueError to a message.
 def _require(holds: object) -> None:
-    """Raise ValueError, which `load` converts to a message, unless a condition holds."""
     if not holds:
         raise ValueError("a damaged value")

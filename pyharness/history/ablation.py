@@ -1,4 +1,4 @@
-"""Entries of the critical apparatus, such as defects, and their effects on the programs' errors."""
+"""Apparatus entries (notes on the programs, such as defects), and their effects on errors."""
 
 import math
 import string
@@ -37,10 +37,10 @@ for _a in "abcd":
 
 @dataclass(frozen=True)
 class Effect:
-    """The outcome of one listing (a program with a choice of defects) on one scene.
+    """The outcome of one program version (`listing`) on one scene.
 
-    `omega` (rad/s) and `velocity` (m/s) are the largest errors over the completed `steps`. `common`
-    has both errors over the steps that all compared listings completed.
+    `omega` (rad/s) and `velocity` (m/s) are the largest errors over the completed `steps`, and
+    `common` both errors over the steps that all compared listings completed.
     """
 
     listing: Listing
@@ -54,10 +54,10 @@ class Effect:
 
 @dataclass(frozen=True)
 class CaseEffects:
-    """The outcomes of four versions of a program in one case, which show one entry's effect.
+    """The outcomes of four program versions in one case, which show an apparatus entry's effect.
 
-    `corrected_alone` is the original with only this entry (such as a defect) corrected,
-    `kept_alone` the corrected listing with only this entry kept.
+    `corrected_alone` is the original listing without this entry, `kept_alone` the corrected listing
+    with it.
     """
 
     program: str
@@ -69,7 +69,7 @@ class CaseEffects:
 
 
 def entries(kind: str | None = None) -> list[dict[str, Any]]:
-    """Return the entries (notes) of one kind, or all; raise InputError for an unknown kind."""
+    """Return the apparatus entries of one kind, or all; raise InputError for an unknown kind."""
     everything: list[dict[str, Any]] = facts("apparatus")["entry"]
     kinds = sorted({entry["kind"] for entry in everything})
     if kind is not None and kind not in kinds:
@@ -78,7 +78,7 @@ def entries(kind: str | None = None) -> list[dict[str, Any]]:
 
 
 def entry(name: str) -> dict[str, Any]:
-    """Return the entry (note) `name` on the programs; raise InputError if there is none."""
+    """Return the apparatus entry `name`; raise InputError if there is none."""
     by_name = {each["id"]: each for each in entries()}
     if name not in by_name:
         raise unknown("entry", name, list(by_name))
@@ -86,7 +86,7 @@ def entry(name: str) -> dict[str, Any]:
 
 
 def effect(scene: Scene, listing: Listing, truth: Reference, effort: float = 1.0) -> Effect:
-    """Return the outcome of a program version on a scene, with errors against `truth`."""
+    """Return the outcome of running `listing` on `scene`, with errors against `truth`."""
     run = run_program(scene, listing, effort=effort)
     return Effect(listing, *_errors(scene, run, truth), run.steps, run.ended, run.stop)
 
@@ -98,17 +98,15 @@ def _errors(scene: Scene, run: Trajectory, truth: Reference) -> tuple[float, flo
 
 @cache
 def case_truth(case: int) -> Reference:
-    """Return the reference solution of a case at its steps, with translational velocity."""
+    """Return the reference solution of a case at its steps, with velocity."""
     scene = case_scene(case)
     return reference(scene, scene.times(), velocity=True)
 
 
 def effects_of(name: str) -> Iterator[CaseEffects]:
-    """Yield the effect of an entry, such as a defect, in each of its programs and every case.
+    """Yield the effects of an apparatus entry in each of its programs and every case.
 
-    For a reading of a doubtful line, or a conjecture on a missing one, `original` and
-    `corrected_alone` are the original listing with and without it, `kept_alone` and `corrected` the
-    corrected listing.
+    The version `original` has the entry, even if the original listing lacks it.
     """
     known = entry(name)
     for program in known["programs"]:
@@ -123,11 +121,10 @@ def effects_of(name: str) -> Iterator[CaseEffects]:
 def lattice(
     scene: Scene, program: str, readings: tuple[str, ...] = (), effort: float = 1.0
 ) -> list[Effect]:
-    """Return a program's outcomes with every subset of its defects, the largest error first.
+    """Return the outcomes with every subset of a program's defects, largest `common` error first.
 
-    The `readings` of doubtful lines and, under a varying torque, conjectures on missing lines vary
-    too. Outcomes are sorted by the errors over the steps that all runs completed. A reading has no
-    effect if a defect in the same statement is corrected.
+    The `readings` of doubtful lines and, under varying torque, conjectures on missing lines vary
+    too. A reading has no effect if a defect in the same statement is corrected.
     """
     check_steps(scene, program, "fortran", effort)
     truth = reference(scene, scene.times(), velocity=True, effort=effort)
@@ -144,7 +141,7 @@ def lattice(
 
 
 def switched(scene: Scene, program: str) -> tuple[str, ...]:
-    """Return a program's defects and, under a varying torque, conjectures on missing lines."""
+    """Return a program's defects and, under varying torque, conjectures on missing lines."""
     return switches(program) if scene.torque.varies else names_of("defect", program)
 
 
@@ -154,9 +151,9 @@ def _size(found: Effect) -> list[float]:
 
 
 def apparatus_report(entries: Sequence[dict[str, Any]], are_all_shown: bool = True) -> Report:
-    """Return the report of the notes on the programs' text, a line for each.
+    """Return the report of apparatus entries, a line for each.
 
-    Unless `are_all_shown`, the text has only the defects that change numbers.
+    Unless `are_all_shown`, its text has only the defects that change numbers.
     """
     shown = entries
     head = (
@@ -184,7 +181,7 @@ def apparatus_report(entries: Sequence[dict[str, Any]], are_all_shown: bool = Tr
 def entry_report(
     entry: dict[str, Any], effects: Sequence[CaseEffects], names: Sequence[str] = FIELDS
 ) -> Report:
-    """Return the report of an apparatus entry: the fields `names`, and a table of any `effects`."""
+    """Return the report of an apparatus entry: its fields `names` and a table of `effects`."""
     cards = "; ".join(f"{program} {cards}" for program, cards in entry["cards"].items())
     what = {each["siglum"]: each["what"] for each in facts("cards/scan")["ground"]}
     grounds = "; ".join(f"{siglum}, {what[siglum]}" for siglum in entry["grounds"])
@@ -233,7 +230,7 @@ def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
 
 
 def lattice_report(scene: Scene, found: Mapping[str, Sequence[Effect]]) -> Report:
-    """Return the report on every subset of a program's defects, which letters denote."""
+    """Return the report of the effects of every subset of each program's defects."""
     text: list[Section] = []
     rows = []
     for program, effects in found.items():

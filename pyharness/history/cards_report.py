@@ -1,4 +1,4 @@
-"""The reports of `cards`: cards with their lines in scan, Fortran and Python, and comparisons."""
+"""The reports of the command `cards` on the punched cards of the thesis's programs."""
 
 import textwrap
 from collections import Counter
@@ -33,10 +33,7 @@ HALF = 48  # width, in characters, of each of two texts side by side
 def cards_report(
     cards: Sequence[Card], title: str = "cards", only_contents: bool = False
 ) -> Report:
-    """Return the report of `cards`, each with its lines and notes.
-
-    With `only_contents` the text has a table of contents instead.
-    """
+    """Return the report of `cards`; with `only_contents`, its text is a table of contents."""
     rows = [[x.program, x.number, x.statement, x.scan, " ".join(x.entries)] for x in cards]
     data = columns("program card statement scan entries", rows)
     text = _contents(cards) if only_contents else list(map(_block, cards))
@@ -69,9 +66,9 @@ def _contents(cards: Sequence[Card]) -> list[Section]:
 
 
 def card_record(card: Card) -> dict[str, Any]:
-    """Return a card as a JSON record, with its lines in Fortran and Python.
+    """Return a card as a JSON record.
 
-    `scan` is null if the scan agrees with our text, empty if it lacks the card.
+    `scan` is null if the scan agrees with our text, and empty if it lacks the card.
     """
     found = deck(card.program)
     scan = (card.scan or "") if card.deviates else None
@@ -88,7 +85,7 @@ def scan_report(
 ) -> Report:
     """Return the report on whether our text explains every line of a scan.
 
-    `faults` names unexplained lines, `undeclared` disagreements between cards and apparatus.
+    `faults` are unexplained lines, `undeclared` disagreements between cards and apparatus.
     """
     cards = [card for program in PROGRAMS for card in deck(program).cards.values()]
     deviating = sum(bool(each.differences or each.lost) for each in cards)
@@ -111,7 +108,7 @@ def scan_report(
 
 
 def classes_report() -> Report:
-    """Return the report of the numbers of notes and their cards, by kind."""
+    """Return the report that counts apparatus entries and their cards, by kind."""
     entries = facts("apparatus")["entry"]
     cards = [card for program in PROGRAMS for card in deck(program).cards.values()]
     entries_of = Counter(each.entry for card in cards for each in card.differences)
@@ -158,7 +155,7 @@ def _block(card: Card) -> Section:
 
 
 def beside(left: Iterable[str], right: Iterable[str]) -> list[Line]:
-    """Return the lines of two texts side by side; left ones have at most `HALF` characters."""
+    """Return two texts side by side; left lines have at most `HALF` characters."""
     pairs = zip_longest(left, right, fillvalue="")
     return [Line(f"{a.ljust(HALF)}   {b}".rstrip()) for a, b in pairs]
 
@@ -194,7 +191,7 @@ def collation_report(found: Sequence[Row]) -> Report:
 
 
 def origins_report(found: Sequence[Disagreement], mistakes: Sequence[str]) -> Report:
-    """Return the report of disagreements, their origins, and mistakes in our table of them."""
+    """Return the report of disagreements, and of `mistakes` in their table."""
     rows, full = [], []
     for each in found:
         having = "".join(_SHORT[program] for program in each.cards) or "-"

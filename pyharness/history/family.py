@@ -1,6 +1,6 @@
 """The weighted residual methods in sections III.1 and IV.2 of the thesis, and their orders.
 
-One step of length h solves omega' = f(t, omega), equations 16-18, with a polynomial trial function
+One step of length h solves omega' = f(t, omega) (eq. 16-18) with a polynomial trial function
 omega(0) + c1 t + ... + cn t**n. The first estimate assumes constant f. Each correction evaluates f
 along the previous estimate, and chooses c1, ..., cn so that the integrals of W (omega' - f) over
 the step vanish for n weight functions W (eq. 26). The thesis makes one correction.
@@ -53,12 +53,11 @@ MOST_STEPS = 2_000
 
 @dataclass(frozen=True)
 class Member:
-    """A weighted residual method of the thesis.
+    """A weighted residual method of the thesis, with n = `terms` coefficients ci.
 
-    The weight functions of least squares are i t**(i-1), the derivatives of the residual by ci for
-    constant f (eq. 25). `terms` is the number n of coefficients ci. `points`, for collocation only,
-    are fractions of the step: "thesis" for k/(n+1), k = 1 to n; "gauss" for the Gauss-Legendre
-    points; or n different numbers from 0 to 1.
+    Least squares has the weight functions i t**(i-1), the derivatives of the residual by ci for
+    constant f (eq. 25). `points`, for collocation only, are fractions of the step: "thesis" for
+    k/(n+1), k = 1 to n; "gauss" for the Gauss-Legendre points; or n different numbers from 0 to 1.
     """
 
     weighting: str = "collocation"
@@ -129,15 +128,15 @@ def converged_order(member: Member) -> int:
 
 
 def predicted_order(member: Member) -> int:
-    """Return the order of the global error: corrections + 1, at most `converged_order`."""
+    """Return the order of the global error after the method's corrections."""
     return min(member.corrections + 1, converged_order(member))
 
 
 def run(scene: Scene, member: Member) -> Trajectory:
     """Integrate a scene by a weighted residual method (Jacobs 1982, III.1, eq. 20-27, and IV.2).
 
-    The first estimate uses the torque at the beginning of the step, a correction the torque at its
-    nodes. Each step has a rounding error of about one unit in the last place of omega.
+    The first estimate uses the torque at the beginning of the step, corrections that at their
+    nodes. The rounding error of a step is about one unit in the last place of omega.
     """
     omega = integrate(scene, [member])[0]
     rows = int(np.logical_and.accumulate(np.isfinite(omega).all(axis=1)).sum())
@@ -150,7 +149,7 @@ def run(scene: Scene, member: Member) -> Trajectory:
 
 
 def integrate(scene: Scene, members: Sequence[Member]) -> Array:
-    """Return omega (rad/s) by several methods at once, shape (members, steps, 3).
+    """Return omega (rad/s) by each method, shape (members, steps, 3).
 
     Values after an overflow are not finite.
     """
@@ -232,11 +231,11 @@ def _torque(scene: Scene, times: Array) -> Array:
 
 @dataclass(frozen=True)
 class OrderFinding:
-    """The derived and the measured order of convergence of a method in a scene, and its error.
+    """A method's derived and measured order of convergence in a scene, and its error.
 
-    `measured` is None if all errors are too large or only rounding errors. It is `settled` if the
-    last two measurements differ by at most 0.1. `error` (rad/s) is the error of omega with the
-    scene's step size.
+    `measured` is None if too many errors are too large or only rounding. It is `settled` if the
+    last two measurements differ by at most 0.1. `error` (rad/s) is that of omega with the scene's
+    step size.
     """
 
     member: Member
@@ -247,7 +246,7 @@ class OrderFinding:
 
     @property
     def deviation(self) -> float:
-        """Return the measured minus the predicted order; NaN without a measured order."""
+        """Return the measured minus the predicted order, or NaN."""
         return math.nan if self.measured is None else self.measured - self.predicted
 
     @property
@@ -264,7 +263,7 @@ def family_members() -> list[Member]:
 def order_table(
     scene: Scene, members: Sequence[Member] | None = None, progress: Progress = no_progress
 ) -> list[OrderFinding]:
-    """Return the order of convergence and the error of each method, by default of `family_members`.
+    """Return order of convergence and error of each method, by default of `family_members`.
 
     Raise InputError if the solution is unbounded or the scene has more than `MOST_STEPS` steps.
     """
@@ -321,7 +320,7 @@ def _ladder(scene: Scene, members: Sequence[Member], horizon: float, end: Array)
 
 
 def _slopes(errors: Array) -> list[float]:
-    """Return the order from each usable pair of errors, whose step sizes have the ratio 2."""
+    """Return the order from each usable pair of errors with step sizes of ratio 2."""
     return [
         math.log2(coarse / fine)
         for coarse, fine in zip(errors[:-2], errors[2:], strict=True)
@@ -363,7 +362,7 @@ def _finding(found: Sequence[OrderFinding]) -> list[str]:
 
 
 def verdict(found: Sequence[OrderFinding]) -> list[str]:
-    """Return a sentence for each order below the derived one, else one sentence for all orders."""
+    """Return a sentence for each order below the derived one, or one sentence for all orders."""
     unexpected = _unexpected(found)
     if unexpected:
         return [f"UNEXPECTED: {each}" for each in unexpected]

@@ -1,7 +1,4 @@
-"""Figures 6 to 12 of the thesis, redrawn: omega of the programs against the reference.
-
-One set of figures shows the original programs, another the corrected programs.
-"""
+"""Figures 6 to 12 of the thesis, redrawn for the original and for the corrected programs."""
 
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
@@ -74,7 +71,7 @@ class FigurePlan:
 
     @property
     def files(self) -> list[str]:
-        """Return the names of the figure's files: two pictures and a CSV file."""
+        """Return the names of the figure's files."""
         return [f"{self.stem}.{ending}" for ending in ENDINGS]
 
     @property
@@ -85,7 +82,7 @@ class FigurePlan:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """The run of one version of a program, drawn as a curve."""
+    """The run of a program version, drawn as a curve."""
 
     listing: Listing
     trajectory: Trajectory
@@ -116,7 +113,7 @@ class FigureFinding:
 
     @property
     def known(self) -> list[tuple[str, Array]]:
-        """Return label and omega (rad/s) of the reference solution and, if drawn, of the limit."""
+        """Return label and omega (rad/s) of the reference and, if drawn, of the limit."""
         return [("reference", self.reference.omega), *([self.limit] if self.limit else [])]
 
 
@@ -194,7 +191,7 @@ def _from_zero(values: Array, start: Array | float = 0.0) -> Array:
 
 
 def figure_picture(finding: FigureFinding) -> Picture:
-    """Return a picture of each omega component over time, drawn over the reference solution."""
+    """Return a picture of each omega component over time, with the reference solution."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7.2, 8.6), dpi=110, layout="constrained")
@@ -219,10 +216,10 @@ def figure_picture(finding: FigureFinding) -> Picture:
 
 
 def together_picture(first: FigureFinding, second: FigureFinding) -> Picture:
-    """Return omega1 of an original and of a corrected figure in one picture.
+    """Return one picture of omega1 in an original and a corrected figure.
 
-    The limit in `first` continues a run that ended early. The curves in `second` coincide; only the
-    last is drawn.
+    The limit in `first` continues a run that ended early. Of `second`, whose curves coincide, only
+    the last is drawn.
     """
     from matplotlib.figure import Figure
 
@@ -242,7 +239,7 @@ def together_picture(first: FigureFinding, second: FigureFinding) -> Picture:
 
 
 def points_picture() -> Picture:
-    """Return a picture of the collocation points of each printed program in the first steps.
+    """Return a picture of the original programs' collocation points in the first steps.
 
     Each row is a step; times (s) are from its beginning, and the grey band is the step.
     """
@@ -295,10 +292,8 @@ def _draw_panel(
 
 
 def _frame(finding: FigureFinding, row: int) -> tuple[float, float]:
-    """Return the bottom and top (rad/s) of the plot of one omega component.
-
-    A curve leaves the plot where it is outside the reference's range by more than max |omega|.
-    """
+    """Return the bottom and top (rad/s) of the plot of one omega component."""
+    # A curve leaves the plot where it is outside the reference's range by more than max |omega|.
     truth = finding.reference.omega
     least, largest = float(truth[:, row].min()), float(truth[:, row].max())
     far = float(np.abs(truth).max())

@@ -1,7 +1,7 @@
-"""Identifiers of the edition: Software Heritage identifiers (SWHIDs), and a digest of its text.
+"""Software Heritage identifiers (SWHIDs) of the edition, and a digest of its text.
 
-A SWHID (ISO/IEC 18670) contains git's SHA-1 hash of a file or folder, which anyone can recompute.
-The archive Software Heritage finds its copies by SWHID.
+A SWHID (ISO/IEC 18670) contains git's SHA-1 hash of a file or folder. The archive Software Heritage
+finds its copies by SWHID.
 """
 
 import json
@@ -37,7 +37,7 @@ def directory_identifier(files: Mapping[str, bytes]) -> str:
 def source_files() -> dict[str, bytes]:
     """Return the files of the edition's data and of the Fortran port, by repository path.
 
-    An installed package has some of the files in other places.
+    An installed package has some of them elsewhere.
     """
     folder = facts_folder()
     found = {
@@ -51,7 +51,7 @@ def source_files() -> dict[str, bytes]:
 
 
 def data_identifier() -> str:
-    """Return the SWHID of the folder `DATA` in the source repository."""
+    """Return the SWHID of the folder `DATA`."""
     found, within = source_files(), f"{DATA}/"
     names = [name for name in found if name.startswith(within)]
     return directory_identifier({name.removeprefix(within): found[name] for name in names})
@@ -94,10 +94,7 @@ def _tree(files: Mapping[str, bytes]) -> bytes:
 
 
 def text_digest(table: Callable[[str], Mapping[str, Any]] = facts) -> str:
-    """Return a digest of cards and apparatus, which identifies the edition's text in citations.
-
-    It has the first 12 hexadecimal digits of the SHA-256 of the data in `TABLES`.
-    """
+    """Return the text's digest for citations: 12 hexadecimal digits of the SHA-256 of `TABLES`."""
     told = {name: table(name) for name in TABLES}
     text = json.dumps(told, ensure_ascii=False, sort_keys=True, separators=(",", ":"))
     return sha256(text.encode()).hexdigest()[:12]

@@ -2,7 +2,7 @@
 
 An original program may converge to the solution of Euler's equations, to another function of time,
 or to no function (docs/article/article.md). Each limit is computed independently of the program,
-and compared with its runs as the step size is halved. `effort` multiplies the work limit.
+and compared with runs at halved step sizes. `effort` multiplies the work limit.
 """
 
 import math
@@ -61,10 +61,10 @@ class Halving:
 
 @dataclass(frozen=True)
 class Limit:
-    """The limit of an original program as the step size goes to zero, and the convergence.
+    """The convergence of an original program to its limit as the step size goes to zero.
 
-    `order` is measured with the last two step sizes. It is None if a run with one of them overflows
-    or has only rounding errors, or if the limit does not exist or is unbounded at `blow_up` (s).
+    `order` is measured with the last two step sizes. It is None after an overflow, with mere
+    rounding errors, without a limit, or if the limit is unbounded at the time `blow_up` (s).
     """
 
     program: str
@@ -87,7 +87,7 @@ class Limit:
 def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) -> Limit:
     """Return the convergence of an original program, run without stop test, to its limit.
 
-    Under a varying torque only the Runge-Kutta program has a limit. Raise InputError if the work
+    Under varying torque only the Runge-Kutta program has a limit. Raise InputError if the work
     limit is exceeded.
     """
     times = scene.times()
@@ -118,10 +118,9 @@ def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) ->
 def limit_solution(
     program: str, scene: Scene, times: Sequence[float], truth: Reference, effort: float = 1.0
 ) -> tuple[Array, str, float | None]:
-    """Return the limit of an original program's omega (rad/s), shape (times, 3).
+    """Return an original program's limit: omega (rad/s), description, and blow-up time (s) or None.
 
-    Without a limit the values are NaN. Also return a description of the limit, and the time (s) at
-    which it becomes unbounded, or None.
+    The omega has the shape (times, 3); it is NaN without a limit.
     """
     scale = float(np.abs([scene.omega, *truth.omega]).max()) or 1.0
     start = list(scene.omega)
@@ -140,14 +139,12 @@ def limit_solution(
 
 
 def _extrapolated(scene: Scene) -> Rate:
-    """Return the right-hand side of the two-term program's limit equation.
-
-    The original program adds the step size h to DT in every step. In step n the collocation points
-    are therefore t/3 and 2t/3 after the beginning of the step, with t = n h. Let F be the
-    right-hand side of Euler's equations at w, F' its Jacobian, and Q its quadratic part. The slope
-    along the first estimate is g(s) = F(w + s F) = F + s F' F + s^2 Q(F). The line through g(t/3)
-    and g(2t/3) is 2 g(t/3) - g(2t/3) = F - (2/9) t^2 Q(F) at s = 0.
-    """
+    """Return the right-hand side of the limit equation of the two-term program."""
+    # The original program adds the step size h to DT in every step. In step n the collocation
+    # points are therefore t/3 and 2t/3 after the beginning of the step, with t = n h. Let F be the
+    # right-hand side of Euler's equations at w, F' its Jacobian, and Q its quadratic part. The
+    # slope along the first estimate is g(s) = F(w + s F) = F + s F' F + s^2 Q(F). At s = 0 the line
+    # through g(t/3) and g(2t/3) has the value 2 g(t/3) - g(2t/3) = F - (2/9) t^2 Q(F).
     right_hand_side = scene.right_hand_side()
     a, b, c = scene.euler_coefficients
 
@@ -160,12 +157,10 @@ def _extrapolated(scene: Scene) -> Rate:
 
 
 def _slow_slopes(scene: Scene) -> Rate:
-    """Return the right-hand side of the Runge-Kutta program's limit, under varying torque.
-
-    Let p be the omega in U(1), at which a step's first slopes are evaluated, and F the right-hand
-    side of Euler's equations. Each step of size h adds (h/2) F(p) to p, and h F(p) to the printed
-    omega. The state is p, then the printed omega.
-    """
+    """Return the right-hand side of the Runge-Kutta program's limit, under varying torque."""
+    # Let p be the omega in U(1), at which a step's first slopes are evaluated, and F the right-hand
+    # side of Euler's equations. Each step of size h adds (h/2) F(p) to p, and h F(p) to the printed
+    # omega. The state is p, then the printed omega.
     right_hand_side = scene.right_hand_side()
 
     def rate(t: float, state: Sequence[float]) -> list[float]:
@@ -178,10 +173,7 @@ def _slow_slopes(scene: Scene) -> Rate:
 def _solved(
     rate: Rate, start: list[float], times: Sequence[float], scale: float, effort: float
 ) -> tuple[Array, float | None]:
-    """Return the solution at `times` (s), NaN after a blow-up, and the blow-up's time (s) or None.
-
-    At the blow-up a component reaches a million times `scale` (rad/s).
-    """
+    """Return the solution, NaN after a blow-up, and the blow-up's time (s) or None."""
     from scipy.integrate import solve_ivp
 
     evaluations, latest = 0, 0.0
@@ -234,7 +226,7 @@ def invisible(scene: Scene) -> dict[str, tuple[str, ...]]:
 def limits_report(
     scene: Scene, found: Sequence[Limit], invisible: Mapping[str, Sequence[str]]
 ) -> Report:
-    """Return the report; `invisible` is a result of the function of this name."""
+    """Return the report of limits and, by program, of `invisible` defects."""
     ends = [[x.program, x.order, x.halvings[-1].from_truth, x.tends_to] for x in found]
     hidden = [f"{each.program}: {', '.join(invisible[each.program]) or 'none'}" for each in found]
     listings = [Listing.original(each.program) for each in found]

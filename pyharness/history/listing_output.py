@@ -1,4 +1,4 @@
-"""Comparison of a page printed by any machine with our pages, to find the machine's arithmetic."""
+"""Comparison of a page that any machine printed with ours, to find the machine's arithmetic."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
@@ -39,9 +39,9 @@ def fits(
 ) -> list[Fit]:
     """Return the comparisons of a page with our pages of the same form, nearest first.
 
-    Pages have the same form if the moments and torques in their headings and the numbers of columns
-    agree. Our runs have as many steps as in the text of the thesis or, if the page is longer, as on
-    the cards. Raise InputError if none of our pages has the form.
+    Pages have the same form if moments and torques in the heading, and the number of columns,
+    agree. Our runs have the steps of the thesis's text or, if the page is longer, of the cards.
+    Raise InputError if none of our pages has the form.
     """
     found: list[Fit] = []
     listings = {program: listings_of(program) for program in programs}
@@ -81,7 +81,7 @@ def listings_of(program: str) -> dict[str, Listing]:
 
 @cache
 def our_page(listing: Listing, case: int, steps: int, word: str) -> str:
-    """Return the page that a program version prints in a case, in the arithmetic `word`."""
+    """Return the page that a program version prints in a case, in arithmetic `word`."""
     scene = replace(case_scene(case), steps=steps)
     return page(scene, listing.program, run_program(scene, listing, "python", word=word))
 
@@ -91,7 +91,7 @@ def _lines(listing: Listing, case: int, steps: int, word: str = BINARY64) -> lis
 
 
 def listing_output_report(path: str, found: Sequence[Fit]) -> Report:
-    """Return the report on the program, listing and arithmetic of a page's file."""
+    """Return the report on program, listing and arithmetic of the page in file `path`."""
     best = found[0]
     rows = [[x.program, x.case, x.listing, x.word, x.fields, len(x.differences)] for x in found]
     text: list[Section] = [printed_page.verdict(path, found), [Table(_TABLE, rows)]]

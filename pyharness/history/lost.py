@@ -1,12 +1,12 @@
 """The lost programs of section IV.2 of the thesis, and mistakes that may explain their failure.
 
-The thesis does not print its programs for the subdomain, Galerkin and least-squares methods.
-According to IV.2 they gave no meaningful results in Cases 1 and 2, where the solution is known.
-`data/lost.toml` has our conjectures: mistakes that such a program may have had.
+According to IV.2, the programs for the subdomain, Galerkin and least-squares methods gave no
+meaningful results in Cases 1 and 2, where the solution is known. The thesis does not print them.
+`data/lost.toml` has our conjectures on their mistakes.
 
-The methods are as in IV.2. The trial function has two terms, and products are written out as
-polynomials. A first estimate assumes a constant right-hand side; one correction follows. A method
-fails if its error exceeds a tenth of the largest omega.
+As in IV.2, the trial function has two terms, and products are polynomials. A first estimate assumes
+a constant right-hand side; one correction follows. A method fails if its error exceeds a tenth of
+the largest omega.
 """
 
 from collections.abc import Sequence
@@ -36,9 +36,9 @@ TERMS = 2
 
 @dataclass(frozen=True)
 class Attempt:
-    """The result of one method with one mistake on Cases 1 and 2.
+    """The result of one method with one mistake.
 
-    `shares` has, by case, the error divided by the largest omega.
+    `shares` are the errors by case, divided by the largest omega.
     """
 
     mistake: str
@@ -49,7 +49,7 @@ class Attempt:
 
 @dataclass(frozen=True)
 class Ranked:
-    """A mistake, with the attempts of all methods."""
+    """A mistake, with the results of all methods."""
 
     mistake: str
     summary: str
@@ -62,7 +62,7 @@ class Ranked:
 
     @property
     def in_either(self) -> int:
-        """Return the number of methods that fail in at least one case."""
+        """Return the number of methods that fail in either case."""
         return sum(bool(each.failed) for each in self.attempts)
 
 
@@ -92,7 +92,7 @@ def _share(scene: Scene, weighting: str, mistake: str, word: str = BINARY64) -> 
 def integrate(scene: Scene, weighting: str, mistake: str = "none") -> Array:
     """Return omega (rad/s) by a method with one mistake, under constant torque, shape (steps, 3).
 
-    The result is NaN after an overflow. The type of the scene's numbers determines the arithmetic.
+    Rows are NaN after an overflow. The type of the scene's numbers determines the arithmetic.
     """
     h = scene.step_size
     coefficients = scene.euler_coefficients
@@ -140,10 +140,8 @@ def _matrix(weighting: str, length: float) -> Array:
 
 
 def _solved(matrix: Array, right: Array, mistake: str, second: bool) -> Array:
-    """Return c1 and c2 of omega(0) + c1 t + c2 t**2 for all components, shape (2, 3).
-
-    `right` has a row for each component; `second` is true for the correction.
-    """
+    """Return c1 and c2 of omega(0) + c1 t + c2 t**2 for all components, shape (2, 3)."""
+    # `right` has a row for each component; `second` is true for the correction.
     if mistake == "transposed":
         matrix = matrix.T
     (a, b), (c, d) = matrix.tolist()
@@ -194,7 +192,7 @@ _TABLE = (
 
 
 def lost_report(found: Sequence[Ranked], word: str = BINARY64) -> Report:
-    """Return the report on the mistakes, computed in the arithmetic `word`."""
+    """Return the report on the mistakes, computed in arithmetic `word`."""
     rows = []
     for each in found:
         shares = [share for attempt in each.attempts for share in attempt.shares.values()]

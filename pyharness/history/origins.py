@@ -1,6 +1,6 @@
 """Disagreements of the decks and the thesis, as evidence on the origin of faults.
 
-The table `data/disagreements.toml` separates what the sources say from our inferences.
+`data/disagreements.toml` separates what the sources say from our inferences.
 """
 
 from collections import Counter
@@ -17,9 +17,9 @@ class Disagreement(NamedTuple):
     """A disagreement of the decks with each other or with the thesis, and its supposed origin.
 
     `steps` are operations in `data/cards/collation.toml`, `equations` formulas of the thesis,
-    `where` a place in it that `says` quotes. `cards` has texts of cards by program and number.
-    `known` follows from the sources; `suggests` and `origin` are our inferences. `unnoticed` tells
-    why the test cases do not show the fault.
+    `where` the place that `says` quotes. `cards` quotes cards by program and number. `known`
+    follows from the sources; `suggests` and `origin` are our inferences. `unnoticed` tells why the
+    test cases do not show the fault.
     """
 
     id: str
@@ -57,7 +57,7 @@ def origins() -> dict[str, str]:
 
 
 def unexplained_defects() -> dict[str, str]:
-    """Return, for each defect that no disagreement explains, the reason."""
+    """Return the defects that no disagreement explains, each with the reason."""
     return dict(facts("disagreements")["unexplained"])
 
 

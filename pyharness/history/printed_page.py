@@ -1,8 +1,8 @@
-"""Compare a page that a machine printed with the pages that our programs print.
+"""Compare a page that a machine printed with the pages of our programs.
 
 The module, which needs only Python's standard library, is also the script `machine/judge.py` in the
-data package: ``python judge.py FILE``. The exit status is 0 if one of our pages is equal, 1 if all
-differ, and 2 if FILE is unreadable or has no page of this form.
+data package. The exit status of ``python judge.py FILE`` is 0 if one of our pages is equal, 1 if
+all differ, and 2 if FILE is unreadable or has no page of this form.
 """
 
 import csv
@@ -25,7 +25,7 @@ SHOWN = 5
 
 @dataclass(frozen=True)
 class Difference:
-    """A number that differs between two pages; row and place in the row are counted from 1."""
+    """A number that differs between two pages; `row` and `place` in the row count from 1."""
 
     row: int
     place: int
@@ -38,7 +38,7 @@ class Fit:
     """The comparison of a page from another machine with one of our pages.
 
     `listing` is ``original``, ``corrected`` or ``original with`` a reading; `word` is the
-    arithmetic; `fields` is the number of compared numbers.
+    arithmetic; `fields` counts the compared numbers.
     """
 
     program: str
@@ -60,7 +60,7 @@ class Fit:
 
 
 def printed_numbers(text: str) -> list[list[str]]:
-    """Return the lines of `text` that contain only numbers, each as a list of numbers."""
+    """Return the lines of `text` that contain only numbers, each as a list."""
     lines = [line.split() for line in text.splitlines()]
     return [line for line in lines if line and all(map(_FIELD.fullmatch, line))]
 
@@ -88,14 +88,14 @@ def rows_of_form(
 
 
 def compared_steps(rows: int, steps: int, card_steps: int) -> int:
-    """Return our number of steps: the thesis text's or, if the page has more rows, the cards'."""
+    """Return `steps` (of the thesis's text) or, if the page has more rows, `card_steps`."""
     return card_steps if rows > steps else steps
 
 
 def compare_rows(
     theirs: Sequence[Sequence[str]], ours: Sequence[Sequence[str]]
 ) -> tuple[int, tuple[Difference, ...]]:
-    """Return the count of compared numbers, and the differences; "-" replaces a missing number."""
+    """Return the count of compared numbers and the differences; "-" replaces a missing number."""
     none: Sequence[str] = ()
     places = [
         (row, place, x, y)
@@ -106,7 +106,7 @@ def compare_rows(
 
 
 def stored_fits(lines: Sequence[Sequence[str]], folder: Path) -> list[Fit]:
-    """Compare a page with those of equal heading and width in `folder`; return nearest first."""
+    """Return the comparisons with pages of equal heading and width in `folder`, nearest first."""
     found = []
     with open(folder / PAGES, newline="", encoding="ascii") as file:
         for each in csv.DictReader(file):
@@ -121,14 +121,14 @@ def stored_fits(lines: Sequence[Sequence[str]], folder: Path) -> list[Fit]:
 
 
 def verdict(path: str, found: Sequence[Fit]) -> list[str]:
-    """Return lines that name our pages equal to the page in file `path`, or the nearest one."""
+    """Return lines that name our pages equal to that in file `path`, or the nearest page."""
     whole = [each for each in found if each.is_whole]
     said = "printed so by" if whole else "by none; the nearest is"
     return [f"{path}: {said} {each.name}" for each in whole or found[:1]]
 
 
 def main(arguments: Sequence[str], folder: Path) -> int:
-    """Compare the page in a file with those in `folder`; print the result and return the status."""
+    """Print the comparison of a page's file with the pages in `folder`; return the exit status."""
     if len(arguments) != 1:
         print("usage: python judge.py FILE, a page as a program printed it", file=sys.stderr)
         return 2

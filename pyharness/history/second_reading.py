@@ -1,8 +1,8 @@
 """An estimate of the remaining transcription errors, by capture and recapture.
 
-The first reading of the scan is our text of the cards. The second is a random sample that was read
-again (`data/cards/second-reading.toml`). A misreading is an error of the scanned text. The numbers
-of misreadings that each reading corrects, and that both correct, give an estimate of the others.
+The first reading of the scan is our text of the cards, the second that of a random sample
+(`data/cards/second-reading.toml`). A misreading is an error of the scanned text. The numbers of
+misreadings that each reading corrects, and that both correct, give an estimate of the others.
 """
 
 from collections.abc import Iterator
@@ -40,10 +40,10 @@ def chapman(first: int, second: int, both: int) -> float:
 def recapture_interval(first: int, second: int, both: int) -> tuple[int, int]:
     """Return the limits of the 95 % confidence interval of a population's size.
 
-    `first` and `second` are the sizes of two samples, `both` the number of their common members.
-    For independent samples, `both` has the hypergeometric distribution. A size is in the interval
-    if at most `both` and at least `both` common members each have a probability of 0.025 or more.
-    Raise ValueError if `both` is 0: there is no upper limit.
+    `first` and `second` are the sizes of two independent samples, `both` is the number of common
+    members. A size is in the interval if the probabilities of at most and of at least `both` common
+    members, by the hypergeometric distribution, are 0.025 or more. Raise ValueError if `both` is 0:
+    there is no upper limit.
     """
     if both < 1:
         raise ValueError("both must be positive")
@@ -78,9 +78,9 @@ def read_cards() -> Iterator[ReadCard]:
 
 
 def misread_places(scan: str, reading: str) -> dict[int, str]:
-    """Return, by index, the text of a reading at each place where it differs from the scan's line.
+    """Return, by index in `scan`, the text of `reading` where the two differ.
 
-    Inserted characters belong to the previous place, or to -1.
+    Inserted characters belong to the previous index, or to -1.
     """
     found: dict[int, str] = {}
     matcher = SequenceMatcher(None, scan, reading, autojunk=False)
@@ -97,8 +97,7 @@ def misread_places(scan: str, reading: str) -> dict[int, str]:
 def recaptures() -> Table:
     """Return the table of estimates, with characters and with whole cards as units.
 
-    Characters are not independent units, because a machine repeats its misreading of a letter;
-    cards are.
+    Only cards are independent units, because a machine repeats its misreading of a letter.
     """
     places: tuple[set[tuple[str, int]], ...] = (set(), set())
     for each in read_cards():
@@ -114,12 +113,12 @@ def recaptures() -> Table:
 
 
 def disagreeing() -> list[ReadCard]:
-    """Return the cards of the sample on which the two readings differ."""
+    """Return the cards of the sample that the two readings read differently."""
     return [each for each in read_cards() if each.first != each.second]
 
 
 def second_reading_report() -> Report:
-    """Return the report on the two readings, with the estimated misreadings."""
+    """Return the report on the two readings and the estimated misreadings."""
     table, cards, differing = recaptures(), [*read_cards()], disagreeing()
     frame = len(witness_lines())
     seed = facts("cards/second-reading")["seed"]

@@ -1,14 +1,14 @@
 """The edition as a TEI P5 document: every card, the scan's variants, and the apparatus.
 
-The elements are:
+Its elements are:
 
 - `pb`: the beginning of a page, with its position `n` in the scan;
 - `app`: a difference, where `lem` is our reading and `rdg` the scan's;
 - `fw`: a heading added by an editor;
 - `surplus`: text that belongs to no card.
 
-Cards are in the order of their numbers. To restore the text of the scan, take the pages in the
-order of `n`, with their lines of cards, `fw` and `surplus`, and each `rdg` in place of its `lem`.
+Cards are in the order of their numbers. To restore the scan's text, take the pages in the order of
+`n`, with their cards, `fw` and `surplus`, and each `rdg` instead of its `lem`.
 """
 
 from collections.abc import Iterable, Iterator
@@ -55,7 +55,7 @@ CERTAINTY = {"certain": "high", "probable": "medium", "conjecture": "low", "unde
 
 
 def tei_document() -> bytes:
-    """Return the cards and the apparatus as a TEI document, in UTF-8."""
+    """Return the document, in UTF-8."""
     root = xml.Element("TEI", xmlns="http://www.tei-c.org/ns/1.0")
     root.set(_XML + "lang", "en")
     root.append(_header())

@@ -1,7 +1,4 @@
-"""The dates of the thesis, with their sources, and the history of the edition's text.
-
-The data are in `data/timeline.toml` and `data/revisions.toml`.
-"""
+"""The dates of the thesis, with their sources, and the revisions of the edition's text."""
 
 from collections.abc import Mapping
 from datetime import date
@@ -17,8 +14,8 @@ class Event(NamedTuple):
     """An event in the history of the thesis, with its date and source.
 
     `first` and `last` are months, as in ``1979-01``, or empty; `why` explains an uncertain date.
-    The date is ``certain`` if the source names it, ``probable`` if it follows from another entry,
-    and ``unknown`` if no source dates the event.
+    `certainty` is ``certain`` if the source names the date, ``probable`` if it follows from another
+    entry, and ``unknown`` without a source.
     """
 
     id: str
@@ -44,7 +41,7 @@ class Event(NamedTuple):
 
 
 def timeline() -> tuple[Event, ...]:
-    """Return the events in the history of the thesis, in the order of the data."""
+    """Return the events in the order of the data."""
     names = {"from": "first", "to": "last"}
     found = []
     for row in facts("timeline")["entry"]:
@@ -58,10 +55,10 @@ def _in_words(month: str) -> str:
 
 
 class Revision(NamedTuple):
-    """A change of the edition's text: the cards and the apparatus.
+    """A change of the edition's text (cards and apparatus).
 
-    `digest` identifies the text after the change; it is empty for changes before the cards were
-    data files. `cards` has the numbers of changed cards by program, as in ``750-770, 800``.
+    `digest` identifies the text after the change; it is empty before the cards were data files.
+    `cards` has the changed cards by program, as in ``750-770, 800``.
     """
 
     date: str

@@ -1,7 +1,7 @@
-"""The effect of word length: runs in emulated arithmetics of p bits, against binary64.
+"""The effect of word length: runs with p significand bits, compared with binary64.
 
-An arithmetic has p significand bits and a rounding rule. A run's printed page is compared with the
-page in binary64, and its omega with the reference solution.
+An emulated arithmetic has p bits and a rounding rule. Printed pages are compared with those in
+binary64, omega with the reference solution.
 """
 
 from collections.abc import Iterator, Sequence
@@ -59,11 +59,11 @@ _STYLES: dict[str, dict[str, Any]] = {
 class WordRun(NamedTuple):
     """A run in one arithmetic, compared with binary64.
 
-    `rule` is ``nearest-even``, ``chop`` (towards zero), or ``FX`` or ``RX``, the unrounded or the
-    rounded operations of the CDC 6600. `stop` has reason and step of an early end, as in ``V2 at
-    25``. The longer of the two printed pages has `fields` numbers, of which `different` differ from
-    the other page. `error` is the largest error of omega (rad/s). `singular` counts the steps with
-    IER = 129, a singular matrix.
+    `rule` is ``nearest-even``, ``chop`` (towards zero), or the CDC 6600's ``FX`` (unrounded) or
+    ``RX`` (rounded). `stop` has reason and step of an early end, as in ``V2 at 25``. The longer
+    printed page has `fields` numbers, of which `different` differ from the other page. `error` is
+    the largest error of omega (rad/s). `singular` counts the steps with a singular matrix (IER =
+    129).
     """
 
     case: int
@@ -87,11 +87,11 @@ class WordCell:
     runs: tuple[WordRun, ...]
 
     def find_run(self, p: int, rule: str) -> WordRun | None:
-        """Return the run with p bits and a rounding rule, or None."""
+        """Return the run with p bits and `rule`, or None."""
         return next((run for run in self.runs if (run.p, run.rule) == (p, rule)), None)
 
     def settled(self, rule: str, same: Sequence[WordRun]) -> int | None:
-        """Return the least precision from which on all runs with `rule` are in `same`, or None."""
+        """Return the least p from which on all runs with `rule` are in `same`, or None."""
         of_rule = sorted((r for r in self.runs if r.rule == rule), key=lambda run: -run.p)
         return min((run.p for run in takewhile(same.__contains__, of_rule)), default=None)
 
@@ -184,7 +184,7 @@ def words_report(cells: Sequence[WordCell]) -> Report:
 
 
 def machine_report(cells: Sequence[WordCell]) -> Report:
-    """Return the report of the verdict on the CDC's arithmetic, from `machine_cells`."""
+    """Return the verdict on the CDC's arithmetic, from the result of `machine_cells`."""
     runs = [(cell.double, run) for cell in cells for run in cell.runs]
     stops = sum(run.stop != double.stop for double, run in runs)
     changes = [

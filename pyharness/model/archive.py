@@ -1,8 +1,8 @@
 """Archives of trajectories and ensembles, in the format of `numpy.savez`.
 
-The array `header` is JSON with the kind of the content and its schema number; `sha256` is a digest
-of all other arrays. Files are not trusted: nothing is executed or unpickled, and no array may claim
-to be larger than the file.
+The array `header` is JSON with the kind of content and the schema number; `sha256` is a digest of
+the other arrays. Nothing is executed or unpickled, and no array may exceed the file's size, because
+files are not trusted.
 """
 
 import hashlib
@@ -26,7 +26,7 @@ _OTHERS = (".csv", ".json", ".md", ".toml", ".tsv", ".txt", ".xlsx", ".xml")
 
 
 def checked_path(where: str, path: object) -> str:
-    """Return a path as text, with .npz added to a new file without ending; or raise InputError."""
+    """Return a path as text, or raise InputError; a new file without ending gets .npz."""
     if not isinstance(path, (str, os.PathLike)):
         raise InputError(f"{where}: {kind_of(path)}; allowed: a path, as text or a Path")
     name = os.fsdecode(path)
@@ -48,7 +48,7 @@ def checked_file(where: str, path: object) -> str:
 
 
 def archive_of(arrays: dict[str, Any]) -> bytes:
-    """Return the bytes of an archive of the arrays, with their SHA-256 digest as last entry."""
+    """Return an archive of the arrays, ending with their SHA-256 digest."""
     buffer, digest = io.BytesIO(), hashlib.sha256()
     with zipfile.ZipFile(buffer, "w") as archive:
         for name in [*(each for each in arrays if each != DIGEST), DIGEST]:
@@ -63,7 +63,7 @@ def archive_of(arrays: dict[str, Any]) -> bytes:
 
 
 def add_entry(digest: Any, name: str, data: bytes | memoryview) -> None:
-    """Add name, length and bytes of an entry to a digest."""
+    """Update a digest with an entry's name, length and bytes."""
     digest.update(f"{name} {len(data)}\n".encode())
     digest.update(data)
 
@@ -73,8 +73,8 @@ def read_archive(
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return the arrays and the header of an archive, or raise InputError.
 
-    Messages begin with `where`, and describe a valid file by `written`. `kinds` names the kind of
-    file in the header and in messages; `known` has the allowed arrays.
+    `kinds` has the kind of file in the header and in messages, `known` the names of allowed arrays.
+    `written` describes a valid file.
     """
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     content = read_input(name, where, memory // 4, written)
@@ -133,7 +133,7 @@ def _array(data: bytes) -> Any:
 
 
 def text_of(arrays: dict[str, Any], name: str) -> str:
-    """Return a text; raise KeyError if the array is missing, ValueError if it is no text."""
+    """Return an array's text; raise KeyError if it is missing, ValueError if it is no text."""
     array = arrays[name]
     if array.shape != () or array.dtype.kind != "U":
         raise ValueError("no text")

@@ -1,4 +1,4 @@
-"""Type of arrays of binary64 numbers, for annotations."""
+"""The type of binary64 arrays, for annotations."""
 
 import numpy as np
 from numpy.typing import NDArray

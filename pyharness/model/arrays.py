@@ -1,8 +1,4 @@
-"""Checks of a user's arrays for many bodies: shape, type, values and number of rows.
-
-An array has one row per body, or one row for all. Each InputError begins with the argument `where`
-or `name`.
-"""
+"""Checks of a user's arrays for many bodies, with one row per body or one for all."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -27,10 +23,9 @@ FROM_ZERO: Rule = (lambda x: x >= 0.0, "a number from 0")
 
 
 def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = None) -> Array:
-    """Return user values as a float array of rows; a single row is allowed.
+    """Return a user's row, or n rows, of `shape` as a float array, (n, *shape).
 
-    `shape` is the shape of a row, in which a letter, such as "k", stands for any length. `rule`
-    tests each number.
+    A letter in `shape`, such as "k", stands for any length. `rule` tests each number.
     """
     if type(values) is float and not shape and rule is None:
         return np.array([values])
@@ -49,7 +44,7 @@ def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = N
 
 
 def numbers_of(where: str, values: object) -> Array:
-    """Return real numbers of any type and shape as float64."""
+    """Return a user's array of real numbers as float64."""
     if type(values) is not np.ndarray:
         if unit_of(values) or isinstance(values, (bytes, bytearray)):
             number(where, values)  # NumPy would drop the unit, or read bytes as numbers
@@ -75,7 +70,7 @@ def numbers_of(where: str, values: object) -> Array:
 
 
 def count_bodies(rows: Mapping[str, Array]) -> int:
-    """Return the number of bodies; raise InputError if the arrays disagree."""
+    """Return the number of bodies; raise InputError if arrays disagree."""
     counts = {len(each) for each in rows.values()}
     n = 0 if 0 in counts else max(counts, default=1)
     if not counts <= {1, n}:
@@ -98,12 +93,12 @@ def check_rows(name: str, array: Array, n: int) -> None:
 
 
 def row_of(array: Array, i: int) -> Any:
-    """Return the row of body `i`, from 0, or the shared row."""
+    """Return the row of body `i`, or the only row."""
     return array[0 if len(array) == 1 else i]
 
 
 def only_one(given: Mapping[str, object]) -> str:
-    """Return the name of the argument that is not None, or ""; raise InputError for several."""
+    """Return the name of the argument other than None, or ""; raise InputError for several."""
     names = [name for name, value in given.items() if value is not None]
     if len(names) > 1:
         raise InputError(f"{' and '.join(names)} are both given; give one of them")
@@ -111,7 +106,7 @@ def only_one(given: Mapping[str, object]) -> str:
 
 
 def threads_of(threads: object) -> int:
-    """Return a user's number of threads, 1 to 1024, or raise InputError."""
+    """Return a user's number of threads, or raise InputError."""
     found = integer("threads", threads)
     if not 1 <= found <= _MOST_THREADS:
         raise InputError(f"threads is {found}; allowed: 1 to {_MOST_THREADS}")
@@ -119,10 +114,9 @@ def threads_of(threads: object) -> int:
 
 
 def buffer_of(where: str, array: Any, shape: tuple[int, ...], kind: str) -> Any:
-    """Return the user's output array, to which a kernel can write.
+    """Return the user's output array for a kernel, or raise InputError.
 
-    It must have `shape` and the type character `kind`, such as "d", and be writable, contiguous and
-    aligned.
+    `kind` is the required type character, such as "d".
     """
     right = isinstance(array, np.ndarray) and array.shape == shape and array.dtype == kind
     if not (right and array.flags.c_contiguous and array.flags.writeable and array.flags.aligned):
@@ -133,21 +127,21 @@ def buffer_of(where: str, array: Any, shape: tuple[int, ...], kind: str) -> Any:
 
 
 def spread(rows: Array, n: int) -> Array:
-    """Return `n` rows; a shared row is repeated."""
+    """Return `n` rows, repeating a shared row."""
     if len(rows) == n:
         return rows
     return np.ascontiguousarray(np.broadcast_to(rows, (n, *rows.shape[1:])))
 
 
 def rows_within(rows: Array, piece: slice) -> Array:
-    """Return the rows of the bodies in `piece`; a shared row is repeated."""
+    """Return the rows in `piece`, repeating a shared row."""
     if len(rows) > 1:
         return rows[piece]
     return np.ascontiguousarray(np.broadcast_to(rows, (piece.stop - piece.start, *rows.shape[1:])))
 
 
 def unit_quaternions(rows: Array) -> Array:
-    """Return quaternions, (n, 4), normalised; NaN if a norm is 0 or not finite."""
+    """Return normalised quaternions, (n, 4); NaN where the norm is 0 or not finite."""
     with np.errstate(all="ignore"):
         found = rows / np.abs(rows).max(axis=1, keepdims=True)
         units: Array = found / np.sqrt((found * found).sum(axis=1, keepdims=True))

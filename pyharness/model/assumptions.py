@@ -1,4 +1,4 @@
-"""Assumptions: values that we supply where the thesis has none or can be read in two ways."""
+"""Values that we assume where the thesis has none or can be read in two ways."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -18,20 +18,20 @@ Runs = Iterable[tuple[Scene, Iterable[Listing]]]
 
 
 def assumptions() -> list[dict[str, Any]]:
-    """Return all assumptions, entries of `data/assumptions.toml`."""
+    """Return the entries of `data/assumptions.toml`."""
     return list(facts("assumptions")["assumption"])
 
 
 def open_starts() -> dict[int, str]:
-    """Return the cases without omega(0) in the thesis, with the source of our value."""
+    """Return the cases without omega(0) in the thesis, and the source of our value."""
     cases = facts("cases")["case"]
     return {each["number"]: each["assumed_omega"] for each in cases if "assumed_omega" in each}
 
 
 def assumed(scene: Scene, listings: Iterable[Listing] = ()) -> list[dict[str, Any]]:
-    """Return the assumptions on which the numbers of a case and its runs of `listings` depend.
+    """Return the assumptions on which a scene and its runs of `listings` (program versions) depend.
 
-    Scenes outside the thesis, and values that a user changed, depend on none.
+    There are none for scenes outside the thesis, or values that a user changed.
     """
     among = list(listings)
     return [each for each in assumptions() if _is_made(each, scene, among)]
@@ -59,17 +59,17 @@ def _is_in(each: dict[str, Any], listing: Listing) -> bool:
 
 
 def mark(scene: Scene, listing: Listing) -> str:
-    """Return `MARK` if a run depends on an assumption about its listing, else ""."""
+    """Return `MARK` if a run depends on an assumption about its program, else ""."""
     return MARK if any(each["on"] == "listing" for each in assumed(scene, [listing])) else ""
 
 
 def case_mark(case: int) -> str:
-    """Return `MARK` if omega(0) of a case is assumed, else ""."""
+    """Return `MARK` if we assume omega(0) of a case, else ""."""
     return MARK if case in open_starts() else ""
 
 
 def assumption_records(runs: Runs) -> list[dict[str, Any]]:
-    """Return the assumptions on which runs depend, each with its cases, for JSON."""
+    """Return, for JSON, the assumptions on which runs depend, with their cases."""
     found: dict[tuple[str, str], dict[str, Any]] = {}
     for scene, listings in runs:
         for each in assumed(scene, listings):
@@ -82,7 +82,7 @@ def assumption_records(runs: Runs) -> list[dict[str, Any]]:
 
 
 def claim_records() -> list[dict[str, Any]]:
-    """Return the assumptions on which only verdicts on claims depend, for JSON."""
+    """Return, for JSON, the assumptions on which only verdicts on claims depend."""
     return [_record(each, each["what"]) for each in assumptions() if each["on"] == "claim"]
 
 
@@ -91,7 +91,7 @@ def _record(each: dict[str, Any], what: str) -> dict[str, Any]:
 
 
 def legend(runs: Sequence[tuple[Scene, Iterable[Listing]]]) -> list[str]:
-    """Return the line that explains the marks of runs, in a list; empty without marks."""
+    """Return, in a list, the line that explains the marks of runs; [] without marks."""
     every = {scene.case for scene, _ in runs}
     told = []
     for each in assumption_records(runs):

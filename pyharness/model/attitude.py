@@ -1,7 +1,6 @@
 """Attitudes as unit quaternions from body to space, scalar first, with Hamilton's product.
 
-A vector v about the body axes has the components q v q* along the axes of space, with the conjugate
-q*. The kinematic equation is q' = q (0, omega)/2. Each InputError begins with the argument `where`.
+A vector v about body axes is q v q* in space, with the conjugate q*; q' = q (0, omega)/2.
 """
 
 import math
@@ -33,13 +32,13 @@ _PARALLEL = 2.0**-51  # sine of half an angle that is a rounding error
 
 
 def scalar_first(values: object) -> Any:
-    """Return the quaternions of a `Rotation`, scalar first; any other value unchanged."""
+    """Return a `Rotation`'s quaternions, scalar first; any other value unchanged."""
     as_quat = getattr(values, "as_quat", None)
     return values if as_quat is None else np.asarray(as_quat())[..., [3, 0, 1, 2]]
 
 
 def unit_quaternion(where: str, values: object) -> tuple[Quaternion, float]:
-    """Return four numbers or a `Rotation` as a unit quaternion, and their norm.
+    """Return the unit quaternion of four numbers or a `Rotation`, and their norm.
 
     Raise InputError unless they are finite and not all 0.
     """
@@ -62,7 +61,7 @@ def unit_quaternion(where: str, values: object) -> tuple[Quaternion, float]:
 def of_angles(where: str, angles_deg: object, sequence: object) -> Quaternion:
     """Return the attitude after three rotations (degrees) about the body axes in `sequence`.
 
-    Raise InputError unless `sequence` is in `SEQUENCES` and the angles are finite.
+    Raise InputError for an unknown sequence or invalid angles.
     """
     if not isinstance(sequence, str) or sequence not in SEQUENCES:
         name = sequence if isinstance(sequence, str) else kind_of(sequence)
@@ -77,7 +76,7 @@ def of_angles(where: str, angles_deg: object, sequence: object) -> Quaternion:
 
 
 def product(p: Iterable[Any], q: Iterable[Any]) -> tuple[Any, Any, Any, Any]:
-    """Return Hamilton's product p q of quaternions of numbers or arrays."""
+    """Return Hamilton's product of two quaternions of numbers or arrays."""
     (a, b, c, d), (e, f, g, h) = p, q
     return (
         a * e - b * f - c * g - d * h,
@@ -101,8 +100,8 @@ def quaternion_rates(omega: Iterable[Any], q: Iterable[Any]) -> list[Any]:
 def angles(attitude: Array, sequence: str) -> Array:
     """Return n attitudes, (n, 4), as angles (degrees) of three successive rotations, (n, 3).
 
-    Where the axes of the first and last rotation are parallel, only the sum or difference of their
-    angles is determined; the last angle is then 0.
+    If the first and last axes are parallel, only the sum or difference of their angles is
+    determined; the last is then 0.
     """
     q0, q1, q2, q3 = attitude.T
     if sequence == "3-1-3":
@@ -151,13 +150,13 @@ def angle_between(attitude: Array, other: Array) -> Array:
 
 
 def quaternion_of_axes(axes: Array) -> Quaternion:
-    """Return the attitude of a right-handed frame with unit vectors as columns, (3, 3)."""
+    """Return the attitude of a right-handed frame, the columns of `axes`, (3, 3)."""
     w, x, y, z = quaternions_of_axes(axes[None])[0].tolist()
     return w, x, y, z
 
 
 def quaternions_of_axes(axes: Array) -> Array:
-    """Return the attitudes, (n, 4), of n right-handed frames with columns as axes, (n, 3, 3)."""
+    """Return the attitudes, (n, 4), of n right-handed frames, columns of `axes`, (n, 3, 3)."""
     # Imported only here, because only a full inertia matrix needs SciPy.
     from scipy.spatial.transform import Rotation
 
@@ -177,7 +176,7 @@ def rotated(vectors: Array, matrix: Array) -> Array:
 
 
 def turned_back(attitudes: Array, turn: Any) -> Array:
-    """Return a body's attitudes from those of axes that the quaternion `turn` rotates in it."""
+    """Return a body's attitudes, given those of a frame and the quaternion from frame to body."""
     w, x, y, z = np.moveaxis(np.asarray(turn), -1, 0)
     first, *rest = np.moveaxis(attitudes, -1, 0)
     parts: Any = product((first, rest[0], rest[1], rest[2]), (w, -x, -y, -z))

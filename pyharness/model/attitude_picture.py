@@ -1,4 +1,4 @@
-"""Pictures of an attitude, and an animation of a brick."""
+"""Pictures of an attitude, and animations of a brick."""
 
 import io
 import os
@@ -33,7 +33,7 @@ _EDGES = [
 
 
 def draw_sphere(axes: Any, found: "Trajectory") -> None:
-    """Draw the paths in space of the body axes, ending in dots, and of omega, ending in a cross."""
+    """Draw paths in space of the body axes (end: dot) and of omega (end: cross)."""
     assert found.attitude is not None
     _frame(axes)
     turned = matrices(found.attitude)
@@ -191,7 +191,7 @@ def _scene_of_brick(figure: "Figure", motion: _Motion, rate: float) -> Any:
 
 
 def _brick(found: "Trajectory") -> Array:
-    """Return the corners of a brick, (8, 3); each side is at least 1 % of the longest."""
+    """Return the corners of a brick, (8, 3)."""
     moments = np.array(found.moments)
     sides = np.sqrt(np.maximum(0.0, moments.sum() - 2.0 * moments))
     sides = np.maximum(sides, 0.01 * sides.max())

@@ -1,4 +1,4 @@
-"""The basis of a check's limit: proved, derived or measured, with its source."""
+"""The bases of the checks' limits."""
 
 from dataclasses import dataclass
 
@@ -12,10 +12,10 @@ MARKS = {
 
 @dataclass(frozen=True)
 class Basis:
-    """The basis of a check's limit.
+    """The basis of a check's limit: proved, derived or measured.
 
-    `mark`, a key of `MARKS`, classifies the weakest part of the argument. `limit` states the limit;
-    `source` names the theorem, derivation or command, in Markdown.
+    `mark`, a key of `MARKS`, classifies its weakest part; `source` names the theorem, derivation or
+    command, in Markdown.
     """
 
     mark: str
@@ -23,6 +23,6 @@ class Basis:
     source: str
 
     def __post_init__(self) -> None:
-        """Raise ValueError for an unknown mark, or an empty text."""
+        """Raise ValueError for an unknown mark or empty text."""
         if self.mark not in MARKS or not self.limit or not self.source:
             raise ValueError(f"not a basis of a limit: {self}")

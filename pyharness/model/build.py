@@ -38,7 +38,7 @@ _LEVELS = ("plain", "avx2", "avx512")
 
 @dataclass(frozen=True)
 class Build:
-    """The versions, the Fortran compiler and its flags; None for a missing item."""
+    """The versions, the compiler and its flags; None if missing."""
 
     version: str
     compiler: str | None
@@ -51,7 +51,7 @@ class Build:
 
 
 def build() -> Build:
-    """Return versions, compiler and flags of this installation."""
+    """Return the `Build` of this installation."""
     compiler = flags = extension = None
     try:
         from pyharness import _build, _kernels
@@ -76,8 +76,7 @@ def build() -> Build:
 def installation() -> dict[str, Any]:
     """Return data on the installation and the machine for a bug report; None if unknown.
 
-    "arithmetic" names the option or library that changes the kernels' arithmetic, or is ``as
-    written``. "environment" has the variables of `INFLUENCES` that are set.
+    "arithmetic" names the option or library that changes the kernels' arithmetic.
     """
     has_affinity = hasattr(os, "sched_getaffinity")
     return {

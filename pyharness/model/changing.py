@@ -1,4 +1,4 @@
-"""Inertias that are polynomials of time, and Euler's equations with a changing inertia."""
+"""Inertias that are polynomials of time, and Euler's equations for changing inertias."""
 
 import math
 from collections.abc import Iterable, Sequence

@@ -1,11 +1,11 @@
 """Constants that Python and the Fortran kernels share.
 
-The script fortran/make_codes.py writes each class as a Fortran module.
+fortran/make_codes.py writes each class as a Fortran module.
 """
 
 
 class Statuses:
-    """The integers with which a kernel reports how its run ended."""
+    """The codes with which a kernel reports how its run ended."""
 
     COMPLETE = 0  # all requested rows are present
     STOPPED = 1  # the Lipschitz test ended the run
@@ -20,7 +20,7 @@ class Statuses:
 
 
 class Methods:
-    """The integers that select a method of a prepared solver."""
+    """The codes of a prepared solver's methods."""
 
     TAPE = 0  # the Taylor series of a recorded torque
     CLOSED_FORM = 1  # for scenes without torque
@@ -36,7 +36,7 @@ class Methods:
 
 
 class Places:
-    """Indices, from 0, of the array that a prepared solver's kernel reads."""
+    """Indices of the array that a prepared solver's kernel reads."""
 
     METHOD = 0
     TOLERANCE = 1  # relative; for methods that have a tolerance
@@ -67,19 +67,19 @@ class Series:
 
 
 class Waves:
-    """The limit of the angle (rad) of our sine in binary128."""
+    """The largest angle for our sine function in binary128."""
 
     ANGLE_BITS = 60  # the angle must be below 2**ANGLE_BITS rad; otherwise its sine is NaN
 
 
 class Blocks:
-    """The number of bodies that a program integrates at once."""
+    """The number of bodies that a program integrates together."""
 
     LANE_COUNT = 32  # several vector registers, so that some compute while others wait
 
 
 class Storage:
-    """Lengths of kernels' arrays for Taylor series of slots (variables), and their values."""
+    """Lengths of the kernels' arrays for Taylor series of slots (variables)."""
 
     SERIES_LENGTH = 40  # terms of a slot's series
     LANE_TERMS = 28  # the same, for many bodies at once
@@ -89,7 +89,7 @@ class Storage:
 
 
 class Operations:
-    """The integers of the operations of a tape."""
+    """The codes of a tape's recorded operations."""
 
     LINEAR = 1  # a constant plus a linear combination of operands
     PRODUCT = 2

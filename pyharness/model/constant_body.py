@@ -1,4 +1,4 @@
-"""Conversion of changing inertias, and torques about axes of space, to recorded torques."""
+"""Conversion of changing inertias and torques in space to torques about the body axes."""
 
 from dataclasses import replace
 from typing import Any
@@ -11,10 +11,10 @@ from pyharness.model.torque_law import TorqueLaw
 
 
 def with_constant_body(scene: Scene) -> Scene:
-    """Return a scene with the same solution, a constant inertia and a torque about the body axes.
+    """Return a scene of the same solution with a constant inertia and a torque about the body axes.
 
-    If the inertia I changes, the result has the coefficients A = B = C = 0 and the torque omega',
-    which follows from I omega' = N - I' omega - omega x (I omega) with the scene's torque N.
+    For a changing inertia I and torque N, the new coefficients are 0. The new torque is omega' from
+    I omega' = N - I' omega - omega x (I omega).
     """
     changing, torque = scene.changing, scene.torque
     if changing is None:

@@ -50,7 +50,7 @@ class _Quantity(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Conversions:
-    """The base class of trajectories: fields, mechanical quantities and conversions.
+    """The base class of trajectories.
 
     If the inertia changes with time, each row uses its value at the row's time.
     """

@@ -1,6 +1,6 @@
 """Dense output: the solution as a function of time, by polynomials through Chebyshev points.
 
-Formulas: Trefethen 2013, Approximation Theory and Approximation Practice, chapters 2 to 5.
+Source: Trefethen 2013, Approximation Theory and Approximation Practice, chapters 2 to 5.
 """
 
 from collections.abc import Callable
@@ -18,13 +18,13 @@ from pyharness.model.errors import InputError
 
 
 def points(count: int) -> Array:
-    """Return Chebyshev points of the second kind, ascending, symmetric to the last bit."""
+    """Return ascending Chebyshev points of the second kind, symmetric to the last bit."""
     found: Array = np.sin(np.pi * np.arange(1 - count, count, 2) / (2 * (count - 1)))
     return found
 
 
 def to_coefficients(count: int) -> Array:
-    """Return the matrix that converts values at the `points` to Chebyshev coefficients."""
+    """Return the matrix from values at the `points` to Chebyshev coefficients."""
     # Angles up to pi have the smallest rounding errors.
     turns = np.outer(np.arange(count), np.arange(count)[::-1]) % (2 * count - 2)
     angles = np.pi * np.minimum(turns, 2 * count - 2 - turns) / (count - 1)
@@ -36,7 +36,7 @@ def to_coefficients(count: int) -> Array:
 
 
 def nodes(low: Array, high: Array, at: Array) -> Array:
-    """Return the points `at`, from -1 to 1, mapped to each interval, in one row each."""
+    """Return the points `at`, from -1 to 1, mapped to each interval, as rows."""
     middle, half = 0.5 * low + 0.5 * high, 0.5 * high - 0.5 * low
     found: Array = middle[:, None] + half[:, None] * at
     found[:, 0], found[:, -1] = low, high
@@ -55,9 +55,9 @@ _WEIGHTS[[0, -1]] /= 2.0
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """A function of time that is a polynomial on each of p intervals between ascending `edges` (s).
+    """A function of time: a polynomial on each of p intervals between ascending `edges` (s).
 
-    `values`, (p, NODES, m), are its m components at the Chebyshev points of each interval.
+    `values`, (p, NODES, m), are its m components at the Chebyshev points of the intervals.
     """
 
     edges: Array
@@ -70,7 +70,7 @@ class Pieces:
 
     @cached_property
     def _by_node(self) -> Array:
-        """The values of shape (m, NODES, p): sums along the times are faster than along nodes."""
+        """The values, (m, NODES, p), which are faster to sum."""
         return np.ascontiguousarray(self.values.transpose(2, 1, 0))
 
     def _evaluate(self, times: Array) -> Array:
@@ -93,16 +93,15 @@ class Pieces:
         return found.T
 
     def numbers(self, times: Array) -> NDArray[np.intp]:
-        """Return the number of the interval of each time."""
+        """Return the index of each time's interval."""
         return np.searchsorted(self.edges[1:-1], times, side="right")
 
 
 def sizes_of(largest: Array, n_own: int) -> Array:
-    """Return the sizes to which errors are relative, from the largest values of m unknowns.
+    """Return the sizes, (..., m), to which errors are relative, from the unknowns' largest values.
 
-    `largest` and the result have the shape (..., m). The size is the largest component for omega, 1
-    for the quaternion, and the value itself for the last `n_own` unknowns, which the user added. A
-    size of 0 becomes 1.
+    The size is the largest component for omega, 1 for the quaternion, and the value itself for the
+    last `n_own` unknowns, the user's. A size of 0 becomes 1.
     """
     sizes = np.ones_like(largest)
     sizes[..., :3] = largest[..., :3].max(axis=-1, keepdims=True)

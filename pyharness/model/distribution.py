@@ -1,4 +1,4 @@
-"""The name and version of the distribution, and optional packages."""
+"""The name and version of the distribution; optional packages."""
 
 from typing import TYPE_CHECKING
 
@@ -19,12 +19,12 @@ def version() -> str:
 
 
 def install_command(extra: str) -> str:
-    """Return the pip command for optional packages, such as ``plots``."""
+    """Return the pip command for an `extra` such as ``plots``."""
     return f"pip install '{DISTRIBUTION}[{extra}]'"
 
 
 def check_package(name: str, what: str, command: str) -> None:
-    """Raise InputError if package `name`, which `what` needs and `command` installs, is missing."""
+    """Raise InputError if package `name` is missing, which `what` needs."""
     from importlib import import_module
 
     try:
@@ -34,7 +34,7 @@ def check_package(name: str, what: str, command: str) -> None:
 
 
 def checked_axes(ax: object) -> "Axes":
-    """Return `ax`, or a new diagram if None; raise InputError for anything but an Axes."""
+    """Return `ax`, or a new diagram if None; raise InputError unless it is an Axes."""
     check_package("matplotlib", "plot", install_command("plots"))
     from matplotlib.axes import Axes
 

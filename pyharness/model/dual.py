@@ -15,13 +15,13 @@ _MORE, _FEWER = 100, 10
 
 
 class Dual:
-    """A value in any arithmetic, with its derivatives with respect to unknowns."""
+    """A value in any arithmetic, and its derivatives with respect to unknowns."""
 
     def __init__(self, value: Any, slopes: Sequence[Any]) -> None:
         self.value, self.slopes = value, slopes
 
     def chained(self, value: Any, slope: Any) -> "Dual":
-        """Return a function of this number as a dual number, from its value and derivative."""
+        """Return a function of this number, from its value and derivative."""
         return Dual(value, [slope * each for each in self.slopes])
 
     def __add__(self, other: Any) -> "Dual":
@@ -33,7 +33,7 @@ class Dual:
     __radd__ = __add__
 
     def __sub__(self, other: Any) -> "Dual":
-        """Return this number minus `other`."""
+        """Return the difference."""
         return self.__add__(-1.0 * other)
 
     def __rsub__(self, other: Any) -> "Dual":
@@ -67,7 +67,7 @@ class Dual:
 
 
 def dual(value: Any, count: int) -> Dual:
-    """Return `value` as a dual number; a plain number has `count` derivatives of 0."""
+    """Return `value` as a dual number; a plain number gets `count` derivatives of 0."""
     return value if isinstance(value, Dual) else Dual(value, [0.0] * count)
 
 
@@ -83,9 +83,9 @@ def with_derivatives(tape: Tape, slots: Sequence[int]) -> Tape:
 
 
 def with_parameters(tape: Tape, values: Sequence[float]) -> Tape:
-    """Return a tape of each output's derivatives with respect to the parameters, then the outputs.
+    """Return a tape of the outputs' derivatives with respect to parameters, then the outputs.
 
-    The parameters are the last inputs of `tape`; the result has `values` in their place.
+    The parameters, the last inputs of `tape`, become the constants `values`.
     """
     count = len(values)
     most, n_inputs = _FEWER * MOST_OPERATIONS, tape.n_inputs - count
@@ -105,7 +105,7 @@ def of_duals(
 ) -> Callable[[Any], Any]:
     """Return `function` for numbers and dual numbers; its derivative is ``slope(argument, value)``.
 
-    `symbolic`, if any, computes the values of dual numbers.
+    `symbolic`, if any, computes values of dual numbers.
     """
 
     def called(x: Any) -> Any:

@@ -29,22 +29,22 @@ _MOST_STEPS_OF_ALL = 1e9
 
 
 class Integrator(Protocol):
-    """The type of a function that integrates a scene."""
+    """A function that integrates a scene."""
 
     def __call__(
         self, scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0, /
     ) -> Trajectory:
-        """Return the trajectory at `times` (s) on one side of 0, in order away from 0."""
+        """Return the trajectory at `times` (s), all on one side of 0, in order away from 0."""
 
 
 def advice(instead: str, effort: float, needed: float | None = None) -> str:
-    """Return the end of a message on an exceeded work limit: `instead`, or a larger effort."""
+    """Return the end of a message on the work limit: `instead`, or a larger effort."""
     factor = suggested(effort, needed)
     return f"{instead}, or allow more work: --effort {factor} (effort={factor} in Python)"
 
 
 def suggested(effort: float, needed: float | None = None) -> str:
-    """Return as text a sufficient effort: twice `needed`, or ten times the present `effort`."""
+    """Return a sufficient effort as text: twice `needed`, or ten times the present one."""
     factor = max(_SLACK * needed, effort) if needed else _UNFORESEEN * effort
     factor = min(1e300, factor)
     digit = 10.0 ** (math.floor(math.log10(factor)) - 1)
@@ -62,8 +62,7 @@ def waves(scene: Scene) -> int:
 def check_steps(scene: Scene, program: str, implementation: str, effort: float) -> None:
     """Raise InputError if a program exceeds the work limit of an `implementation`.
 
-    The work is steps times (1 + c w) for w sines and cosines in the torque, each of work c
-    (`_LIMITS`).
+    The work is steps times (1 + c w) for w sines and cosines in the torque, with c from `_LIMITS`.
     """
     if implementation not in _LIMITS:
         raise unknown("implementation", implementation, _LIMITS)
@@ -75,7 +74,7 @@ def check_steps(scene: Scene, program: str, implementation: str, effort: float) 
 def check_bodies(scene: Scene, program: str, bodies: int, effort: Number) -> None:
     """Raise InputError if a compiled program exceeds the work limit on many bodies.
 
-    The work is bodies times steps times (1 + c w), as in `check_steps`, with c = 1.
+    The work is bodies times steps times (1 + w) for w sines and cosines.
     """
     cost = 1.0 + _LIMITS["fortran"][1] * waves(scene)
     needed = bodies * scene.steps * cost / _MOST_STEPS_OF_ALL

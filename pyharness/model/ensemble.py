@@ -1,4 +1,4 @@
-"""The result of `solve_many`: final states of many bodies."""
+"""The result of `solve_many`: states of many bodies."""
 
 import os
 from dataclasses import dataclass, field, replace
@@ -146,7 +146,7 @@ class Ensemble(BatchResult):
         return energy
 
     def with_times(self, times: Array) -> "Ensemble":
-        """Return this result for n * m bodies as one for n bodies at m times, as views."""
+        """Return this result for n * m bodies as views for n bodies at m times."""
 
         def divided(array: Any) -> Any:
             return None if array is None else array.reshape(-1, len(times), *array.shape[1:])

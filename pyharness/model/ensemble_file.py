@@ -1,4 +1,4 @@
-"""Files of ensembles: archives with an array for each attribute; events are concatenated."""
+"""Files of ensembles: archives with an array for each attribute."""
 
 import json
 import os
@@ -30,7 +30,7 @@ _SENSITIVITY = "sensitivity_"
 
 
 def save_ensemble(found: "Ensemble", path: str | os.PathLike[str]) -> None:
-    """Write an ensemble to the file `path`, as `Ensemble.save` describes."""
+    """Write an ensemble to a file, as `Ensemble.save` describes."""
     arrays = {name: getattr(found, name) for name in _ARRAYS if getattr(found, name) is not None}
     names = list(found.sensitivities or ())
     for number, name in enumerate(names):
@@ -55,7 +55,7 @@ def save_ensemble(found: "Ensemble", path: str | os.PathLike[str]) -> None:
 
 
 def load_ensemble(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Return the attributes of the ensemble of a file, as `Ensemble.load` describes."""
+    """Return a stored ensemble's attributes, as `Ensemble.load` describes."""
     name = checked_path(_FILE, path)
     where = f"{_FILE} '{name}'"
     known = {*_ARRAYS, *_EVENTS, *(f"{_SENSITIVITY}{number}" for number in range(1000))}

@@ -1,4 +1,4 @@
-"""Exceptions for users, and words for their messages."""
+"""Exceptions for users, and parts of their messages."""
 
 from collections.abc import Iterable
 
@@ -40,16 +40,15 @@ SLIDING = (
 
 
 class TimedError(InputError):
-    """An InputError whose message names a time (s), which `slower` converts from rescaled time."""
+    """An InputError that names a time (s), which `slower` converts from rescaled time."""
 
     def __init__(self, message: str, time: float) -> None:
-        """Put `time` in place of ``{time}`` in the message."""
         super().__init__(message.replace("{time}", f"{time:.6g}"))
         self.time = time
         self._message = message
 
     def __reduce__(self) -> tuple[type["TimedError"], tuple[str, float]]:
-        """Return the class and the arguments for `pickle`."""
+        """Return the arguments for `pickle`."""
         return type(self), (self._message, self.time)
 
     def slower(self, factor: float) -> "TimedError":
@@ -82,7 +81,7 @@ def printable(text: str, kept: str = "") -> str:
 
 
 def kind_of(value: object) -> str:
-    """Return the type of a value of TOML, Python or NumPy in words, such as "a list"."""
+    """Return the type of a value in words, such as "a list"."""
     kinds = {
         "text": (str, bytes, bytearray), "true or false": (bool,), "a whole number": (int,),
         "a number": (float,), "a complex number": (complex,), "a list": (list, tuple),
@@ -112,9 +111,9 @@ def known(what: str, name: object, allowed: Iterable[str]) -> str:
 
 
 def unknown(what: str, name: object, allowed: Iterable[str], where: str = "") -> InputError:
-    """Return the InputError for a name that is not `allowed`, which suggests a similar one.
+    """Return the InputError for a `name` that is not `allowed`, with a similar name as a hint.
 
-    `what` is the kind of name, such as "case"; `where`, such as "--fix", begins the message.
+    `what` is the kind of name, such as "case"; `where` begins the message.
     """
     import difflib
 

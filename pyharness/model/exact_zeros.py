@@ -28,7 +28,7 @@ def determinant(elements: Sequence[Sequence[Sequence[float]]]) -> list[Fraction]
 
 
 def first_zeros(polynomial: Iterable[float | Fraction]) -> tuple[float, float]:
-    """Return the last zero (s) of a polynomial before time 0, and the first after time 0.
+    """Return a polynomial's zeros (s) nearest to time 0, before and after it.
 
     The polynomial must be above 0 at time 0. A missing zero is -inf or inf.
     """
@@ -38,11 +38,7 @@ def first_zeros(polynomial: Iterable[float | Fraction]) -> tuple[float, float]:
 
 
 def _first_zero(polynomial: Sequence[Fraction]) -> float:
-    """Return the first zero (s) of a polynomial after time 0, or infinity.
-
-    A polynomial is above 0 in an interval if its coefficients in Bernstein's basis are (Farouki
-    2012, Computer Aided Geometric Design 29). Other intervals are halved.
-    """
+    """Return the first zero (s) of a polynomial after time 0, or infinity."""
     if min(polynomial) >= 0:
         return math.inf
     divisor = math.lcm(*(c.denominator for c in polynomial))
@@ -54,6 +50,8 @@ def _first_zero(polynomial: Sequence[Fraction]) -> float:
     least = min(0, exponent * (len(whole) - 1))
     row = _bernstein([c << (exponent * n - least) for n, c in enumerate(whole)])
     unit = Fraction(2) ** exponent
+    # A polynomial is above 0 in an interval if its coefficients in Bernstein's basis are (Farouki
+    # 2012, Computer Aided Geometric Design 29). Other intervals are halved.
     pieces = [(Fraction(0), Fraction(1), row)]
     while pieces:
         begin, end, row = pieces.pop()
@@ -90,7 +88,7 @@ def _bernstein(polynomial: Sequence[int]) -> list[int]:
 
 
 def _halves(row: list[int]) -> tuple[list[int], list[int]]:
-    """Return the coefficients in both halves of an interval, times 2**degree (de Casteljau)."""
+    """Return coefficients in both halves of an interval, times 2**degree (de Casteljau)."""
     degree = len(row) - 1
     early, late = [row[0] << degree], [row[-1] << degree]
     for n in range(degree - 1, -1, -1):

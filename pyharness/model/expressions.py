@@ -1,6 +1,6 @@
-"""Torques as text: three arithmetic expressions of time, omega and attitude, as in scene files.
+"""Torques as three arithmetic expressions of time, omega and attitude, as in scene files.
 
-Only allowed nodes of the syntax tree are evaluated, with symbols; no text is run as Python code.
+Only allowed nodes of the syntax tree are evaluated; no text is run as Python code.
 """
 
 import ast
@@ -61,10 +61,9 @@ def parsed(
 ) -> StateTorque | TorqueLaw:
     """Return the torque of three expressions about the body axes, as a torque law if possible.
 
-    They may contain t (s), w1, w2, w3 (rad/s), the quaternion q0, q1, q2, q3, pi, the names in
-    `constants`, and own states (`Scene.states`). `rates` has an expression for the time derivative
-    of each own state. Values are in N m, or in rad/s2 for a body with coefficients. Raise
-    InputError for an invalid expression.
+    They may contain t (s), w1 to w3 (rad/s), the quaternion q0 to q3, pi, names in `constants`, and
+    own states (`Scene.states`), whose time derivatives are the expressions in `rates`. Units are N
+    m, or rad/s2 for a body with coefficients. Raise InputError for an invalid expression.
     """
     values = _checked_constants(constants)
     texts = _three_texts(expressions)
@@ -87,13 +86,13 @@ def parsed(
 def components(
     texts: Mapping[str, str], inputs: Sequence[Any], constants: Mapping[str, Any]
 ) -> list[Any]:
-    """Return the values of checked expressions, `texts`, as symbols; `inputs` are eight symbols."""
+    """Return checked expressions as symbols; `inputs` has the symbols of `INPUTS`."""
     names = {**dict(zip(INPUTS, inputs, strict=True)), "pi": math.pi, **constants}
     return [_component(text, names, place) for place, text in texts.items()]
 
 
 def text_components(values: Mapping[str, object], inputs: Sequence[Any]) -> list[Any]:
-    """Return numbers unchanged, and the values of expressions as symbols."""
+    """Return numbers unchanged, and expressions as symbols."""
     found = []
     for place, value in values.items():
         if isinstance(value, str):

@@ -1,6 +1,6 @@
 """Elementary functions of floats and of the numbers of `pyharness.thesis.word`.
 
-Functions of floats are the C library's; those of numbers in other formats are correctly rounded.
+Floats use the C library; other results are correctly rounded.
 """
 
 import math
@@ -8,17 +8,17 @@ from typing import Any
 
 
 def is_finite(x: Any) -> bool:
-    """Return whether a number is neither NaN nor infinite."""
+    """Return whether a number is finite."""
     return math.isfinite(x) if isinstance(x, float) else x.is_finite
 
 
 def square_root(x: Any) -> Any:
-    """Return the square root; raise ValueError for a float below 0."""
+    """Return the square root; raise ValueError for a negative float."""
     return math.sqrt(x) if isinstance(x, float) else x.sqrt()
 
 
 def sine(angle: Any) -> Any:
-    """Return the sine of an angle (rad), or NaN for an infinite float."""
+    """Return the sine of an angle (rad); NaN for an infinite float."""
     if not isinstance(angle, float):
         return angle.sin()
     # Python raises an error for an infinite angle; Fortran, like IEEE 754, returns NaN.
@@ -26,7 +26,7 @@ def sine(angle: Any) -> Any:
 
 
 def cosine(angle: Any) -> Any:
-    """Return the cosine of an angle (rad), or NaN for an infinite float."""
+    """Return the cosine of an angle (rad); NaN for an infinite float."""
     if not isinstance(angle, float):
         return angle.cos()
     return math.cos(angle) if math.isfinite(angle) else math.nan

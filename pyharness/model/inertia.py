@@ -1,9 +1,8 @@
-"""Principal moments and principal axes of full inertia matrices.
+"""Principal moments and axes of inertia matrices, diagonalised in integers.
 
-Symmetric matrices are diagonalised in integers, because in binary64 a small eigenvalue would have
-few correct digits. The elements are integer multiples of a power of 2, u; the absolute determinant
-of a regular matrix is at least u**3. This bounds the smallest absolute eigenvalue from below, which
-determines how many bits are enough.
+In binary64, a small eigenvalue would have few correct digits. The elements are integer multiples of
+a power of 2, u; a regular matrix has an absolute determinant of at least u**3. This bounds the
+smallest absolute eigenvalue from below, and determines how many bits are enough.
 """
 
 import math
@@ -35,7 +34,7 @@ class PrincipalFrame:
     """Principal moments (kg m2) and axes, as floats and as fractions of 30 or more digits.
 
     The columns of `axes` form a right-handed frame, each nearest to the body axis of the same
-    number. `moments_low` is `exact_moments` minus `moments`, as floats.
+    number. `moments_low` is `exact_moments` minus `moments`.
     """
 
     moments: Triple
@@ -45,7 +44,7 @@ class PrincipalFrame:
     exact_axes: tuple[Exact, Exact, Exact]
 
     def into(self, vector: Exact) -> Exact:
-        """Return the exact components of a vector about the principal axes."""
+        """Return a vector's exact components about the principal axes."""
         return triple(
             sum((x * v for x, v in zip(axis, vector, strict=True)), Fraction(0))
             for axis in self.exact_axes
@@ -87,7 +86,7 @@ def symmetric_matrix(where: str, values: object) -> Matrix:
 
 @lru_cache(maxsize=_KEPT)
 def principal_frame(inertia: Matrix) -> PrincipalFrame:
-    """Return the principal frame; each moment is accurate to its last digit."""
+    """Return the principal frame, with moments correct to the last digit."""
     values, vectors = diagonalised(inertia)
     order: list[int] = []
     # Each body axis gets the nearest remaining eigenvector.
@@ -128,8 +127,8 @@ def diagonalised(
 ) -> tuple[Exact, tuple[Exact, Exact, Exact]]:
     """Return the eigenvalues and orthonormal eigenvectors by Jacobi's method in integers.
 
-    They are fractions with relative errors of at most 2**-100; a zero eigenvalue is exactly 0. For
-    a diagonal matrix they are in the order of its elements.
+    Relative errors are at most 2**-100; zero eigenvalues are exact. For a diagonal matrix, the
+    eigenvalues are in the order of its elements.
     """
     exponent = min((_last_bit(x) for row in matrix for x in row if x), default=0)
     whole = [[int(Fraction(x) / Fraction(2) ** exponent) for x in row] for row in matrix]

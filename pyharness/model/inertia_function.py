@@ -1,4 +1,4 @@
-"""Inertias that are functions of time, recorded from functions, expressions or tables."""
+"""Inertias as functions of time, from functions, expressions or tables."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
@@ -29,8 +29,8 @@ _CONTINUOUS = 1e-9  # largest relative jump of an element that counts as roundin
 class InertiaFunction(Changing):
     """An inertia that is a continuous function of time.
 
-    The outputs of `tape` are the three moments, or the nine elements of the matrix by rows.
-    `written` has the values of a scene file: expressions and numbers, or a table's items.
+    The recorded operations `tape` give three moments, or nine matrix elements by rows. `written`
+    has a scene file's expressions and numbers, or a table's items.
     """
 
     place: str
@@ -66,7 +66,7 @@ class InertiaFunction(Changing):
         return with_derivatives(self.tape, [TIME])
 
     def matrix(self, time: Any) -> list[list[Any]]:
-        """Return the inertia matrix (kg m2) at a time (s), a symbol or an array."""
+        """Return the inertia matrix (kg m2) at a time (s), a float, symbol or array."""
         return self._rows(_outputs(self.tape, time))
 
     def matrix_rate(self, time: Any) -> list[list[Any]]:
@@ -81,11 +81,11 @@ class InertiaFunction(Changing):
 
     @cached_property
     def span(self) -> tuple[float, float]:
-        """Infinite ends, because a moment that reaches 0 ends the integration as a singularity."""
+        """Infinite ends, because a moment that reaches 0 ends the integration."""
         return -np.inf, np.inf
 
     def check(self, times: Iterable[float]) -> None:
-        """Raise InputError unless moments are above 0 at 1001 times from 0 to each of `times`."""
+        """Raise InputError unless moments are above 0 at 1001 times up to each of `times`."""
         for end in times:
             if not (end and np.isfinite(end)):
                 continue
@@ -138,7 +138,7 @@ def inertia_function(place: str, function: Callable[[Any], Any]) -> InertiaFunct
 
 
 def inertia_of_texts(place: str, values: Any) -> InertiaFunction:
-    """Return the moments or inertia matrix from a scene file's expressions of t and numbers."""
+    """Return the inertia from a scene file's expressions of t and numbers."""
     where = f"[body] {place}"
     rows = [values] if place == "moments" else values
     if not isinstance(values, list) or not all(
@@ -165,7 +165,7 @@ def inertia_of_tables(
 
 
 def checked_function(found: InertiaFunction) -> InertiaFunction:
-    """Return an inertia; raise InputError if it jumps, or is not positive definite at time 0."""
+    """Return an inertia; raise InputError if it jumps, is asymmetric, or is invalid at time 0."""
     # Imported only here, because most scenes need no exact numbers.
     from pyharness.model.inertia import checked_inertia
 
@@ -188,10 +188,7 @@ def checked_function(found: InertiaFunction) -> InertiaFunction:
 
 
 def _check_continuous(tape: Tape, where: str) -> None:
-    """Raise InputError unless all choices are continuous, such as minimum, maximum, abs and clip.
-
-    A jump of the inertia would make omega jump.
-    """
+    """Raise InputError if the inertia, and therefore omega, may jump."""
     jumps = InputError(
         f"{where}: an inertia that may jump; allowed: minimum, maximum, abs, clip, interp, tables "
         "with the interpolation linear or cubic"

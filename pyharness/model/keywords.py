@@ -1,4 +1,4 @@
-"""Hints for keyword arguments that users of SciPy expect."""
+"""Hints for keyword arguments of SciPy that users may expect."""
 
 import inspect
 from collections.abc import Callable

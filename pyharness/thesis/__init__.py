@@ -1,1 +1,1 @@
-"""The three programs in the thesis's appendix: cards, Python ports (twins) and compiled runs."""
+"""The thesis's three programs: cards, Python ports (twins) and compiled runs."""

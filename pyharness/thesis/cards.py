@@ -1,10 +1,9 @@
-"""The text of the edition: every card of the three decks, and its appearance in the scan.
+"""The cards of the three programs, in our text and in the scan of the thesis.
 
-A card is a line of a printed program, a deck the cards of one program. A line of the scan consists
-of card number, dash and text; blanks are ignored. `data/cards` has the decks, the pages of the
-scan, and for each card the corresponding lines of the Python port (the twin). Comments in the
-Fortran port name the cards of each line. `data/apparatus.toml`, the critical apparatus, explains
-where the scan deviates from our text.
+A card is a line of a printed program, a deck the cards of one program. `data/cards` has the decks,
+the scan's pages, and each card's lines in the Python port (the twin). Comments in the Fortran port
+name the cards of each line. A line of the scan has card number, dash and text; blanks are ignored.
+`data/apparatus.toml`, the critical apparatus, explains deviations of the scan from our text.
 """
 
 import re
@@ -27,7 +26,7 @@ PORT = "fortran/original"
 class Difference(NamedTuple):
     """A passage of a card, without blanks, that differs between our text and the scan.
 
-    `entry` is the apparatus entry that explains the difference.
+    The apparatus entry `entry` explains the difference.
     """
 
     ours: str
@@ -46,9 +45,9 @@ class Place(NamedTuple):
 class Card(NamedTuple):
     """A card of a printed program, and its appearance in the scan.
 
-    `text` is columns 1 to 72 in our text. `differences` are ordered from left to right. `printed`
-    is the scan's card number if it differs, with the apparatus entry that explains it; `lost` is
-    the apparatus entry on a card that the scan lacks.
+    `text` is our text of columns 1 to 72. `differences` are ordered from left to right. `printed`
+    is the scan's card number if it differs, with the apparatus entry that explains it. `lost` is
+    the apparatus entry of a card that the scan lacks.
     """
 
     program: str
@@ -60,12 +59,12 @@ class Card(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Return the name of the card, as in ``two-term:1660``."""
+        """Return a name such as ``two-term:1660``."""
         return f"{self.program}:{self.number}"
 
     @property
     def statement(self) -> str:
-        """Return the text with each sequence of blanks reduced to one."""
+        """Return the text with each run of blanks reduced to one."""
         return " ".join(self.text.split())
 
     @property
@@ -80,7 +79,7 @@ class Card(NamedTuple):
 
     @property
     def scan(self) -> str | None:
-        """Return the scan's number, dash and text without blanks; None if the card is lost."""
+        """Return the card's line in the scan, without blanks; None if the scan lacks it."""
         if self.lost:
             return None
         number = self.printed[0] if self.printed else str(self.number)
@@ -90,8 +89,8 @@ class Card(NamedTuple):
     def passages(self) -> Iterator[tuple[str, Difference | None]]:
         """Yield each passage of the text, with its difference from the scan or None.
 
-        A difference is at the first occurrence of its characters after the previous one. Raise
-        ValueError if there is none.
+        A difference begins where its characters first occur after the previous difference. Raise
+        ValueError if there is no such place.
         """
         places = [n for n, letter in enumerate(self.text) if not letter.isspace()]
         letters = tight(self.text)
@@ -111,7 +110,7 @@ class Card(NamedTuple):
 
     @property
     def text_with_scanned_names(self) -> str:
-        """Return our text with the scan's form of each name that we normalised."""
+        """Return our text with the scan's form of names that we normalised."""
         kinds = {each["id"]: each["kind"] for each in facts("apparatus")["entry"]}
         return "".join(
             each.scans if each and kinds[each.entry] == "normalization" else text
@@ -134,7 +133,7 @@ class Card(NamedTuple):
 
 
 class Deck:
-    """The cards of a program by number, with their lines in the Fortran and the Python port."""
+    """The cards of a program, with their lines in the Fortran and the Python port."""
 
     def __init__(self, program: str) -> None:
         self.program = program
@@ -153,10 +152,7 @@ class Deck:
 
     @cached_property
     def executable(self) -> frozenset[int]:
-        """Return the numbers of the cards with executable statements.
-
-        Other cards are comments, or part of a PROGRAM, DIMENSION, REAL, FORMAT or END statement.
-        """
+        """Return the numbers of cards with executable statements, no specifications or comments."""
         found, computes = set(), False
         for card in self.cards.values():
             if not card.continues:
@@ -166,24 +162,24 @@ class Deck:
         return frozenset(found)
 
     def statement_kind(self, card: Card) -> str:
-        """Return the kind of a card: ``comment``, ``executable`` or ``specification``."""
+        """Return ``comment``, ``executable`` or ``specification``."""
         if card.is_comment:
             return "comment"
         return "executable" if card.number in self.executable else "specification"
 
     @cached_property
     def absent(self) -> dict[int, str]:
-        """Return, by card number, why the Fortran port omits an executable card."""
+        """Return, by card number, why the Fortran port omits a card."""
         return {n: why for cards, why in self._places["absent"] for n in numbers(cards)}
 
     @cached_property
     def otherwise(self) -> dict[int, str]:
-        """Return, by card number, why the Fortran port has a statement in another form."""
+        """Return, by card number, why the Fortran port changes the form of a statement."""
         return {n: why for cards, why in self._places["otherwise"] for n in numbers(cards)}
 
     @cached_property
     def port(self) -> dict[int, list[Place]]:
-        """Return, by card number, the corresponding lines of the Fortran port."""
+        """Return the lines of the Fortran port by card number."""
         file = port_file(self.program)
         lines = enumerate(_lines(shipped(PORT) / file), 1)
         found = ((number, match) for number, text in lines if (match := _MARGIN.match(text)))
@@ -191,19 +187,19 @@ class Deck:
 
     @cached_property
     def twin(self) -> dict[int, list[Place]]:
-        """Return, by card number, the corresponding lines of the Python port."""
+        """Return the lines of the Python port by card number."""
         places = self._places["twin"]
         return _by_card((cards, twin_line(file, text)) for cards, file, text in places)
 
 
 @cache
 def deck(program: str) -> Deck:
-    """Return the deck of a program; callers share it and must not change it."""
+    """Return the deck of a program, which callers must not change."""
     return Deck(program)
 
 
 def statements_of(texts: Iterable[str]) -> list[list[str]]:
-    """Return label and text, without blanks, of each statement on cards with these `texts`."""
+    """Return [label, text] of each statement on cards with these `texts`, without blanks."""
     found: list[list[str]] = []
     for text in texts:
         if text.startswith("C"):
@@ -216,7 +212,7 @@ def statements_of(texts: Iterable[str]) -> list[list[str]]:
 
 
 def numbers(ranges: str) -> list[int]:
-    """Return the card numbers that a text names: ``750-770, 800`` is 750, 760, 770 and 800."""
+    """Return the card numbers in a text: ``750-770, 800`` gives 750, 760, 770 and 800."""
     found: list[int] = []
     for each in ranges.split(",") if ranges else ():
         first, _, last = each.strip().partition("-")
@@ -225,20 +221,17 @@ def numbers(ranges: str) -> list[int]:
 
 
 def chosen(asked: Iterable[str]) -> list[Card]:
-    """Return the cards that `asked` names, or all cards if it is empty.
+    """Return the cards that `asked` names, or all if it is empty.
 
-    Each item is a program (``two-term``), a card (``two-term:1660``), or a number or range of
-    numbers in any program (``1660``, ``1040-1090``). Raise InputError for other items.
+    Each item is a program (``two-term``), a card (``two-term:1660``), or a number or range in any
+    program (``1660``, ``1040-1090``). Raise InputError for other items.
     """
     every = (card for each in list(asked) or PROGRAMS for card in _cards_of(each))
     return list(dict.fromkeys(every))
 
 
 def parallels(card: Card) -> list[Card]:
-    """Return the cards of the other programs with the same text; blanks are ignored.
-
-    The list is empty for a comment or a blank card.
-    """
+    """Return the cards of other programs with equal text; none for a comment or blank card."""
     if card.is_comment or not card.text[6:].strip():
         return []
     same_text = _by_text().get(tight(card.text), [])
@@ -299,9 +292,10 @@ def port_file(program: str) -> str:
 
 
 def switch_at(place: Place) -> tuple[str, bool] | None:
-    """Return the switch on which a Fortran line depends, and whether the line runs if it is active.
+    """Return the switch on which a Fortran line depends, and whether the line needs it active.
 
-    A switch is the flag of a defect or reading. Return None unless the line depends on exactly one.
+    A switch is the flag of a defect or reading. The innermost ``if`` around the line that tests a
+    single switch counts; without one, return None.
     """
     lines = _lines(shipped(PORT) / place.file)
     depth = _indentation(lines[place.line - 1])
@@ -317,7 +311,7 @@ def switch_at(place: Place) -> tuple[str, bool] | None:
 
 
 def twin_line(file: str, text: str) -> Place:
-    """Return the only line of a Python port with this text; raise ValueError if there is none."""
+    """Return the only line of a Python port with this text; raise ValueError if not exactly one."""
     where = [n for n, line in enumerate(_lines(_TWINS / file), 1) if line.strip() == text]
     if len(where) != 1:
         raise ValueError(f"{text!r} occurs {len(where)} times in {file}")

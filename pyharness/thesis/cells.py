@@ -1,7 +1,7 @@
-"""Cells, combinations of a listing and a case, in which Fortran and Python ports are compared.
+"""Pairs of a listing and a case (cells), in which the Fortran and Python ports are compared.
 
-A listing is a program with a choice of defects, readings (interpretations of doubtful cards) and
-conjectures; a case is a scene of Table 1 of the thesis.
+A listing is a program with chosen defects, readings of doubtful cards, and conjectures; a case is a
+scene of the thesis's Table 1.
 """
 
 from collections.abc import Iterator
@@ -19,17 +19,16 @@ def subsets(names: tuple[str, ...]) -> Iterator[frozenset[str]]:
 
 
 def all_listings(program: str) -> Iterator[Listing]:
-    """Yield every listing of a program: each subset of readings with each subset of defects."""
+    """Yield all listings of a program: every subset of readings with every subset of defects."""
     for readings in subsets(names_of("reading", program)):
         for defects in subsets(switches(program)):
             yield Listing(program, defects, readings)
 
 
 def all_cells() -> Iterator[tuple[Listing, int]]:
-    """Yield every pair of a listing and a case number, for all three programs.
+    """Yield every pair of a listing and a case number.
 
-    For a case with an initial torque, each listing also occurs with the conjecture
-    `initial-torque`.
+    In a case with an initial torque, each listing also occurs with the conjecture `initial-torque`.
     """
     cases = {case: initial_torque(case_scene(case)) is not None for case in case_numbers()}
     for program in PROGRAMS:
@@ -47,7 +46,7 @@ def cell_name(listing: Listing, case: int) -> str:
 
 
 def listing_name(listing: Listing) -> str:
-    """Return a listing's name, such as ``original``, ``corrected:READING`` or ``DEFECT+DEFECT``."""
+    """Return a name such as ``original``, ``corrected:READING`` or ``DEFECT+DEFECT``."""
     if listing.label == "custom":
         return "+".join(sorted(listing.active))
     return ":".join([listing.label, *sorted(listing.readings)])

@@ -1,7 +1,7 @@
 """Comparisons of the scan with our text of the cards, and of the three decks with the thesis.
 
-`data/cards/collation.toml` lists the operations of the programs, and the statements of sections II
-to V about them. Whether the decks agree is computed from their cards.
+`data/cards/collation.toml` has the cards of each operation of the programs, and the statement of
+sections II to V about it. Whether the decks agree is computed.
 """
 
 import difflib
@@ -21,10 +21,10 @@ _OF_THE_SCAN = ("misreading", "missing text", "normalization")
 
 
 def expected_lines() -> list[tuple[str, str]]:
-    """Return the lines that our tables expect in the appendix of the thesis, as pairs (text, name).
+    """Return the expected lines of the scanned appendix, as pairs (text without blanks, name).
 
-    The text has no blanks. The name is a card's, such as ``two-term:1660``, ``furniture`` for a
-    line that an editor added, or ``phantom`` for text that belongs to no card at its place.
+    The name is a card's, such as ``two-term:1660``, ``furniture`` for an editor's line, or
+    ``phantom`` for text of no card at its place.
     """
     found = []
     for page in facts("cards/scan")["page"]:
@@ -41,9 +41,9 @@ def expected_lines() -> list[tuple[str, str]]:
 
 @cache
 def witness_lines() -> dict[str, str]:
-    """Return the line of each card as scanned, by the name of the card.
+    """Return each card's line in the scan, by the card's name.
 
-    Its blanks are from `data/cards/blanks.toml`. Callers must not change the dictionary.
+    Blanks are from `data/cards/blanks.toml`. Callers must not change the dictionary.
     """
     blanks = facts("cards/blanks")
     found = {}
@@ -56,7 +56,7 @@ def witness_lines() -> dict[str, str]:
 
 
 def unexplained(scan: str) -> list[str]:
-    """Return a sentence for each line in which the text of a scan disagrees with our tables.
+    """Return a sentence for each line of a scan's text that disagrees with `expected_lines`.
 
     Raise InputError if the text has no appendix.
     """
@@ -89,8 +89,8 @@ def unexplained(scan: str) -> list[str]:
 def undeclared() -> list[str]:
     """Return a sentence for each disagreement between the cards and the apparatus.
 
-    Each deviation of the scan must name an apparatus entry that declares it, and each declared
-    deviation must occur. A lost card must name an entry of the kind ``missing text``.
+    An apparatus entry must declare each deviation of the scan; each declared deviation must occur.
+    A lost card needs an entry of the kind ``missing text``.
     """
     used: set[tuple[Any, ...]] = set()
     for card in chosen(()):
@@ -126,13 +126,13 @@ def undeclared() -> list[str]:
 
 
 class Row(NamedTuple):
-    """A row of the comparison: whether the decks and the thesis agree on an operation, `what`.
+    """A comparison of the decks and the thesis in one operation of the programs, `what`.
 
     `cards` has the card numbers by program, as in ``750-770, 800``. `decks` is ``agree`` if all
     decks with the operation have the same statements, ``names`` if only names differ, ``order`` if
     only names and order differ, ``-`` if no deck has the operation, else ``differ``. `thesis` is
-    ``agrees``, ``differs`` or ``silent``; `text` is the place in the thesis, `says` the statement
-    there. `entries` of the apparatus, or `reason`, explain a disagreement.
+    ``agrees``, ``differs`` or ``silent``; `text` is the place in the thesis, `says` its statement.
+    `entries` of the apparatus, or `reason`, explain a disagreement.
     """
 
     what: str
@@ -152,7 +152,7 @@ class Row(NamedTuple):
 
 
 def rows() -> list[Row]:
-    """Return the rows of the comparison, in the order of the operations in the decks."""
+    """Return all comparisons, in the order of operations in the decks."""
     found = []
     for given in facts("cards/collation")["row"]:
         thesis = ("agrees" if given["agrees"] else "differs") if "text" in given else "silent"
@@ -168,8 +168,8 @@ def rows() -> list[Row]:
 def faults(found: list[Row]) -> list[str]:
     """Return a sentence for each mistake or unexplained disagreement in the rows `found`.
 
-    Every entry in a row must be in the apparatus, and name a card of the row. Every card except
-    comments must be in exactly one row, and every apparatus entry with cards in some row, unless it
+    Each entry in a row must be in the apparatus, and name a card of the row. Each card except
+    comments must be in one row. Each apparatus entry with cards must be in a row, unless it
     concerns only the scan.
     """
     told = [f"{row.what}: no entry or reason" for row in found if not row.is_explained]
@@ -198,7 +198,7 @@ def faults(found: list[Row]) -> list[str]:
 
 
 def statements(program: str, cards: str) -> list[str]:
-    """Return the statements on the `cards` of a program, without blanks, labels and comments."""
+    """Return the statements on a program's `cards`, without blanks, labels and comments."""
     texts = (deck(program).cards[number].text for number in numbers(cards))
     return [text for _, text in statements_of(texts)]
 
@@ -236,7 +236,7 @@ def _renamed(statement: str, names: str) -> str:
 
 
 def names_a_card(entry: dict[str, Any], cards: Mapping[str, Iterable[int]]) -> bool:
-    """Return whether an apparatus entry names one of these `cards`, or no card at all."""
+    """Return whether an apparatus entry names one of the `cards`, or no card."""
     return not entry["cards"] or any(
         set(numbers(entry["cards"].get(program, ""))) & set(named)
         for program, named in cards.items()

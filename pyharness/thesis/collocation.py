@@ -1,9 +1,9 @@
-"""Collocation as in section IV.2 of the thesis, with up to five terms: one step, and a run.
+"""Collocation with up to five terms, as in section IV.2 of the thesis: one step, and a run.
 
-In a step, every unknown is a polynomial x(0) + c1 t + c2 t**2 + ... (eq. 34). With n terms after
+In a step, each unknown is a polynomial x(0) + c1 t + c2 t**2 + ... (eq. 34). With n terms after
 x(0), its derivative equals the right-hand side at n collocation points (eq. 36). A first estimate
-assumes a constant right-hand side. One correction then uses the right-hand sides at the collocation
-points of this estimate.
+assumes a constant right-hand side; one correction uses the estimate's right-hand sides at the
+points.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,8 +31,8 @@ def integrate(
     """Run a collocation program on a scene, and return its trajectory.
 
     `points_of` returns the collocation points (s) for the program's step size DT (s). `rates`
-    returns the right-hand sides at point k (0 for the start). Its arguments are the torques over
-    the moments (rad/s2) at the start and at all points, k, and the six unknowns.
+    returns the right-hand sides at point k (0 for the start) from torques over moments (rad/s2) at
+    the start and all points, k, and the six unknowns.
     """
     h = scene.step_size
     dt = h
@@ -64,10 +64,10 @@ def integrate(
 def interval(
     start: Vector, points: Sequence[float], end: float, rates: Rates
 ) -> tuple[list[float], int]:
-    """Return all unknowns after one step, and the error code IER of the correction.
+    """Return all unknowns after one step, and the correction's error code IER.
 
-    `points` and `end` are times (s) after its start. `rates` returns the right-hand sides at point
-    k (0 for the start) from k and the unknowns.
+    `points` and `end` are times (s) after the start. `rates` returns the right-hand sides from the
+    point's number k (0 for the start) and the unknowns.
     """
     constant = rates(0, start)
     estimate, _ = fit(points, [constant] * len(points))
@@ -77,7 +77,7 @@ def interval(
 
 
 def fit(points: Sequence[float], rates: Sequence[Vector]) -> tuple[list[list[float]], int]:
-    """Return c1, c2, ... of each unknown, and IER, from the derivatives `rates` at `points` (s)."""
+    """Return each unknown's c1, c2, ..., and IER, from the derivatives `rates` at `points` (s)."""
     by_unknown = [list(column) for column in zip(*rates, strict=True)]
     return leqt1f(collocation_matrix(points), by_unknown)
 
@@ -91,10 +91,7 @@ def collocation_matrix(points: Sequence[float]) -> list[list[float]]:
 
 
 def values(start: Vector, coefficients: Sequence[Vector], t: float) -> list[float]:
-    """Return every unknown's polynomial x(0) + c1 t + c2 t**2 + ... at the time `t` (s).
-
-    The rounding errors depend on the order of the terms.
-    """
+    """Return each unknown at `t` (s): x(0) + c1 t + c2 t**2 + ..., summed in this order."""
     t2 = t * t
     powers = [t, t2, t2 * t, t2 * t2, t2 * t2 * t]
     result = []

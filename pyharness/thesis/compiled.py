@@ -1,4 +1,4 @@
-"""Runs of the compiled programs (Fortran ports) of the thesis on a scene."""
+"""Runs of the thesis's compiled programs (Fortran ports)."""
 
 from dataclasses import replace
 from typing import Any
@@ -22,7 +22,7 @@ def run(
 ) -> Trajectory:
     """Run the compiled program of a listing on a scene, and return its trajectory.
 
-    The arguments are those of `programs.run_program`, but are not checked.
+    The arguments are those of `programs.run_program`, unchecked.
     """
     given = program_arguments(scene, listing, lipschitz, may_stop, velocity)
     rows, ier, n_rows, *ended = extension().run_program(*given)
@@ -36,10 +36,10 @@ def read_rows(
 ) -> Trajectory:  # fmt: skip
     """Return the output of a compiled program as a trajectory.
 
-    `rows` has shape (n, 8): true time and the program's TIME (s), omega (rad/s) and translational
-    velocity (m/s). The first n values of `ier` are used. `stop_variable` is the number in
-    `STOP_VARIABLES`, from 1, of the variable that failed the stop test, or 0. `stop_quotient` is
-    the change of the variable's right-hand side divided by the variable's (1/s).
+    `rows` has shape (n, 8): true time and TIME (s), omega (rad/s) and velocity (m/s). The first n
+    values of `ier` are used. `stop_variable` is the number in `STOP_VARIABLES`, from 1, of the
+    variable that failed the stop test, or 0. `stop_quotient` (1/s) is the change of its right-hand
+    side over its own.
     """
     n = len(rows)
     return trajectory_of(
@@ -56,9 +56,9 @@ def program_arguments(
 ) -> tuple[Any, ...]:
     """Return the arguments of the compiled function `run_program`.
 
-    Among them are a bit mask of defects, readings and conjectures, and seven triples: moments (kg
-    m2), or A, B and C of Euler's equations; omega (rad/s); masses (kg); forces (N); constant (N m)
-    and rate (N m/s) of the torque; initial torque over the moments (rad/s2), or zeros.
+    They include a bit mask of defects, readings and conjectures. Seven triples are moments (kg m2),
+    or A, B and C; omega (rad/s); masses (kg); forces (N); constant (N m) and rate (N m/s) of the
+    torque; initial torque over moments (rad/s2), or zeros.
     """
     first = initial_torque(scene) if listing.has("initial-torque") else None
     if first is None and listing.has("initial-torque"):

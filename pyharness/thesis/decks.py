@@ -1,7 +1,7 @@
-"""Decks written as fixed-form FORTRAN, and their compilation and runs.
+"""Cards as fixed-form FORTRAN programs (decks), their compilation and their runs.
 
-A compiled deck is a third path from the cards to the results: the author's statements and a
-separate LEQT1F (`data/cards/leqt1f.f`) share no code with the Fortran and Python ports.
+A compiled deck checks the Fortran and Python ports independently: it has the author's statements
+and a separate LEQT1F (`data/cards/leqt1f.f`).
 """
 
 import re
@@ -40,8 +40,8 @@ _MARK = "+"
 class Run(NamedTuple):
     """The output of a compiled deck.
 
-    `tape5` has shape (n, 7): TIME (s), U1 to U3 (rad/s) and V1 to V3 (m/s). `page` is the text of
-    the printer file TAPE6, without carriage control and trailing blanks.
+    `tape5` has shape (n, 7): TIME (s), U1 to U3 (rad/s), V1 to V3 (m/s). `page` is the file TAPE6,
+    without carriage control and trailing blanks.
     """
 
     tape5: np.ndarray
@@ -51,15 +51,13 @@ class Run(NamedTuple):
 def deck_text(
     listing: Listing, scene: Scene | None = None, dialect: str = "1982", terms: int | None = None
 ) -> str:
-    """Return a program as fixed-form FORTRAN, with card numbers in columns 73 to 80.
+    """Return a program as fixed-form FORTRAN, with card numbers in columns 74 to 80.
 
     The published cards have the data of Case 2 with 300 steps (collocation) or Case 5 with 100
-    steps (Runge-Kutta). A `scene` of Table 1 replaces these data.
-
-    The `dialect` "1982" leaves the cards as published, "ftn" adds cards for the torque of Case 7,
-    and "gfortran" also adapts cards to a modern compiler. Column 73 marks added and adapted cards.
-    `terms`, 3 or 5, requests the conjectural deck of `model_cards`. Raise InputError if the dialect
-    is unknown, or if the request can't be expressed in cards.
+    steps (Runge-Kutta); a `scene` of Table 1 replaces these data. The `dialect` "1982" adds
+    nothing, "ftn" adds cards for the torque of Case 7, and "gfortran" also adapts cards to a modern
+    compiler. Column 73 marks added and adapted cards. `terms`, 3 or 5, requests the deck of
+    `model_cards`. Raise InputError for an unknown dialect, or a request that cards can't express.
     """
     if dialect not in DIALECTS:
         raise unknown("dialect", dialect, DIALECTS, "--dialect")
@@ -89,13 +87,13 @@ def deck_text(
 
 
 def card_steps(program: str) -> int:
-    """Return the number of steps in the DO statement of a program's cards."""
+    """Return the number of steps in a program's published DO statement."""
     number = facts("cards/alterations")["case"][program]["steps"]
     return int(deck(program).cards[number].text.split(",")[1])
 
 
 def corrected_cards(program: str) -> dict[int, str]:
-    """Return the cards of the corrected program by number, including inserted cards."""
+    """Return the corrected program's cards by number, including inserted cards."""
     lines = deck_text(Listing.corrected(program)).splitlines()
     return {int(line[73:]): line[:72].rstrip() for line in lines}
 
@@ -113,10 +111,10 @@ def corrections(program: str) -> dict[int, list[str]]:
 
 
 def job_text(deck: str, system: str = "nos", rounds: bool = False) -> str:
-    """Return a batch job that compiles and runs a deck in the dialect `ftn` with CDC's FTN.
+    """Return a batch job that compiles and runs a deck of the dialect `ftn` with CDC's FTN.
 
-    The job includes our LEQT1F if the deck calls it. `system` is "nos" or "nosbe"; `rounds` sets
-    FTN's option ROUND for sums, products and quotients. Raise InputError for another system.
+    The job includes our LEQT1F if the deck calls it. `rounds` sets FTN's option ROUND for sums,
+    products and quotients. Raise InputError unless the operating `system` is "nos" or "nosbe".
     """
     if system not in SYSTEMS:
         raise unknown("system", system, SYSTEMS, "--system")
@@ -132,7 +130,7 @@ def job_text(deck: str, system: str = "nos", rounds: bool = False) -> str:
 def _is_made(
     alteration: Mapping[str, Any], listing: Listing, dialect: str, case: int | None
 ) -> bool:
-    """Return whether all conditions of an alteration hold; `case` is None for published cards."""
+    """Return whether an alteration's conditions hold; `case` is None for the published data."""
     named = alteration.get
     return (
         named("program") == listing.program
@@ -160,7 +158,7 @@ def model_cards(terms: int) -> dict[int, str]:
     """Return the cards of a collocation deck with `terms` terms, by their new numbers.
 
     The deck is a conjecture: section V.2 of the thesis uses three and five terms in Case 6, but
-    prints no such deck. The collocation points are at the fractions k/(terms + 1) of the interval.
+    prints no cards. The collocation points are at the fractions k/(terms + 1) of the step.
     """
     text = [card.text for card in deck("four-term").cards.values()]
     terms_range = range(1, terms + 1)
@@ -235,17 +233,17 @@ def _case_cards(program: str, scene: Scene) -> dict[int, str]:
 
 
 def solver_cards() -> int:
-    """Return the number of cards in our LEQT1F, without comments."""
+    """Return the number of our LEQT1F's cards, without comments."""
     return sum(not line.startswith("C") for line in _SOLVER.read_text().splitlines())
 
 
 def compiler() -> str | None:
-    """Return the path of gfortran; None if it is not installed."""
+    """Return the path of gfortran, or None."""
     return shutil.which(COMPILER)
 
 
 def run_deck(text: str, folder: Path | None = None) -> Run:
-    """Compile and run a deck in the dialect `gfortran`, and return its output.
+    """Compile and run a deck of the dialect `gfortran`, and return its output.
 
     `folder` keeps the compiled solver for later calls. Raise RuntimeError if the compiler or the
     program fails.
@@ -262,7 +260,7 @@ def run_deck(text: str, folder: Path | None = None) -> Run:
 
 
 def solver_object(folder: Path) -> Path:
-    """Return the path of the compiled solver in `folder`; compile it if missing."""
+    """Return the path of the solver in `folder`, compiled if missing."""
     found = folder / "leqt1f.o"
     if not found.exists():
         _command([COMPILER, *FLAGS, "-c", str(_SOLVER), "-o", str(found)], folder)

@@ -1,4 +1,4 @@
-"""Right-hand sides, and the record of a run, for the Python ports of all three programs."""
+"""Right-hand sides, and the record of a run, for the three Python ports."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -16,16 +16,13 @@ Vector = Sequence[float]
 
 
 def omega_rate(coefficients: Vector, m: Vector, u: Vector) -> list[float]:
-    """Return F, G, H of eqs. 16-18 from A, B, C, torque over moment (rad/s2) and omega (rad/s)."""
+    """Return domega/dt, eqs. 16-18, from A, B, C, torque over moment (rad/s2) and omega (rad/s)."""
     a, b, c = coefficients
     return [m[0] + a * u[1] * u[2], m[1] + b * u[0] * u[2], m[2] + c * u[0] * u[1]]
 
 
 def velocity_rate(acceleration: Vector, u: Vector, v: Vector) -> list[float]:
-    """Return F/m - omega x V along the body axes (m/s2).
-
-    `acceleration` is F/m (m/s2), `u` omega (rad/s) and `v` V (m/s).
-    """
+    """Return F/m - omega x V in body axes (m/s2), from F/m, omega `u` (rad/s) and V `v` (m/s)."""
     return [
         acceleration[0] + v[1] * u[2] - v[2] * u[1],
         acceleration[1] + v[2] * u[0] - v[0] * u[2],
@@ -40,7 +37,7 @@ def accelerations(scene: Scene, listing: Listing) -> list[float]:
 
 
 def initial_torque(scene: Scene) -> Vector | None:
-    """Return `card_torque` over the moments (rad/s2), for the conjecture `initial-torque`."""
+    """Return the torque over moments (rad/s2) of the conjecture `initial-torque`, or None."""
     given = card_torque(scene)
     if given is None or scene.moments is None:
         return None
@@ -48,7 +45,7 @@ def initial_torque(scene: Scene) -> Vector | None:
 
 
 def card_torque(scene: Scene) -> Vector | None:
-    """Return the initial torque (N m) of a scene's case in Table 1, or None."""
+    """Return the initial torque (N m) of a case in Table 1, or None."""
     given = {each["case"]: each["torque"] for each in facts("printer")["initial_torque"]}
     return given.get(scene.case)
 
@@ -81,7 +78,7 @@ class Record:
     def trajectory(
         self, ended: str = "complete", stop: Stop | None = None, prints_ier: bool = True
     ) -> Trajectory:
-        """Return the trajectory of all rows, with the error codes IER if `prints_ier`.
+        """Return the trajectory of all rows, with the solver's IER if `prints_ier`.
 
         A step that overflowed has no row, but its evaluations are counted.
         """

@@ -1,6 +1,6 @@
 """Four-term collocation: the second program of the appendix, Jacobs 1982, IV.2.
 
-The residual of the equations of motion is zero at the fractions .2, .4, .6 and .8 of each step.
+The collocation points are at .2, .4, .6 and .8 of each step.
 """
 
 from collections.abc import Sequence
@@ -15,10 +15,7 @@ from pyharness.thesis.equations import Vector, accelerations, omega_rate, veloci
 def run(
     scene: Scene, listing: Listing, lipschitz: float = 500.0, may_stop: bool = True
 ) -> Trajectory:
-    """Run the program on a scene, and return its trajectory.
-
-    `lipschitz` and `may_stop` have no effect: the program has no stop test.
-    """
+    """Run the program; without a stop test, `lipschitz` and `may_stop` have no effect."""
     coefficients = scene.euler_coefficients
     acceleration = accelerations(scene, listing)
 

@@ -1,7 +1,7 @@
-"""Runs of the programs in a floating-point format of `word.py`, such as the CDC's 48 bits.
+"""Runs of the programs in a floating-point format of `word.py`, such as the CDC's.
 
-The Python ports run in every format, the compiled programs only in formats of IEEE 754. The
-extension module exchanges numbers as bytes, in this machine's order.
+Python ports run in every format, compiled programs only in those of IEEE 754. The extension module
+exchanges numbers as bytes in native order.
 """
 
 import copy
@@ -37,7 +37,7 @@ def run(
 ) -> Trajectory:
     """Run the Python port of a listing in the arithmetic `word`; no argument is checked.
 
-    The results are rounded to floats; the attribute `exact` has them unrounded.
+    The results are rounded to floats; `exact` has them unrounded.
     """
     twin = importlib.import_module(f"pyharness.thesis.{listing.program.replace('-', '_')}")
     found: Trajectory = twin.run(scene_in(scene, word), listing, lipschitz, may_stop)
@@ -73,8 +73,8 @@ def run_compiled(
 ) -> Trajectory:
     """Run a listing's compiled program in the arithmetic `word`; the result is that of `run`.
 
-    Raise InputError if the compiler does not support this arithmetic, or angles in the torque are
-    too large for its sine; raise NotBuiltError if the extension is not built.
+    Raise InputError if the compiler lacks this arithmetic, or an angle in the torque is too large
+    for its sine, and NotBuiltError if the extension is not built.
     """
     if word.p > 53:
         _check_angles(scene)
@@ -134,7 +134,7 @@ def n_bytes(word: Word) -> int:
 
 
 def to_bytes(numbers: Iterable[Any], word: Word, *shape: int) -> Bytes:
-    """Return numbers of the format `word` as an array of bytes, shape (n_bytes(word), *shape).
+    """Return numbers of the format `word` as bytes, in an array of shape (n_bytes(word), *shape).
 
     `numbers` and the result are in column-major order.
     """
@@ -145,7 +145,7 @@ def to_bytes(numbers: Iterable[Any], word: Word, *shape: int) -> Bytes:
 
 
 def from_bytes(given: Bytes, word: Word) -> NDArray[np.object_]:
-    """Return the numbers that `to_bytes` converted to bytes."""
+    """Return the numbers that `to_bytes` converted."""
     patterns = (each.tobytes() for each in given.reshape(n_bytes(word), -1, order="F").T)
     found = [_number(int.from_bytes(each, sys.byteorder), word) for each in patterns]
     return np.array(found, dtype=object).reshape(given.shape[1:], order="F")

@@ -1,4 +1,4 @@
-"""A replacement for LEQT1F of the IMSL library, which solves A X = B.
+"""A replacement for IMSL's LEQT1F, which solves A X = B.
 
 It computes LU factors in Crout's order, with implicit row scaling and partial pivoting.
 """
@@ -9,10 +9,10 @@ SINGULAR = 129
 def leqt1f(
     matrix: list[list[float]], right_hand_sides: list[list[float]]
 ) -> tuple[list[list[float]], int]:
-    """Return the solutions x of A x = b for each right-hand side b, and the error code IER.
+    """Return the solution of A x = b for each right-hand side b, and the error code IER.
 
-    If A is singular within rounding, IER is `SINGULAR` (129), and each b is returned in place of
-    its x; otherwise IER is 0.
+    If A is singular within rounding, IER is 129 and each b is returned unsolved; otherwise IER is
+    0.
     """
     factors = [list(row) for row in matrix]
     pivots = _factor(factors)
@@ -60,7 +60,6 @@ def _factor(a: list[list[float]]) -> list[int] | None:
 
 
 def _substitute(a: list[list[float]], pivots: list[int], b: list[float]) -> list[float]:
-    """Return the solution x of A x = b from the results of `_factor`."""
     n = len(a)
     x = list(b)
     for i, row in enumerate(a):

@@ -38,7 +38,7 @@ _NOT_REACHED = -1
 class ProgramEnsemble(BatchResult):
     """The results of a program of the thesis for n bodies at m requested steps.
 
-    If a body's run ended before a requested step, its values there are NaN, in `ier` -1.
+    After the end of a body's run, its values are NaN, in `ier` -1.
 
     Attributes
     ----------
@@ -47,21 +47,21 @@ class ProgramEnsemble(BatchResult):
     status : ndarray of int8, shape (n,)
         How each run ended: COMPLETE, STOPPED or OVERFLOW of `pyharness.model.codes.Statuses`.
     at : ndarray of int, shape (m,)
-        The requested steps, counted from 1.
+        The requested steps, from 1.
     velocity : ndarray, shape (n, m, 3), or None
-        Translational velocity along the body axes, m/s; None if it was not requested.
+        Translational velocity along the body axes, m/s; None if not requested.
     recorded_time : ndarray, shape (m,), or (n, m) if the bodies have different step sizes
         The program's variable TIME, s. With shape (m,), it is NaN at a step that no body reached.
     n_rows : ndarray of int32, shape (n,)
-        The number of steps with a result in each body's run, requested or not.
+        Number of steps with a result in each run, requested or not.
     stop_variable : ndarray of int8, shape (n,)
         The variable that failed the stop test, or 0: 1-3 for U1-U3 (omega), 4-6 for V1-V3
-        (velocity), 7 for the norm of U, 8 for the norm of U and V.
+        (velocity), 7 for the norm of U, 8 for that of U and V.
     stop_quotient : ndarray, shape (n,)
         Change of the right-hand side over change of the variable (1/s); infinite if the variable
-        did not change, NaN if the stop test did not end the run.
+        did not change, NaN without a stop.
     ier : ndarray of int32, shape (n, m), or None
-        The error code of the linear solver in the collocation programs; None for Runge-Kutta.
+        Error code of the linear solver in the collocation programs; None for Runge-Kutta.
     """
 
     at: NDArray[np.int32]
@@ -202,10 +202,7 @@ def _run(
     scene: Scene, listing: Listing, by_moments: bool, inputs: dict[str, Array], n: int,
     wanted: NDArray[np.int32], may_stop: bool, velocity: bool, threads: int,
 ) -> ProgramEnsemble:  # fmt: skip
-    """Run a compiled program for n bodies; the arguments are already checked.
-
-    `inputs` has the arrays of `run_many` by name; "body" is the array of moments or of A, B, C.
-    """
+    """Run a program; `inputs` has arrays by name, with "body" for moments or coefficients."""
     program = extension().run_programs
     one_step_size = bool((inputs["step_size"] == inputs["step_size"].flat[:1]).all())
     rows = (spread(each, n) for each in inputs.values())

@@ -1,8 +1,8 @@
-"""Counts of the floating-point operations in a step of a program, from its cards.
+"""Counts of the floating-point operations in a step of a program.
 
-The author's statements are interpreted, and our version of LEQT1F is called, with numbers that
-count the operations on them. `T**2` counts as one multiplication, `T**3` and `T**4` as two each.
-Subscripts, jumps, ABS and WRITE do not count.
+The author's statements and our LEQT1F are executed with numbers that count operations. `T**2`
+counts as one multiplication, `T**3` and `T**4` as two each. Subscripts, jumps, ABS and WRITE do not
+count.
 """
 
 import operator
@@ -29,10 +29,9 @@ ALIKE = dict.fromkeys(_OPERATIONS, 1)
 
 
 class Count(NamedTuple):
-    """The number of additions, subtractions, multiplications and divisions in a step.
+    """The number, or time, of additions, subtractions, multiplications and divisions in a step.
 
-    `written` counts every operation on the cards; `once` counts repetitions with the same operands
-    only once. If operations are weighted with times, both are times.
+    `written` counts every operation on the cards; `once` omits repetitions with the same operands.
     """
 
     written: int
@@ -40,8 +39,6 @@ class Count(NamedTuple):
 
 
 class _Counter:
-    """A counter of operations that stores the result of each distinct operation."""
-
     def __init__(self, times: Mapping[str, int]) -> None:
         self.times, self.written = times, 0
         self.known: dict[tuple[Any, ...], _Number] = {}
@@ -64,8 +61,6 @@ def _operator(name: str, reflected: bool = False) -> Callable[["_Number", Any], 
 
 
 class _Number(float):
-    """A floating-point value, with the counter of the operations on it."""
-
     counter: _Counter
 
     def __new__(cls, counter: _Counter, value: float) -> "_Number":
@@ -92,10 +87,9 @@ class _Array(defaultdict[tuple[int, ...], Any]):
 
 
 def operations_per_step(listing: Listing, times: Mapping[str, int] = ALIKE) -> Count:
-    """Return the operations of a listing's program in its first step.
+    """Return the operations in a listing's first step, for the data on the published cards.
 
-    The scene is the case on the published cards. `times` has the weight of each operation, such as
-    its unit time on a machine.
+    `times` has the weight of each operation, such as its time on a machine.
     """
     statements = statements_of(deck_text(listing).splitlines())
     begin = next(n for n, (_, text) in enumerate(statements) if _DO.match(text))

@@ -1,8 +1,8 @@
-"""The output of a program, the printed page and TAPE5, made from its trajectory.
+"""The printed page and the file TAPE5 of a program, made from its trajectory.
 
-The page omits the first character of each record, the carriage control, which is always a blank.
-`data/printer.toml` has the FORMATs, and marks their conjectural parts. The package `fortranformat`
-writes the values, except negative zeros and values that are not finite.
+The page omits each record's carriage control, a blank. `data/printer.toml` has the FORMATs, and
+marks their conjectural parts. The package `fortranformat` writes all values except negative zeros
+and values that are not finite.
 """
 
 import math
@@ -31,9 +31,9 @@ _PLACES = re.compile(r"F\d+\.(\d+)")
 def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
     """Return the text that `program` prints for its run.
 
-    The page has the moments and torques of `scene`, which must have moments, then a line for each
-    row of `trajectory`. If the stop test ended the run, the last line is the step that failed it.
-    Lines have no trailing blanks.
+    The moments and torques of `scene`, which must have moments, precede a line for each step. If
+    the stop test ended the run, the last line is the step that failed it. Lines have no trailing
+    blanks.
     """
     formats = formats_of(program)
     assert scene.moments is not None
@@ -49,14 +49,11 @@ def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
 
 
 def _printed_rows(trajectory: Trajectory, form: str) -> list[list[float]]:
-    """Return omega (rad/s) and velocity (m/s) of each row, as six floats.
-
-    Numbers of another arithmetic than binary64 are first rounded to the decimals of the FORMAT
-    `form`, so that the floats are printed as these numbers would be.
-    """
+    """Return omega (rad/s) and velocity (m/s) by row, as floats that print like exact numbers."""
     if trajectory.exact is None:
         assert trajectory.velocity is not None
         return np.hstack([trajectory.omega, trajectory.velocity]).tolist()  # type: ignore[no-any-return]
+    # Numbers of another arithmetic than binary64 are first rounded to the decimals of the FORMAT.
     (places,) = {int(each) for each in _PLACES.findall(form)}
     return [[_to_places(x, places) for x in row[2:]] for row in trajectory.exact.tolist()]
 
@@ -76,14 +73,14 @@ def _to_places(x: Any, places: int) -> float:
 def formats_of(program: str) -> dict[str, Any]:
     """Return a program's FORMATs: ``header`` (moments, torques), ``heads`` and ``rows``.
 
-    Further keys name their cards, and mark their characters as certain or conjectural.
+    Other keys name the FORMATs' cards, and mark characters as certain or conjectural.
     """
     programs: list[dict[str, Any]] = facts("printer")["program"]
     return next(each for each in programs if each["name"] == program)
 
 
 def write(text: str, values: Sequence[float]) -> list[str]:
-    """Return the records, with carriage control, of a WRITE of `values` with the FORMAT `text`."""
+    """Return the records of a WRITE of `values` with the FORMAT `text`, with carriage control."""
     printed: str = _writer(text).write([x if math.isfinite(x) else _TOO_WIDE for x in values])
     return [_MINUS_ZERO.sub(r" \1", record) for record in printed.split("\n")]
 
@@ -100,12 +97,11 @@ TAPE5 = np.dtype([("head", "<i4"), ("items", "<f8", (7,)), ("tail", "<i4")])
 
 
 def tape5(trajectory: Trajectory) -> bytes:
-    """Return the bytes of TAPE5 for a trajectory with translational velocities.
+    """Return the bytes of the file TAPE5 for a trajectory with translational velocity.
 
-    TAPE5 is a file of unformatted sequential records. Each WRITE(5)TIME,U1,U2,U3,V1,V2,V3 is one
-    record: its length in bytes, seven binary64 numbers, and the length again, all little-endian, as
-    in today's Fortran compilers and `scipy.io.FortranFile`. The author's tape had other record
-    marks and, as we infer, words of 60 bits.
+    Each WRITE(5)TIME,U1,U2,U3,V1,V2,V3 makes a record: its length in bytes, seven binary64 numbers,
+    and the length again, all little-endian, as with today's compilers and `scipy.io.FortranFile`.
+    The author's tape had other record marks and, as we infer, words of 60 bits.
     """
     assert trajectory.velocity is not None
     result = np.empty(len(trajectory.time), dtype=TAPE5)

@@ -1,4 +1,4 @@
-"""The three programs of the appendix, run as compiled programs or as their Python ports."""
+"""The three programs of the appendix, compiled or as Python ports."""
 
 import importlib
 from dataclasses import dataclass
@@ -41,7 +41,7 @@ class Program:
         effort: float = 1.0,
         word: str = BINARY64,
     ) -> Trajectory:
-        """Run this program and return its trajectory; see `run_program`.
+        """Run the program and return its trajectory; see `run_program`.
 
         Raise InputError also if the listing belongs to another program.
         """
@@ -79,7 +79,7 @@ class Program:
 
 
 def work_of(word: str, implementation: str) -> str:
-    """Return the key of an arithmetic and implementation in the work limits of `check_steps`."""
+    """Return the key of an arithmetic and implementation in `check_steps`' work limits."""
     if word == BINARY64:
         return implementation
     return "another word" if implementation == "python" else word

@@ -1,7 +1,7 @@
 """Runge-Kutta: the third program of the appendix, Jacobs 1982, eq. 31 and IV.3.
 
-The stop test uses the Lipschitz condition (eq. 19): it ends a run if, within a step, the change of
-the right-hand sides exceeds a constant times the change of the unknowns.
+The stop test (Lipschitz condition, eq. 19) ends a run if the right-hand sides change in a step by
+more than a constant times the change of the unknowns.
 """
 
 import math
@@ -24,10 +24,7 @@ from pyharness.thesis.equations import (
 def run(
     scene: Scene, listing: Listing, lipschitz: float = 500.0, may_stop: bool = True
 ) -> Trajectory:
-    """Run the program on a scene, and return its trajectory.
-
-    `lipschitz` is the constant of the stop test (1/s), which is omitted unless `may_stop`.
-    """
+    """Run the program on a scene; `lipschitz` (1/s) is the constant of its stop test."""
     a, b, c = scene.euler_coefficients
     acceleration = accelerations(scene, listing)
     dt = scene.step_size
@@ -107,9 +104,9 @@ def lipschitz_test(
     """Return a variable that violates eq. 19, and its quotient of changes (1/s), or None.
 
     `change_k` and `change_u` are absolute changes of the six right-hand sides and unknowns in a
-    step. The test compares their norms or, with the defect `lipschitz-per-component`, single
-    components: of omega and, with `lipschitz-tests-velocity`, the velocity. The quotient is
-    infinite if the unknown does not change.
+    step. The test compares norms or, with the defect `lipschitz-per-component`, components. Only
+    the defect `lipschitz-tests-velocity` includes the velocity. The quotient is infinite if the
+    unknown does not change.
     """
     velocity_counts = listing.has("lipschitz-tests-velocity")
     last = 6 if velocity_counts else 3

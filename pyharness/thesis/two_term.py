@@ -1,6 +1,6 @@
 """Two-term collocation: the first program of the appendix, Jacobs 1982, IV.2.
 
-The residual of the equations of motion is zero at one third and two thirds of each step.
+The collocation points are at one third and two thirds of each step.
 """
 
 from collections.abc import Sequence
@@ -15,10 +15,7 @@ from pyharness.thesis.equations import Vector, accelerations, omega_rate, veloci
 def run(
     scene: Scene, listing: Listing, lipschitz: float = 500.0, may_stop: bool = True
 ) -> Trajectory:
-    """Run the program on a scene, and return its trajectory.
-
-    `lipschitz` and `may_stop` have no effect: the program has no stop test.
-    """
+    """Run the program; without a stop test, `lipschitz` and `may_stop` have no effect."""
     a, b, c = scene.euler_coefficients
     unset_c1 = 0.0
     acceleration = accelerations(scene, listing)

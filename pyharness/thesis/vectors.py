@@ -1,11 +1,11 @@
 """Numbers and instructions of CDC machines in octal, and test vectors for their arithmetic.
 
-A CDC word has 60 bits: a sign bit, an exponent field of 11 bits, and a coefficient of 48 bits. All
-60 bits of a negative number are complemented. The exponent is the field minus 2000 (octal), plus
-one if the field is below 2000.
+A CDC word has a sign bit, an exponent field of 11 bits, and a coefficient of 48 bits. All bits of a
+negative number are complemented. The exponent is the field minus 2000 (octal), plus one if the
+field is below 2000.
 
 The test vectors in `data/words/cdc.json` follow from the CYBER 170 hardware reference, CDC
-60463560; a public emulator agrees with them. Such a file is a JSON object with `schema` and
+60463560; a public emulator agrees. A file of test vectors is a JSON object with `schema` and
 `vectors`. Each vector has `name`, `op` (an instruction of `operated`), and `x`, `y` and `result` in
 octal.
 """
@@ -53,12 +53,12 @@ class Answer(NamedTuple):
 
     @property
     def agrees(self) -> bool:
-        """Return whether our result equals the expected one; blanks are ignored."""
+        """Return whether our result equals the expected one, blanks ignored."""
         return "".join(self.vector.result.split()) == "".join(self.found.split())
 
 
 def answers(path: str | Path = OURS) -> list[Answer]:
-    """Return the vectors of a JSON file, with our results; raise InputError if it is invalid."""
+    """Return a JSON file's vectors with our results; raise InputError if it is invalid."""
     content = read_input(path, f"vectors '{path}'", _LARGEST, "a JSON file")
     try:
         data = json.loads(content)
@@ -90,11 +90,10 @@ def _answer(where: str, entry: Any) -> Answer:
 
 
 def from_octal(text: str) -> Pair:
-    """Return the number m 2**e that a CDC word of 20 octal digits represents, as the pair (m, e).
+    """Return the pair (m, e) of the number m 2**e in a CDC word of 20 octal digits.
 
-    Words with all bits 0 or all bits 1 are zero. For zero, infinity and nan, m is 0 and e is the
-    value as a float. Raise InputError if `text` is no such word, or its coefficient is not
-    normalised.
+    For zero (all bits 0 or all 1), infinity and nan, m is 0 and e is the value as a float. Raise
+    InputError if `text` is no such word, or its coefficient is not normalised.
     """
     digits = "".join(text.split()) if isinstance(text, str) else ""
     if not _WORD.fullmatch(digits):
@@ -130,8 +129,8 @@ def to_octal(number: Pair) -> str:
 def operated(name: str, x: str, y: str) -> str:
     """Return the result of a CDC instruction on the words `x` and `y`, all in octal.
 
-    `name` is FX (truncating) or RX (rounding) followed by +, -, * or /. A sum or difference is
-    normalised only if NX follows, as in ``RX+ NX``. Raise InputError for other names.
+    `name` is FX (truncating) or RX (rounding) with +, -, * or /. A sum or difference is normalised
+    only if NX follows, as in ``RX+ NX``. Raise InputError for other names.
     """
     if name not in _INSTRUCTIONS:
         raise unknown("instruction", name, _INSTRUCTIONS)

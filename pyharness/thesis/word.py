@@ -1,14 +1,13 @@
-"""Words: floating-point formats of p bits with a rounding rule, for runs of the Python ports.
+"""Floating-point formats of p bits with a rounding rule (words), for runs of the Python ports.
 
-A number of such a format has the operators of a float. The other operand may be an integer, a
-number of the same format, or a float, which is converted like a literal in a source text: from its
-shortest decimal representation.
+A number has the operators of a float. The other operand may be an integer, a number of the same
+format, or a float, converted like a literal in a source text: from its shortest decimal
+representation.
 
-The rules of arithmetic are functions of pairs of integers (m, e), for a number m 2**e; m has p
-bits, or fewer if the number is subnormal. If m is 0, e is the value as a float: 0.0, -0.0, inf,
--inf or nan. Operands of an `Operation` have m other than 0. No library has the rules of the CDC
-machines: gmpy2, SoftFloat and numpy round only as IEEE 754 does, and mpmath does not limit
-exponents.
+Arithmetic functions take integers m, e for a number m 2**e; m has p bits, fewer if the number is
+subnormal. In results, m may be 0; then e is the value as a float: 0.0, -0.0, inf, -inf or nan. No
+library has the CDC's rules: gmpy2, SoftFloat and numpy round only as IEEE 754, and mpmath does not
+limit exponents.
 """
 
 import math
@@ -34,8 +33,7 @@ class Rules(NamedTuple):
     """The arithmetic of a format, as functions of integers m and e.
 
     `nearest` (ties to even) rounds square roots, sines, cosines and literals; `cut` (towards zero)
-    rounds literals if the format truncates them. `difference` serves comparisons alone: two numbers
-    are equal if it is zero.
+    rounds literals if the format truncates them. `difference` serves only tests of equality.
     """
 
     nearest: Rounding
@@ -51,7 +49,7 @@ def rounding(p: int, least: int, most: int, cut: bool, gradual: bool) -> Roundin
     """Return a function that rounds m 2**e to p bits and an exponent from `least` to `most`.
 
     Rounding is towards zero if `cut`, else to nearest, ties to even. A larger exponent gives
-    infinity. A smaller one gives zero or, if `gradual`, a subnormal number or zero as in IEEE 754.
+    infinity; a smaller one gives zero or, if `gradual`, a subnormal number or zero as in IEEE 754.
     """
     shortened = _cut if cut else _to_even
 
@@ -91,8 +89,8 @@ def _to_even(m: int, shift: int) -> int:
 def ieee(p: int, largest: int, cut: bool) -> Rules:
     """Return the rules of IEEE 754 for p-bit coefficients and numbers below 2**(largest + 1).
 
-    If `cut`, sums, products and quotients are truncated towards zero. Results that are too large
-    become infinite, as on machines that truncated, although IEEE 754 requires the largest number.
+    If `cut`, sums, products and quotients are truncated towards zero. Too large results become
+    infinite, as on machines that truncated; IEEE 754 requires the largest number.
     """
     least, most = 2 - largest - p, largest - p + 1
     fit = rounding(p, least, most, cut, gradual=True)
@@ -123,12 +121,12 @@ def cdc(p: int, rounds: bool) -> Rules:
     """Return the arithmetic of the CDC 6600 and CYBER 70 for p-bit coefficients.
 
     The source is the CYBER 170 hardware reference, CDC 60463560. A number is an integer coefficient
-    of p = 48 bits and an exponent; a sum is formed in a register of 2 p bits, the frame. Without
-    `rounds`, sums, differences, products and quotients are truncated by the instructions FX (octal
-    30, 31, 40 and 44), else rounded by RX (34, 35, 41 and 45). There is no guard bit: the bits
-    below the unit of the larger operand are truncated before NX (24) normalises a sum.
+    of p = 48 bits and an exponent. Without `rounds`, the instructions FX (octal 30, 31, 40 and 44)
+    truncate sums, differences, products and quotients; else RX (34, 35, 41 and 45) round them. Sums
+    have no guard bit: bits below the unit of the larger operand are truncated before NX (24)
+    normalises a sum.
 
-    Literals are rounded to nearest, an assumption: no source states how CDC's FTN converted them.
+    Literals are rounded to nearest, an assumption: no source states the rule of CDC's FTN.
     """
     settled = rounding(p, _LEAST, _MOST, cut=True, gradual=False)
     quarter = 1 << p - 2 if rounds else 0
@@ -154,8 +152,8 @@ def cdc(p: int, rounds: bool) -> Rules:
 def framed(p: int, rounds: bool, xm: int, xe: int, ym: int, ye: int) -> tuple[int, int]:
     """Return the sum of xm 2**xe and ym 2**ye before normalisation, as a pair (frame, e).
 
-    The frame is in units of 2**(e - p), where e is the larger exponent. The operand with the
-    smaller exponent is shifted and truncated. If `rounds`, half a unit in the last place is first
+    The frame, a register of 2 p bits, is in units of 2**(e - p), where e is the larger exponent.
+    The other operand is shifted and truncated. If `rounds`, half a unit in the last place is first
     added to each operand, as RX does.
     """
     if xe <= ye:
@@ -178,7 +176,7 @@ def _quotient(x: float, y: float) -> float:
 def _operator(
     rule: str, of_floats: Callable[[float, float], float], negates: bool = False
 ) -> Callable[["Number", Any], "Number"]:
-    """Return the operator of `rule`, a field of Rules; if `negates`, it negates the operand."""
+    """Return the operator of `rule`, a field of Rules; `negates` negates its operand."""
 
     def operate(self: "Number", other: Any) -> "Number":
         own = self.__class__
@@ -197,7 +195,7 @@ def _comparison(compare: Callable[[float, float], bool]) -> Callable[["Number", 
 
 
 class Number:
-    """An immutable number of a floating-point format: the integer `m` times 2**`e`.
+    """A number of a floating-point format, the integer `m` times 2**`e`.
 
     If `m` is 0, `e` is the value as a float. `Word` makes a subclass for each format. The operators
     round their results; x/0 is infinite, 0/0 is nan.
@@ -232,13 +230,13 @@ class Number:
         return self.__class__(abs(self.m), self.e if self.m else abs(self.e))
 
     def __bool__(self) -> bool:
-        """Return whether the number is not zero; True for nan."""
+        """Return whether the number is nan or not zero."""
         return bool(self.m or self.e)
 
     def __eq__(self, other: object) -> bool:
         """Return whether the difference, computed in this format, is zero.
 
-        In a CDC word, two neighbouring numbers may have the difference zero.
+        The difference of two neighbouring CDC numbers may be zero.
         """
         x, y = self, self.word(other)
         if x.m and y.m:
@@ -272,7 +270,7 @@ class Number:
         return bool(self.m) or self.e == 0.0
 
     def fraction(self) -> Fraction:
-        """Return the exact value of a finite number as a fraction."""
+        """Return the exact value of a finite number."""
         return Fraction(self.m) * Fraction(2) ** self.e if self.m else Fraction(self.e)
 
     def sqrt(self) -> "Number":
@@ -306,11 +304,9 @@ class Number:
         return self.__class__(*self.rules.nearest(-int(m) if sign else int(m), e))
 
     def _special(self, operation: Callable[[float, float], float], other: "Number") -> "Number":
-        """Return the result of an operation with an operand that is zero, infinite or nan.
-
-        If the floats `_shadow` give a finite result other than 0, one operand was 0, and the other
-        is the result.
-        """
+        """Return the result of an operation with an operand that is zero, infinite or nan."""
+        # If the shadows give a finite result other than 0, one operand is 0, and the other is the
+        # result.
         found = operation(self._shadow, other._shadow)
         if found and math.isfinite(found):
             return self if self.m else other
@@ -321,13 +317,13 @@ class Number:
 
     @property
     def _shadow(self) -> float:
-        """Return a zero, infinity or nan as a float, any other number as its sign."""
+        """Return a zero, infinity or nan as a float, other numbers as their sign."""
         if self.m:
             return 1.0 if self.m > 0 else -1.0
         return float(self.e)
 
     def _order(self, other: Any) -> float:
-        """Return a number with the sign of self - other, exact; nan if an operand is nan."""
+        """Return a number with the exact sign of self - other; nan if an operand is nan."""
         x, y = self, self.word(other)
         if not (x.m and y.m):
             return 0.0 if x._shadow == y._shadow else x._shadow - y._shadow
@@ -340,9 +336,9 @@ class Word:
 
     `rule` is "nearest-even", "chop" (towards zero), or the CDC's "FX" (truncating) or "RX"
     (rounding). Except for FX and RX, numbers are below 2**(largest + 1), and the smallest exponent
-    follows from `largest` as in IEEE 754. By default `largest` is that of binary64 if p is at most
-    53, else that of binary128. With `cut_literals`, converted values are truncated towards zero.
-    Raise InputError for an unknown rule, or p below 4.
+    is that of IEEE 754. By default `largest` is that of binary64 if p is at most 53, else of
+    binary128. `cut_literals` truncates converted values towards zero. Raise InputError for an
+    unknown rule, or p below 4.
     """
 
     def __init__(
@@ -375,7 +371,7 @@ class Word:
     def __call__(self, value: Any) -> Number:
         """Return a float, integer, fraction, decimal text or `Number` as a number of this format.
 
-        Raise TypeError for any other type, and for a number of another format.
+        Raise TypeError for any other type or format.
         """
         if isinstance(value, Number) and value.word is self:
             return value

@@ -1,1 +1,1 @@
-"""Reference solutions of scenes in multiple precision, with bounds on their errors."""
+"""Reference solutions in multiple precision, with bounds on their errors."""

@@ -1,7 +1,7 @@
-"""Exact solution of a symmetric body with a torque along its axis, in decimal arithmetic.
+"""Exact solution of a symmetric body with a torque along its axis, in decimals.
 
-The spin is its initial value plus the integral of torque over moment; the other components rotate
-by an angle proportional to the integral of the spin.
+The spin about the axis is its initial value plus the integral of torque over moment. The other
+components rotate by an angle proportional to the integral of the spin.
 """
 
 import decimal
@@ -18,7 +18,7 @@ DIGITS = 50
 def axial_top(scene: Scene, times: Sequence[float]) -> list[Row]:
     """Return omega (rad/s) at `times` (s) of a body with I1 = I2 and its torque along axis 3.
 
-    Raise InputError for other moments or another torque.
+    Raise InputError for another body or torque.
     """
     law, moments = scene.body_torque, scene.moments
     vectors = [law.constant, law.rate, *(a for a, _ in law.sines + law.cosines)]

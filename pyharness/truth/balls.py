@@ -1,4 +1,4 @@
-"""Numbers of the enclosures: balls, power series of balls, complex balls, and their functions.
+"""Functions of balls, complex balls and power series of balls, for proved enclosures.
 
 A ball is an interval, stored as middle and radius. Each operation of python-flint returns a ball
 that contains the exact results for all numbers in the operands.
@@ -18,7 +18,7 @@ from pyharness.truth.enclosed import Balls
 
 
 def ball(x: Fraction) -> Any:
-    """Return a ball that contains a fraction, exactly if the precision suffices."""
+    """Return a ball that contains a fraction, exact if the precision suffices."""
     return arb(fmpq(x.numerator, x.denominator))
 
 
@@ -29,7 +29,7 @@ def fraction(x: Any) -> Fraction:
 
 
 def balls(row: Sequence[Any]) -> Balls:
-    """Return the exact middles of a row of balls, with the largest of their radii."""
+    """Return the exact middles of a row of balls, with their largest radius."""
     return Balls(tuple(map(fraction, row)), max(fraction(x.rad()) for x in row))
 
 
@@ -59,9 +59,9 @@ def _refuse(*_: Any) -> Any:
 
 
 def functions_at(time: Fraction, forward: bool) -> Functions[Any]:
-    """Return the functions of tapes (recorded operations) for a step from `time` (s).
+    """Return the functions that evaluate tapes (recorded operations) in a step from `time` (s).
 
-    A table is replaced by its piece after `time` if `forward`, else before it.
+    A table is evaluated by its piece after `time` if `forward`, else before it.
     """
 
     def table(each: Table, at: Any) -> Any:

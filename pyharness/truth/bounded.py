@@ -1,7 +1,7 @@
 """Error of the reference solution: a proved bound where a proof is cheap, else the estimate.
 
 A proof encloses the solution in balls (intervals, given by middle and radius). The largest distance
-between the reference and any point of the ball bounds the error.
+of the reference from any point of a ball bounds the error.
 """
 
 import math
@@ -47,11 +47,11 @@ class ErrorBound(NamedTuple):
     warning: str = ""
 
     def text(self, unit: str = "rad/s") -> str:
-        """Return the bound for omega, rounded up to two significant digits, with unit and basis."""
+        """Return the bound for omega as text: two digits, rounded up, with unit and basis."""
         return f"{' '.join(filter(None, (at_most(self.value), unit)))} ({self.basis})"
 
     def over(self, scale: float) -> "ErrorBound":
-        """Return the bound divided by `scale` (rad/s) unless that is 0; the angle is kept."""
+        """Return the bound for omega over `scale` (rad/s) unless that is 0; the angle is kept."""
         return self._replace(value=self.value / scale) if scale else self
 
     @property
@@ -92,9 +92,9 @@ def bound_of(
     any_torque: bool = False,
     effort: float | None = None,
 ) -> ErrorBound:
-    """Return the error bound of the reference `known` of a scene.
+    """Return the error bound of a scene's reference, `known`.
 
-    If `before_rounding`, the bound is for omega plus `remainder`, which rounding removed. Other
+    With `before_rounding`, the bound is for omega plus `known.remainder`, if there is one. Other
     options are those of `error_bound`.
     """
     exact = before_rounding and known.remainder is not None
@@ -126,7 +126,7 @@ def error_bound(
 ) -> ErrorBound:
     """Return the error bound of the reference at `times` (s).
 
-    `omega` (rad/s) and `remainder`, which is added to it, have the shape (n, 3), `attitude` (n, 4).
+    `omega` (rad/s) and `remainder`, which is added to it, have shape (n, 3), `attitude` (n, 4).
     `claimed` (rad/s) and `claimed_angle` (rad) are the estimates, returned where nothing is proved.
 
     The bound of omega is proved if the scene can have a certificate. With python-flint, both bounds
@@ -155,7 +155,7 @@ def _exact(omega: Array, remainder: Array | None) -> Sequence[Row]:
 
 
 def joined(found: Sequence[ErrorBound]) -> ErrorBound:
-    """Return the largest of the bounds in `found`, which must not be empty."""
+    """Return the largest of one or more bounds."""
     angles = [each.angle for each in found if each.angle is not None]
     bases = [each.angle_basis for each in found if each.angle_basis is not None]
     return ErrorBound(
@@ -172,7 +172,7 @@ def _common(bases: Sequence[str]) -> str:
 
 
 class _Statement(NamedTuple):
-    """Values of the reference at times on one side of 0, in order away from 0."""
+    """The reference at times on one side of 0, in order away from 0."""
 
     scene: Scene
     times: list[float]  # s
@@ -228,7 +228,7 @@ class _Statement(NamedTuple):
         return omega, attitude
 
     def _digits(self) -> int | None:
-        """Return how many digits make balls small against the estimate; None if more than 60."""
+        """Return the digits that make balls small against the estimate; None above 60."""
         largest = max(1.0, *(abs(float(x)) for row in self.omega for x in row))
         if not (0.0 < self.claimed < math.inf):
             # Omega is 0 at all times, or there is no estimate.
@@ -258,13 +258,11 @@ def _distance(x: float | Fraction, y: Fraction) -> float:
 def _extreme_angles(
     rows: Sequence[Sequence[Fraction]], found: Sequence[Balls]
 ) -> tuple[float, float]:
-    """Return a lower and an upper bound on the largest error (rad) of the quaternions `rows`.
-
-    The error is twice the angle between the lines of a row and of the true quaternion. This angle
-    is at most the sum of two. The first, between the row and the middle of its ball, has the sine
-    s; if s <= 1/2, it is less than s (1 + s**2). The second, between the middle and the true
-    quaternion, is at most arcsin(2 r) < 4 r, as each component differs by at most the radius r.
-    """
+    """Return a lower and an upper bound on the largest error (rad) of quaternions `rows`."""
+    # The error is twice the angle between the lines of a row and of the true quaternion. This angle
+    # is at most the sum of two. The first, between the row and the middle of its ball, has the sine
+    # s; if s <= 1/2, it is less than s (1 + s**2). The second, between the middle and the true
+    # quaternion, is at most arcsin(2 r) < 4 r, as each component differs by at most the radius r.
     least = most = 0.0
     for row, (middle, radius) in zip(rows, found, strict=True):
         inside = sum((x * y for x, y in zip(row, middle, strict=True)), Fraction(0))

@@ -1,7 +1,6 @@
 """Proved enclosures of omega by Taylor steps in integer arithmetic, and their certificates.
 
-`certificate_checker` explains the bound on the error of a step, and verifies a certificate without
-trusting this module.
+`certificate_checker` explains the error bound of a step, and verifies a certificate independently.
 """
 
 import math
@@ -58,11 +57,11 @@ class Proof:
 
 
 class _AmplifiedError(Exception):
-    """Signal that amplified errors require further digits, whose number is the argument."""
+    """Signal that amplified errors require further digits; the argument is their number."""
 
 
 def has_certificate(scene: Scene) -> bool:
-    """Return whether a scene has constant moments, and a torque law about the body's axes."""
+    """Return whether moments or coefficients are constant, and the torque is a law in body axes."""
     constant = scene.changing is None and scene.inertia is None
     return constant and isinstance(scene.torque, TorqueLaw) and not scene.torque.in_space
 
@@ -76,9 +75,9 @@ def prove(
 ) -> Proof:
     """Return balls that contain omega at `times` (s), and their certificate.
 
-    A radius is at most 10**-digits rad/s, times the largest component of omega if that exceeds 1
-    rad/s. `effort` is a factor on the work limit. Raise InputError if the scene can't have a
-    certificate, omega grows without bound, or the limit is exceeded.
+    A radius is at most 10**-digits times the larger of 1 rad/s and the largest component of omega.
+    `effort` is a factor on the work limit. Raise InputError if the scene can't have a certificate,
+    omega grows without bound, or the limit is exceeded.
     """
     if not has_certificate(scene):
         raise InputError(
@@ -154,10 +153,7 @@ class _Run:
         self.omega: list[Balls] = []
 
     def prove(self, limit: float, effort: float, progress: Progress, early: float) -> None:
-        """Compute the steps up to the last time, and the balls of omega.
-
-        Raise _AmplifiedError if, after the fraction `early` of the time, the radius grows too fast.
-        """
+        """Compute all steps; raise _AmplifiedError if radii grow too fast after part `early`."""
         system, clock = self._system, self._clock
         middle = [int(Fraction(x) * (1 << self._bits)) for x in self._record["omega"]]
         waves = [0, 1 << self._bits] * len(system.frequencies)
@@ -206,7 +202,7 @@ class _Run:
     def _expected_excess(
         self, radius: int, source: int, middle: Sequence[int], share: float
     ) -> float:
-        """Return by how many digits the radius will be too large at the end, by extrapolation."""
+        """Return the excess digits of the final radius, by extrapolation."""
         amplified = self._amplified
         total = amplified[-1][1] + math.log10(radius) - math.log10(source)
         amplified.append((share, total))
@@ -225,7 +221,7 @@ class _Run:
         return source, 8 * source + thick + 8
 
     def _add_balls(self, series: list[list[int]], radius: int, time: int, h: int) -> None:
-        """Add the balls at the requested times in a step, or at its beginning if h is 0."""
+        """Add balls at the requested times in a step, or at its beginning if h is 0."""
         unit = 1 << self._bits
         for t in self._times[len(self.omega) :]:
             passed = t * (1 << self._clock) - time

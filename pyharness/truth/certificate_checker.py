@@ -1,13 +1,12 @@
 """Check a certificate: a proof that balls contain the solution of Euler's equations.
 
 The program imports only Python's standard library, and computes with integers. Its arguments are
-files of certificates; it prints the scenes and rows that they prove. The exit status is 1 unless
-all certificates hold.
+files of certificates; it prints what they prove. The exit status is 1 unless all certificates hold.
 
 The equations are y' = f(t, y) for the angular velocity omega, and for the sines and cosines of the
-torque. In a step of length h, a polynomial p(s), s from 0 to 1, approximates the solution: the
-Taylor series with coefficients rounded down. Any polynomial would do, because the proof bounds its
-residual d = p' - h f(p).
+torque. In a step h, a polynomial p(s), s from 0 to 1, approximates the solution: the Taylor series
+with coefficients rounded down. Any polynomial is allowed, because the proof bounds its residual d =
+p' - h f(p).
 
 The error e = y - p obeys |e|' <= h mu |e| + |d| (Dahlquist 1958), where mu bounds the logarithmic
 norm of the Jacobian of f in a tube around p. The resulting bound on |e|, the radius of the step,
@@ -38,7 +37,7 @@ Expansion = tuple[list[list[int]], list[int], int]
 
 
 class NotProvedError(ValueError):
-    """The exception for a certificate that does not prove what it states."""
+    """Signal that a certificate does not prove what it states."""
 
 
 def over(numerator: int, denominator: int) -> int:
@@ -50,9 +49,9 @@ class System:
     """Euler's equations of a scene, with integer coefficients: equations 13-15 of the thesis.
 
     They are D y_i' = P y_j y_k + C + R t + sum over f of (S s_f + G c_f), with i, j, k in cyclic
-    order. Each frequency f of the torque adds its sine s_f and cosine c_f as unknowns, with s_f' =
-    f c_f and c_f' = -f s_f. An entry of `rows` is D, and a list of P, C, R and of S, G for each
-    frequency.
+    order. Each frequency f of the torque adds the unknowns s_f (sine) and c_f (cosine), with s_f' =
+    f c_f and c_f' = -f s_f. An entry of `rows` is D, and a list of P, C, R and each frequency's S,
+    G.
     """
 
     def __init__(self, scene: dict[str, Any], bits: int, clock: int, scales: Sequence[int]) -> None:
@@ -82,7 +81,7 @@ class System:
         self.factors = [abs(parts[i] + parts[j]) * scales[i] * scales[j] / 2 for i, j in pairs]
 
     def expand(self, state: Sequence[int], time: int, h: int, order: int) -> Expansion:
-        """Return Taylor series, and bounds on the residuals of omega and of sines and cosines."""
+        """Return a step's Taylor series, and residual bounds of omega and of sines and cosines."""
         series, bits, clock, wave_residual = [[x] for x in state], self.bits, self.clock, 0
         # Coefficient k is rounded down by less than 1, which changes the residual by less than k.
         rounding = order * (order + 1) // 2
@@ -142,7 +141,7 @@ class System:
     def radii(
         self, radius: int, wave_radius: int, expansion: Expansion, tube: int, h: int
     ) -> tuple[int, int]:
-        """Return error bounds of omega and of the waves in a step, or raise NotProvedError."""
+        """Return error bounds of omega and of sines and cosines, or raise NotProvedError."""
         series, residuals, wave_residual = expansion
         growth = self.growth(series, tube, h)
         if growth > 2 * UNIT:
@@ -211,7 +210,7 @@ def fits(value: Any, form: Any) -> bool:
 
 
 def check(certificate: dict[str, Any]) -> int:
-    """Return the number of steps of a certificate; raise NotProvedError if it does not hold."""
+    """Return a certificate's number of steps; raise NotProvedError if it does not hold."""
     scene = certificate["scene"]
     body = "coefficients" if "coefficients" in scene else "moments"
     if not fits(certificate, {**FORM, "scene": {**SCENE, body: (EXACT,) * 3}}):
@@ -247,7 +246,7 @@ def check(certificate: dict[str, Any]) -> int:
 
 
 def check_file(name: str, text: str | None = None) -> tuple[dict[str, Any] | None, str]:
-    """Return the certificate in a file, or in `text`, and ""; else None and why it fails."""
+    """Return the certificate in a file, or in `text`, and ""; if it fails, None and the reason."""
 
     def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         return dict(pairs) if len(dict(pairs)) == len(pairs) else {"a key occurs twice": None}

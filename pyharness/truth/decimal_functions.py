@@ -13,7 +13,7 @@ Row = list[Decimal]
 
 
 def sine_cosine(angle: Decimal) -> tuple[Decimal, Decimal]:
-    """Return the sine and the cosine of an angle (rad) of any size."""
+    """Return sine and cosine of an angle (rad) of any size."""
     with decimal.localcontext() as context:
         context.prec += 12 + max(0, angle.adjusted())
         angle = angle.remainder_near(2 * pi(context.prec))
@@ -54,7 +54,7 @@ def arctan(x: Decimal) -> Decimal:
 
 
 def arcsin(x: Decimal) -> Decimal:
-    """Return the angle (rad) whose sine is x; raise ArithmeticError beyond 1."""
+    """Return the angle (rad) whose sine is x; raise ArithmeticError if abs(x) > 1."""
     if abs(x) >= 1:
         if abs(x) > 1:
             raise decimal.InvalidOperation
@@ -83,10 +83,7 @@ def _arctan_inverse(n: int) -> Decimal:
 
 
 def product(x: Row, reversed_y: Row) -> Decimal:
-    """Return coefficient k of the product of two series, from their coefficients 0 to k.
-
-    The second series is in reverse order.
-    """
+    """Return coefficient k of a product of series from coefficients 0 to k, the second reversed."""
     if x and not x[-1]:
         # Series of polynomials end in many zeros, which change no digit of the sum.
         n = len(x) - 1

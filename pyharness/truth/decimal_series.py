@@ -50,7 +50,7 @@ def taylor_series(
     norm of the scene's quaternion. `coefficients` are A, B and C; `order` is the degree of the
     series, which high powers in the torque may increase; `tolerance` is local and relative.
     `effort` is a factor on a work limit of some ten seconds; None means 100 000 steps, fewer if the
-    torque depends on the state. `start` replaces the scene's initial state.
+    torque depends on the state. `start` replaces the initial state.
     """
     equations, limit = _Equations(scene, coefficients, velocity), _Limit(scene, effort)
     tape = equations.tape
@@ -143,11 +143,9 @@ class _Limit:
         self._before: tuple[int, Decimal] = (0, Decimal(0))
 
     def check(self, step: int, stops: int, begin: Decimal, length: Decimal, rest: Decimal) -> None:
-        """Raise InputError if the number of steps, so far or by forecast, exceeds the limit.
-
-        `stops` counts the steps that ended early at a change of a table, `step` all others.
-        `begin`, `length` (of the next step) and `rest` are in s.
-        """
+        """Raise InputError if the number of steps, so far or by forecast, exceeds the limit."""
+        # `stops` counts the steps that ended early at a change of a table, `step` all others.
+        # `begin`, `length` (of the next step) and `rest` are in s.
         if step + stops >= self._most:
             self._refuse(stops + (self._forecast(step, abs(begin), rest) if step else 0))
         elif step == 0:
@@ -167,12 +165,10 @@ class _Limit:
                 self._before = step, abs(begin)
 
     def _forecast(self, step: int, begin: Decimal, rest: Decimal) -> Decimal:
-        """Return the expected number of steps until the end.
-
-        `begin` (s) is the time after `step` steps, `rest` (s) the remaining time. The mean length
-        of a step is assumed to remain. If the number of steps grew with a power of time above 1.3,
-        it is extrapolated with this power, at most 3.
-        """
+        """Return the expected number of steps until the end."""
+        # `begin` (s) is the time after `step` steps, `rest` (s) the remaining time. The mean length
+        # of a step is assumed to remain. If the number of steps grew with a power of time above
+        # 1.3, it is extrapolated with this power, at most 3.
         step_before, begin_before = self._before
         power = Decimal(1)
         if 0 < step_before < step:
@@ -193,7 +189,7 @@ class _Limit:
 
 
 def _torque_work(scene: Scene) -> int:
-    """Return the work for the torque, in fifths of a step without torque."""
+    """Return the torque's work, in fifths of a step without torque."""
     if isinstance(scene.torque, StateTorque) and scene.torque.tape is not None:
         return series_products(scene.torque.tape)
     law = _law_of(scene)
@@ -207,11 +203,9 @@ def _law_of(scene: Scene) -> TorqueLaw:
 
 
 def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal, leading: int = 3) -> Decimal:
-    """Return the length (s), at most `rest`, of a step whose last two Taylor terms are small.
-
-    They are at most `tolerance` times the largest of the first `leading` unknowns or, if these are
-    0, times one of their next four Taylor terms.
-    """
+    """Return the length (s), at most `rest`, of a step whose last two Taylor terms are small."""
+    # The terms are at most `tolerance` times the largest of the first `leading` unknowns or, if
+    # these are 0, times one of four Taylor terms, from their first that is not 0.
     order = len(coefficients[0]) - 1
     begun = next((j for j in range(order - 1) if _size(coefficients, j, leading)), None)
     length = rest
@@ -244,11 +238,9 @@ def _is_continued(
     length: Decimal,
     tolerance: Decimal,
 ) -> bool:
-    """Return whether the rates at the end of a step agree with the derivative of the Taylor series.
-
-    They disagree after a pulse of the torque that is invisible at the beginning of the step.
-    Rounding differences, which the last of the `equations` show, are allowed.
-    """
+    """Return whether the rates at the end of a step agree with the Taylor series' derivative."""
+    # A pulse of the torque that is invisible at the beginning of the step makes them disagree. The
+    # last of the `equations` shows the effect of rounding.
     slopes = _evaluate([[k * x for k, x in enumerate(row)][1:] for row in series], length)
 
     def rates(which: _Equations, factor: Decimal) -> Row:
@@ -270,16 +262,16 @@ def _is_continued(
 
 
 def divisors(scene: Scene) -> tuple[Fraction, Fraction, Fraction]:
-    """Return the exact moments of inertia (kg m2), or 1 for a body with coefficients."""
+    """Return the exact moments (kg m2), or 1 for a body with coefficients."""
     return scene.exact_moments or (Fraction(1), Fraction(1), Fraction(1))
 
 
 class _Equations:
     """The equations of one scene as recurrences of Taylor coefficients.
 
-    `velocity` adds dV/dt = F/m - omega x V, with force F and mass m; an attitude adds dq/dt =
-    q (0, omega)/2. For a changing inertia I and a torque N the equations are (I omega)' = N - omega
-    x (I omega); otherwise `coefficients` are A, B, C. `TapeSeries` explains `change`, `results`.
+    `velocity` adds dV/dt = F/m - omega x V, with force F and mass m; an attitude adds dq/dt = q (0,
+    omega)/2. A changing inertia I and torque N give (I omega)' = N - omega x (I omega); otherwise
+    `coefficients` are A, B, C. `TapeSeries` explains `change` and `results`.
     """
 
     def __init__(
@@ -304,10 +296,7 @@ class _Equations:
         self._acceleration = [Decimal(force) / Decimal(scene.masses[0]) for force in scene.forces]
 
     def expand(self, time: Decimal, state: Row, order: int, forward: bool) -> list[Row]:
-        """Return the Taylor coefficients 0 to `order` of all unknowns around `time` (s).
-
-        At a break of a table, they hold after `time` if `forward`, else before it.
-        """
+        """Return all unknowns' Taylor coefficients to `order`; `forward` selects a break's side."""
         series = [[x] for x in state]
         torque = self._torque_series(time, order, series, forward)
         elements = [] if self._changing is None else self._changing.elements
@@ -340,7 +329,7 @@ class _Equations:
     def _torque_series(
         self, time: Decimal, order: int, series: list[Row], forward: bool
     ) -> Callable[[int], Row]:
-        """Return a function for coefficient k of torque over moments; call it with k = 0, 1, ..."""
+        """Return a function for coefficient k of torque over moments, k = 0, 1, ... in order."""
         if self.tape is not None:
             tape, moments = self.tape, self._moments
             tape.begin(time, series[:3], series[-4:] if self._attitude else [], forward)
@@ -391,11 +380,9 @@ def _rates_by_momentum(
     series: list[Row],
     backward: list[Row],
 ) -> Row:
-    """Return Taylor coefficient k of the derivative of omega, from L' = N - omega x L.
-
-    `torque` is coefficient k of N. `momentum` (L = I omega), `series` (omega) and `inertia` (I)
-    have coefficients 0 to k; `backward` is `series` reversed.
-    """
+    """Return Taylor coefficient k of omega', from L' = N - omega x L with momentum L, torque N."""
+    # `torque` is coefficient k of N. `momentum` (L = I omega), `series` (omega) and `inertia` (I)
+    # have coefficients 0 to k; `backward` is `series` reversed.
     right = []
     for i in range(3):
         j, m = (i + 1) % 3, (i + 2) % 3
@@ -427,7 +414,7 @@ def _triple(x: Row, y: Row, z: Row) -> Decimal:
 
 
 def _attitude_rates(q: list[Row], omega: list[Row]) -> Row:
-    """Return coefficient k of q (0, omega)/2, from those of q and, in reverse order, of omega."""
+    """Return coefficient k of q (0, omega)/2; `omega` has coefficients k to 0."""
     (a, b, c, d), (x, y, z) = q, omega
     return [
         (-product(b, x) - product(c, y) - product(d, z)) / 2,

@@ -1,6 +1,6 @@
-"""Switches of a recorded torque, such as floor, in decimal arithmetic; steps end at their jumps.
+"""Discontinuous functions (switches), such as floor, of a recorded torque in decimal arithmetic.
 
-`pyharness.model.tape` explains tapes and slots.
+Steps end at the jumps. `pyharness.model.tape` explains tapes and slots.
 """
 
 from decimal import Decimal, getcontext
@@ -21,11 +21,10 @@ _TOGETHER = Decimal("1e-15")  # relative difference of roots that count as one
 
 
 class Switches:
-    """The results of the switches of a tape, in `results` by slot.
+    """The switches of a tape, with their `results` by slot.
 
-    A switch changes where its operand crosses a level: 0, or a whole number for a floor. `_levels`
-    has the slots whose operands are at a level: -1 if the switch has its result above the level, 1
-    if it has its result below.
+    The result of a switch jumps where its operand crosses a level: 0, or an integer for a floor. At
+    a level, `_levels` has the slot: -1 if the result is that above the level, 1 if that below.
     """
 
     def __init__(self, tape: TapeSeries) -> None:
@@ -56,10 +55,9 @@ class Switches:
         return False
 
     def turns(self, time: Decimal, length: Decimal) -> bool:
-        """Change the result of an operand that moves to the other side of its level.
+        """Change the first result whose operand moves to the other side of its level.
 
-        Return whether a result was changed. Raise TimedError if the operand moves so with either
-        result.
+        Return whether there was one. Raise TimedError if either result makes the operand do so.
         """
         for slot, is_floor, x in self._tape.operands_of_switches():
             level = self._levels.get(slot)
@@ -80,7 +78,7 @@ class Switches:
         return False
 
     def end(self, length: Decimal) -> Decimal:
-        """Return the step (s), shortened until operands' series converge, or to the first jump."""
+        """Return a step (s) in which operands' series converge, up to the first jump."""
         while any(self._is_unresolved(x, length) for *_, x in self._tape.operands_of_switches()):
             length *= Decimal("0.75")
         roots = []
@@ -104,7 +102,7 @@ class Switches:
         return first.copy_sign(length)
 
     def step(self, is_whole: bool) -> None:
-        """Change the results that jump at the end of a step, if it `is_whole` (not shortened)."""
+        """Change the results that jump at the end of a step if it `is_whole`, not shortened."""
         self._levels = {}
         if is_whole:
             for slot, level in self._next.items():
@@ -120,10 +118,7 @@ class Switches:
 
 
 def _first_root(terms: Row, length: Decimal, side: int) -> Decimal | None:
-    """Return the first place up to `length` where a series gets the sign opposite to `side`.
-
-    Roots are eigenvalues of the companion matrix in binary64, corrected by Newton's method.
-    """
+    """Return the distance to the first root in a step where a series loses the sign `side`."""
     scaled = [each * length**k for k, each in enumerate(terms)]
     if not scaled[0]:
         scaled = scaled[1:]
@@ -132,6 +127,7 @@ def _first_root(terms: Row, length: Decimal, side: int) -> Decimal | None:
         return None
     floats = np.array([float(each / size) for each in scaled])
     kept = np.flatnonzero(np.abs(floats) > 1e-25)
+    # Eigenvalues of the companion matrix in binary64, corrected below by Newton's method.
     found = np.roots(floats[: kept[-1] + 1][::-1])
     near = found[(np.abs(found.imag) < _IMAGINARY) & (found.real > -1e-3) & (found.real < 1.001)]
     slopes = [k * each for k, each in enumerate(scaled)][1:]

@@ -1,7 +1,7 @@
 """Torque-free motion by Jacobi's elliptic functions in decimals.
 
-Unlike a Taylor series, they lose no digits with time, and flips (sign changes of omega near the
-separatrix) take no more work. The module shares no code with the closed form that it checks.
+Unlike Taylor series, these functions lose no digits with time, and flips (sign changes of omega
+near the separatrix) take no more work. No code is shared with the closed form that is checked.
 """
 
 import decimal
@@ -22,8 +22,8 @@ def torque_free(scene: Scene, time: float | Decimal, rounded: bool = False) -> R
     """Return omega (rad/s) of a scene without torque at `time` (s).
 
     If `rounded`, A, B and C are rounded to binary64. Raise InputError if the torque depends on the
-    state, or an unsteady motion may be unbounded. It is bounded if the body has moments, or at
-    least one of A, B, C is above 0 and one below.
+    state, or an unsteady motion may be unbounded. Without moments, at least one of A, B, C must
+    then be above 0 and one below.
     """
     i = checked_scene(scene).exact_moments
     a, w = [Fraction(x) for x in scene.euler_coefficients], [Fraction(x) for x in scene.omega]
@@ -69,12 +69,10 @@ def _solution(coefficients: Sequence[Fraction], start: Sequence[Fraction], time:
 
 
 def _general(a: Sequence[Fraction], omega: Sequence[Fraction], time: Decimal) -> Row:
-    """Return omega (rad/s) at `time` (s) if no coefficient is 0 and the second is negative.
-
-    The scaled components x, y, z (1/s) obey x' = y z, y' = -z x, z' = x y. Their integrals p = x**2
-    + y**2 and q = z**2 + y**2 are compared as fractions: on the separatrix, p = q, a rounding error
-    would cause flips.
-    """
+    """Return omega (rad/s) at `time` (s) if no coefficient is 0 and the second is negative."""
+    # The scaled components x, y, z (1/s) obey x' = y z, y' = -z x, z' = x y. Their integrals p =
+    # x**2 + y**2 and q = z**2 + y**2 are compared as fractions: on the separatrix, p = q, a
+    # rounding error would cause flips.
     s1, s2, s3 = (abs(each) for each in a)
     squares = [s2 * s3, s1 * s3, s1 * s2]
     x2, y2, z2 = (f * w * w for f, w in zip(squares, omega, strict=True))
@@ -108,11 +106,9 @@ def _move_on_ellipse(a: Row, omega: Row, time: Decimal) -> Row:
 
 
 def _normal(start: Row, p: Fraction, q: Fraction, time: Decimal) -> Row:
-    """Return x, y, z (1/s) at `time` (s), where x' = y z, y' = -z x, z' = x y.
-
-    `start` has z other than 0; p = x**2 + y**2 is not 0, and q = z**2 + y**2 is at least p. The
-    addition theorems of sn, cn and dn give the solution.
-    """
+    """Return x, y, z (1/s) at `time` (s), where x' = y z, y' = -z x, z' = x y."""
+    # The addition theorems of sn, cn and dn give the solution. `start` has z other than 0; p = x**2
+    # + y**2 is not 0, and q = z**2 + y**2 is at least p.
     x, y, z = start
     sign = -1 if z < 0 else 1
     root_p, root_q, k2 = to_decimal(p).sqrt(), to_decimal(q).sqrt(), to_decimal(p / q)
@@ -127,7 +123,7 @@ def _normal(start: Row, p: Fraction, q: Fraction, time: Decimal) -> Row:
 
 
 def jacobi(u: Decimal, comodulus: Decimal) -> tuple[Decimal, Decimal, Decimal]:
-    """Return sn, cn and dn of `u`; `comodulus` is 1 - k**2 with the modulus k.
+    """Return sn, cn and dn of `u` with the modulus k; `comodulus` is 1 - k**2.
 
     The method is the descending Landen transformation (Abramowitz and Stegun 16.12).
     """

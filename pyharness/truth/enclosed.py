@@ -22,9 +22,8 @@ class Balls(NamedTuple):
 class Enclosure:
     """Balls that contain the solution of one scene; quantities that were not requested are None.
 
-    The attitude is a unit quaternion, scalar first. The transition matrix has, row by row, the
-    derivatives of omega and of the quaternion, before it is normalised, with respect to omega at
-    time 0.
+    The attitude is a unit quaternion, scalar first. The state-transition matrix has, row by row,
+    the derivatives of omega and of the unnormalised quaternion with respect to omega at time 0.
     """
 
     time: tuple[float, ...]  # s
@@ -38,13 +37,13 @@ class Enclosure:
 
     @property
     def radius(self) -> float:
-        """The largest radius of the balls of omega (rad/s), rounded up."""
+        """The largest radius of omega's balls (rad/s), rounded up."""
         return max((rounded_up(each.radius) for each in self.omega), default=0.0)
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return a dictionary for JSON for each time, with decimals as strings.
+        """Return a dictionary for JSON for each time.
 
-        Each radius includes their rounding error.
+        Middles are decimal strings; radii include their rounding errors.
         """
         rows = []
         for n, time in enumerate(self.time):
@@ -72,7 +71,7 @@ def with_energy(scene: Scene, found: Enclosure) -> Enclosure:
 
 
 def row_of(time: float, omega: Balls) -> dict[str, Any]:
-    """Return the balls of omega at `time` (s) as a dictionary for JSON."""
+    """Return omega's balls at `time` (s) as a dictionary for JSON."""
     texts, radius = decimals(omega)
     return {"time": time, "omega": texts, "radius": radius}
 
@@ -85,7 +84,7 @@ def decimals(balls: Balls) -> tuple[list[str], float]:
 
 
 def rounded_up(x: Fraction) -> float:
-    """Return a binary64 number of four digits that is at least `x`, which is not negative."""
+    """Return a binary64 number of four digits, at least `x`, which is not negative."""
     # A factor above 1 compensates for rounding to a decimal string.
     candidates = (float(f"{float(x) * factor:.3e}") for factor in (1.0, 1.001, 1.01))
     # Near the least binary64 number, the factors may change nothing.
@@ -94,9 +93,9 @@ def rounded_up(x: Fraction) -> float:
 
 
 def largest_radius(omega: Sequence[Balls], digits: int) -> Fraction:
-    """Return the largest ratio of a radius to the allowed radius.
+    """Return the largest ratio of a ball's radius to the allowed radius.
 
-    The latter is 10**-digits rad/s, times the largest component of omega if that exceeds 1 rad/s.
+    The allowed radius is 10**-digits times the larger of 1 rad/s and the ball's largest component.
     """
     largest = Fraction(0)
     for middle, radius in omega:
@@ -122,7 +121,7 @@ def _decimal(x: Fraction, digits: int) -> str:
 def scales_of(coefficients: Sequence[Fraction]) -> list[float]:
     """Return the units in which proofs measure errors of the components of omega.
 
-    They are the square roots of abs(A), abs(B) and abs(C) over the largest of these, but at least
+    They are the square roots of abs(A), abs(B), abs(C) over the largest of these, but at least
     0.01. If all are above 0.01, the logarithmic norm of the Jacobian is 0 for rotations about the
     axes of the largest and the smallest moment.
     """

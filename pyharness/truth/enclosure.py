@@ -1,8 +1,8 @@
 """Proved enclosures: balls (intervals, given by middle and radius) that contain the solution.
 
-Torque-free motion is proved in closed form (`enclosure_free`), motion under torques of time alone
+Torque-free motion is enclosed in closed form (`enclosure_free`), motion under torques of time alone
 by Taylor steps in integers (`certificate`), other motion by Taylor steps in balls
-(`enclosure_steps`). The closed form and the steps in balls need python-flint.
+(`enclosure_steps`). All but `certificate` need python-flint.
 """
 
 from collections.abc import Sequence
@@ -38,15 +38,14 @@ def enclose(
 ) -> Enclosure:
     """Return balls that contain the solution of a scene at requested times.
 
-    `times` (s) have one sign and lead away from 0; the first may be 0. A radius of omega is at most
-    10**-digits rad/s, times the largest component of omega if that exceeds 1 rad/s; a closed form
-    takes the initial omega instead. `velocity` adds the translational velocity (m/s), `transition`
-    the transition matrix; the attitude is added if the scene has one, the rotational energy if it
-    has moments. `progress` receives the completed percentage of the time, 100, and the time as
-    text. `effort` is a factor on the work limit.
+    `times` (s) lead away from 0 on one side. A radius of omega is at most 10**-digits times the
+    larger of 1 rad/s and the largest component of omega (initial omega, in closed form). `velocity`
+    adds the translational velocity (m/s), `transition` the state-transition matrix. The attitude,
+    and the energy of a body with moments, are included. `progress` receives the completed
+    percentage, 100, and the time as text. `effort` is a factor on the work limit.
 
     Raise InputError if `digits` is not from 1 to 1000, the times are not in order, python-flint is
-    missing, the torque isn't recorded, the solution can't be enclosed, or the limit is exceeded.
+    missing, the torque isn't recorded, or no enclosure is found within the limit.
     """
     checked_scene(scene, True, True, True, True)
     if not 1 <= integer("digits", digits) <= MOST_DIGITS:

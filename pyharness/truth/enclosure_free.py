@@ -1,8 +1,8 @@
 """Proved enclosures of torque-free motion at any time, in ball arithmetic (python-flint).
 
-Omega is expressed by Jacobi's elliptic functions, and the attitude by a theta function (Jacobi
-1850; Whittaker, Analytical Dynamics, section 69). Formulas are chosen by exact comparison of
-fractions, not of balls (intervals).
+Omega is given by Jacobi's elliptic functions, the attitude by a theta function (Jacobi 1850;
+Whittaker, Analytical Dynamics, section 69). Formulas are chosen by exact comparison of fractions,
+not of balls (intervals).
 """
 
 import math
@@ -29,9 +29,9 @@ def enclose_free(
     """Return balls that contain omega (rad/s) without torque at each of `times` (s).
 
     With `attitude`, four more balls contain the unit quaternion from body to space, scalar first
-    and continuous in time; their radii are at most 10**-`digits`. A radius of omega is at most
-    10**-`digits` rad/s, times the largest initial component if that exceeds 1 rad/s. The motion
-    must be bounded; an attitude needs moments. Raise InputError if 20 000 bits do not suffice.
+    and continuous in time. Each radius is at most 10**-`digits`, for omega times the larger of 1
+    rad/s and the largest initial component. The motion must be bounded; an attitude needs moments.
+    Raise InputError if 20 000 bits do not suffice.
     """
     scale = max(Fraction(1), *(abs(Fraction(w)) for w in scene.omega))
     bits = min(64 + math.ceil(digits * math.log2(10)), _MOST_BITS)
@@ -90,7 +90,7 @@ def omega_on_ellipse(axis: int, a: list[Fraction], w: list[Fraction], t: Fractio
 
 
 class Orbit:
-    """A torque-free motion that is not steady, with nonzero coefficients.
+    """An unsteady torque-free motion with nonzero coefficients `a` and initial omega `w` (rad/s).
 
     Omega about the three `axes` is `sizes` (rad/s) times cn(u), sn(u) and dn(u), with u = `start` +
     `rate` t and `rate` in 1/s (DLMF Table 22.13.1). `m` is k**2, with the modulus k; `square` is
@@ -99,7 +99,6 @@ class Orbit:
     """
 
     def __init__(self, a: list[Fraction], w: list[Fraction]) -> None:
-        """Compute the constants for coefficients `a` and initial omega `w` (rad/s)."""
         s = [abs(x) for x in a]
         # The coefficient of the axis of sn differs in sign from the others.
         y = next(k for k in range(3) if a[k] * a[k - 1] < 0 and a[k] * a[k - 2] < 0)
@@ -150,7 +149,7 @@ class Orbit:
 
 
 def integer_near(x: arb) -> int:
-    """Return an integer near the middle of `x`; reduction by any number of periods is exact."""
+    """Return an integer near the middle of `x`; subtracting any number of periods is exact."""
     mantissa, exponent = map(int, x.mid().man_exp())
     return round(mantissa * Fraction(2) ** exponent)
 
@@ -163,9 +162,9 @@ def carlson(x: Fraction, y: Fraction, z: Fraction) -> arb:
 class _Attitude:
     """The attitude along an orbit.
 
-    In the body, let n be the direction of the angular momentum L, and e the direction of the axis
-    of dn. Their scalar product n e is c dn(u) with c > 0. The attitude is the product of a constant
-    rotation, the rotation by psi about e, and the smallest rotation from n to e.
+    In the body, let n be the direction of the angular momentum L, and e that of the axis of dn.
+    Then n e = c dn(u) with c > 0. The attitude is the product of a constant rotation, the rotation
+    by psi about e, and the smallest rotation from n to e.
 
     Euler's equations give psi' = (2 T/|L| + omega e)/(1 + n e), with the kinetic energy T. Like dn,
     psi' has the periods 2K and 4iK' in complex u. Its poles, where dn(u) = -1/c, are at u = 2iK' +
@@ -219,7 +218,7 @@ class _Attitude:
         return value / abs(value)
 
     def _tilt(self, omega: Balls) -> Balls:
-        """Return the quaternion of the smallest rotation from n to e, less than a right angle."""
+        """Return the quaternion of the smallest rotation from n to e, below a right angle."""
         n = [x * y for x, y in zip(self.weights, omega, strict=True)]
         axis, sign = self.orbit.axes[2], self.orbit.sign
         row = [1 + sign * n[axis], arb(0), arb(0), arb(0)]

@@ -69,8 +69,7 @@ def _lines(row: dict[str, Any]) -> list[list[Any]]:
 def certificates_report(found: Sequence[tuple[str, dict[str, Any] | None, str]]) -> Report:
     """Return the report of checked certificates.
 
-    An entry of `found` has the file's name, and the certificate or, if it does not hold, None and
-    the reason.
+    An entry of `found` has the file's name, the certificate or, if it fails, None, and the reason.
     """
     verdicts = []
     for name, proved, why in found:

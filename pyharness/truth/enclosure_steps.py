@@ -7,8 +7,7 @@ The unknowns form blocks, such as omega and attitude. The norms of the blocks of
 vector r, which obeys r' <= M r + d, where d bounds the norms of the residual's blocks. On its
 diagonal, M bounds the logarithmic norms of the diagonal blocks of the Jacobian of f near p;
 elsewhere, the norms of the other blocks. Since no element of M is negative, r(h) <= exp(h M) (r(0)
-+ h d) after a step of length h. For one block this is theorem I.10.6 of Hairer, Norsett and Wanner
-1993, Solving Ordinary Differential Equations I.
++ h d) after a step h. For one block this is theorem I.10.6 of Hairer, Norsett and Wanner 1993.
 """
 
 import math
@@ -100,8 +99,8 @@ class Equations:
     """The equations of motion of a scene, with exact coefficients.
 
     The unknowns are omega (rad/s), the scene's quaternion, the velocity (m/s) and, with
-    `transition`, the derivatives of omega and attitude with respect to omega at time 0, row by row.
-    `blocks` are the slices of these groups, `scales` the units of errors.
+    `transition`, the derivatives of omega and quaternion with respect to omega at time 0, row by
+    row. `blocks` are the slices of these groups, `scales` the units of errors.
     """
 
     def __init__(self, scene: Scene, velocity: bool, transition: bool) -> None:
@@ -137,7 +136,7 @@ class Equations:
         self._push = [arb(force) / arb(scene.masses[0]) for force in scene.forces]
 
     def at(self, begin: Fraction, forward: bool) -> Rates:
-        """Return the right-hand side for a step after `begin` (s), or before unless `forward`."""
+        """Return the right-hand side for a step from `begin` (s), `forward` or backward in time."""
         functions = functions_at(begin, forward)
 
         def rates(time: Any, state: Sequence[Any]) -> list[Any]:
@@ -215,7 +214,7 @@ class _NoStepError(Exception):
 
 
 def _upper(x: Any) -> Any:
-    """Return a ball's exact upper end; raise _NoStepError if it is not finite."""
+    """Return a ball's exact upper end, or raise _NoStepError if it is not finite."""
     end = arb(x).upper()
     if not end.is_finite():
         raise _NoStepError
@@ -350,11 +349,9 @@ class _Proof:
         return [self.norm(bounds, block) for block in self.blocks]
 
     def _rests(self, rates: Rates, terms: list[list[Any]], h: Fraction, count: int) -> list[Any]:
-        """Return bounds on the sums of the Taylor terms of f(t, p) from number `count` on.
-
-        If a rate is at most B on a complex disc whose radius is c steps, its term k is at most B
-        c**-k at the end of the step (Cauchy's estimate). The bounds are geometric series.
-        """
+        """Return bounds on the sums of the Taylor terms of f(t, p) from number `count` on."""
+        # If a rate is at most B on a complex disc whose radius is c steps, its term k is at most B
+        # c**-k at the end of the step (Cauchy's estimate). The bounds are geometric series.
         length = abs(ball(h))
         candidates = []
         for circle in _CIRCLES:

@@ -1,9 +1,9 @@
 """Attitude of a torque-free body at any time in decimals.
 
 In each period of omega the body rotates about the angular momentum by the same angle, so that
-Taylor series integrate only one period. Near the separatrix errors of omega grow exponentially.
-Each segment of the period therefore starts from the omega of `elliptic.py`. No code is shared with
-the closed form that this module checks.
+Taylor series integrate only one period. Near the separatrix, errors of omega grow exponentially;
+each segment of the period therefore starts from the omega of `elliptic.py`. No code is shared with
+the closed form that is checked.
 """
 
 import decimal
@@ -32,7 +32,7 @@ def free_attitude(scene: Scene, time: float) -> Row:
 
     Its sign is continuous in time. The scene must have moments and an attitude. On the separatrix,
     where omega has no period, the motion is integrated until omega is constant to all digits. Raise
-    InputError if the integration would be too long, or the torque depends on the state.
+    InputError if the integration is too long, or the torque depends on the state.
     """
     checked_scene(scene)
     assert scene.attitude is not None
@@ -62,10 +62,7 @@ def period_of(scene: Scene) -> Decimal | None:
 
 
 def _rate_and_period(scene: Scene) -> tuple[Decimal, Decimal | None]:
-    """Return the rate (1/s) of the elliptic functions, and omega's period (s).
-
-    The period is None on the separatrix. Perturbations grow by at most some exp(rate * time).
-    """
+    """Return the elliptic functions' rate (1/s), and omega's period (s; None on the separatrix)."""
     i, w = list(scene.exact_moments or ()), [Fraction(x) for x in scene.omega]
     low, middle, high = sorted(range(3), key=lambda axis: i[axis])
     energies = [moment * rate * rate for moment, rate in zip(i, w, strict=True)]
@@ -75,6 +72,7 @@ def _rate_and_period(scene: Scene) -> tuple[Decimal, Decimal | None]:
     # 2 T I_high - L**2, and `turns` is L**2 - 2 T I_low.
     stays = energies[low] * both + energies[middle] * upper
     turns = energies[high] * both + energies[middle] * lower
+    # Perturbations grow by at most some exp(rate * time).
     larger = lower * stays if gap > 0 else upper * turns
     if not larger:
         return Decimal(0), None
@@ -88,14 +86,13 @@ def _rate_and_period(scene: Scene) -> tuple[Decimal, Decimal | None]:
 
 
 def _settling_time(scene: Scene, rate: Decimal) -> Decimal:
-    """Return a time (s) after which, and before its negative, a separatrix motion is steady.
-
-    Omega is then constant to all digits: its components about the axes of the least and the largest
-    moment are proportional to sech(rate * time - u), where exp(abs(u)) is at most 2/sech(u).
-    """
+    """Return the time (s) from 0, either way, after which separatrix motion is steady."""
     i, w = list(scene.exact_moments or ()), [Fraction(x) for x in scene.omega]
     low, middle, high = sorted(range(3), key=lambda axis: i[axis])
     energies = [moment * rate * rate for moment, rate in zip(i, w, strict=True)]
+    # Omega is then constant to all digits: its components about the axes of the least and the
+    # largest moment are proportional to sech(rate * time - u), where exp(abs(u)) is at most
+    # 2/sech(u).
     # Part of the energy about the low axis at u = 0, where omega has no component about the middle
     # axis.
     part = (i[high] - i[middle]) / (i[high] - i[low])

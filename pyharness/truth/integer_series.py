@@ -1,7 +1,7 @@
 """A second reference, by Taylor series in integer arithmetic.
 
 It shares no code with `truth/reference.py`. Numbers are integers over 2**BITS, in units in which
-the last time is 1 and the largest omega about 1. Sines and cosines of the torque are further
+the last time is 1 and the largest omega about 1. The torque's sines and cosines are further
 unknowns, so that no library function is needed.
 """
 
@@ -32,7 +32,7 @@ Series = list[int]
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """The solution of one scene at the requested times, and at many times between them."""
+    """The solution of a scene at requested times, and at many times between."""
 
     time: Array  # shape (n,); as requested, s
     omega: Array  # shape (n, 3); rounded to binary64, rad/s
@@ -41,7 +41,7 @@ class Path:
 
 
 class _OtherUnitError(Exception):
-    """Signal that the unit of omega must be multiplied by 2**n; n is the argument."""
+    """Signal that the unit of omega must be multiplied by 2**n, n the argument."""
 
 
 def integer_series(scene: Scene, times: Sequence[float]) -> Path:
@@ -134,10 +134,7 @@ def _fixed(value: Fraction) -> int:
 
 
 def exact_body(scene: Scene) -> tuple[list[Fraction], list[Fraction]]:
-    """Return the exact divisors of torques, and A, B, C.
-
-    The divisors are the moments (kg m2), or 1 for a body with coefficients.
-    """
+    """Return exact moments (kg m2), or ones for a body with coefficients, and exact A, B, C."""
     moments = list(scene.exact_moments or (Fraction(1),) * 3)
     if scene.coefficients is not None:
         return moments, [Fraction(x) for x in scene.coefficients]
@@ -186,12 +183,9 @@ class _Equations:
         self.start += [0, 1 << BITS] * len(self._waves)
 
     def expand(self, state: Series, begin: int, length: int) -> list[Series]:
-        """Return the Taylor terms of all unknowns at the end of a step.
+        """Return all unknowns' Taylor terms in a step: coefficient k times power k of the step."""
 
-        Term k is coefficient k times power k of the step. `state` has the unknowns at its
-        beginning; `begin` and `length` are in units of 2**-64 of the last time.
-        """
-
+        # `begin` and `length` are in units of 2**-64 of the last time.
         def stepped(x: int) -> int:
             return x * length >> _CLOCK
 

@@ -1,8 +1,8 @@
 """Reference solutions of scenes, with estimates of their errors.
 
 A sphere, and a symmetric body without torque, have a closed form. Any other scene is solved by
-Taylor series of equations 13-15 of the thesis in decimal arithmetic, with exact Euler coefficients.
-No code is shared with the methods that the module checks.
+Taylor series of equations 13-15 of the thesis in decimals, with exact Euler coefficients. No code
+is shared with the methods that are checked.
 """
 
 import decimal
@@ -68,16 +68,15 @@ def reference(
     precise: bool = False,
     effort: float | None = None,
 ) -> Reference:
-    """Return the reference solution of `scene` at `times` (s).
+    """Return the reference solution of `scene` at `times` (s), which lead away from 0 on one side.
 
-    The times have one sign and lead away from 0; the first may be 0. The estimated error is the
-    largest difference of two integrations with different orders and steps, times four if `precise`.
-    A `precise` series has an error of at most 1e-25 before rounding, unless errors are amplified
-    too much. Attitudes are always computed by the series.
+    The estimated error is the largest difference of two integrations with different orders and
+    steps, times four if `precise`. A `precise` series has an error of at most 1e-25 before
+    rounding, unless errors are amplified too much. Attitudes are always computed by the series.
 
-    `effort` is a factor on a work limit of some ten seconds; None means a limit of 100 000 steps. A
-    torque that depends on the state must be recorded; the rows end before it becomes singular.
-    Raise InputError if the times are not in order, a changing moment reaches 0, or the series is
+    `effort` is a factor on a work limit of some ten seconds; None means 100 000 steps. A torque
+    that depends on the state must be recorded; the rows end before it becomes singular. Raise
+    InputError if the times are not in order, a changing moment reaches 0, or the series is
     impossible or too long.
     """
     if scene.changing is not None:
@@ -150,9 +149,9 @@ def _check_torque(scene: Scene) -> None:
 
 
 def known_solution(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
-    """Return omega (rad/s) of a sphere or a torque-free symmetric body in closed form, else None.
+    """Return omega (rad/s) of a sphere or torque-free symmetric body in closed form, else None.
 
-    It has as many decimals as the precision of the decimal context.
+    Omega has as many decimals as the precision of the decimal context.
     """
     if isinstance(scene.torque, StateTorque) or scene.changing is not None:
         return None
@@ -162,7 +161,7 @@ def known_solution(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
 
 
 def _digits_before_the_point(scene: Scene, time: Decimal) -> int:
-    """Return an upper bound on the digits before the point of all numbers up to `time` (s)."""
+    """Return a bound on the digits before the point of all numbers up to `time` (s)."""
     law = scene.body_torque
     omega = max(Decimal(abs(w)) for w in scene.omega)
     rate = max(map(abs, exact_coefficients(scene))) * omega
@@ -219,7 +218,7 @@ def _sphere(scene: Scene, t: Decimal) -> Row:
 
 
 def exact_coefficients(scene: Scene) -> Row:
-    """Return A, B, C to all digits of the current decimal context."""
+    """Return A, B, C to all digits of the decimal context."""
     if scene.coefficients is not None:
         return [Decimal(x) for x in scene.coefficients]
     i1, i2, i3 = divisors(scene)

@@ -1,8 +1,7 @@
 """Taylor coefficients, in decimal arithmetic, of a torque that is recorded on a tape.
 
 A tape is a list of operations, whose results are in numbered slots. The coefficients are computed
-order by order with those of the solution, by the recurrences of Jorba and Zou 2005, Experimental
-Mathematics 14.
+order by order with those of the solution (Jorba and Zou 2005, Experimental Mathematics 14).
 """
 
 from bisect import bisect_left, bisect_right
@@ -46,7 +45,7 @@ _Sum = tuple[Decimal, list[tuple[Decimal, int]]]
 def series_products(tape: Tape) -> int:
     """Return how many products of two series a tape takes in each order.
 
-    A sine with its cosine, and a tanh with its derivative, take two; a table takes none.
+    A sine with its cosine, or a tanh with its derivative, takes two; a table takes none.
     """
     waves = ("sine", "cosine")
     angles = {each.operands for each in tape.operations if each.kind in waves}
@@ -57,18 +56,15 @@ def series_products(tape: Tape) -> int:
 class TapeSeries:
     """The Taylor series of a tape's operations around a time.
 
-    `begin` starts an expansion, and each `next` adds a coefficient to all series. `least_order` is
-    the lowest order that loses no product whose factors are 0 at that time.
+    `begin` starts an expansion, and each `next` adds a coefficient to all series. Terms of sums are
+    multiplied by 1 plus or minus `change`, which shows the effect of rounding. The caller sets
+    `results`, the results of switches by slot. `least_order` is the lowest order that loses no
+    product whose factors are 0 at that time.
     """
 
     def __init__(
         self, tape: Tape, change: Decimal = Decimal(0), results: dict[int, Decimal] | None = None
     ) -> None:
-        """Store the operations, with terms of sums multiplied by 1 plus or minus `change`.
-
-        A `change` shows the effect of rounding. `results` has the results of switches by slot,
-        which the caller changes.
-        """
         self.results = {} if results is None else results
         self._tape = tape
         self.has_switches = tape.n_switches > 0
@@ -93,9 +89,8 @@ class TapeSeries:
     ) -> None:
         """Begin an expansion around `time` (s).
 
-        `omega` and `attitude`, which may be empty, are the unknowns' Taylor coefficients; the
-        caller extends them. At a break of a table the later piece is expanded if `forward`, else
-        the earlier.
+        `omega` and `attitude`, which may be empty, are Taylor coefficients that the caller extends.
+        At a break of a table, the later piece is expanded if `forward`, else the earlier.
         """
         self._order = 0
         self._tables = {
@@ -139,7 +134,7 @@ class TapeSeries:
         return sum((factor * self._slots[slot][k] for factor, slot in terms), start)
 
     def _coefficient(self, operation: Operation, linear: _Sum, slot: int, k: int) -> Decimal:
-        """Return Taylor coefficient k of an operation; its series has coefficients 0 to k - 1."""
+        """Return Taylor coefficient k of an operation, whose series has those up to k - 1."""
         kind, operands, _, table = operation
         if kind == "linear":
             return self._combined(linear, k)
@@ -217,9 +212,9 @@ class TapeSeries:
 
         An exponential, or the derivative of a hyperbolic tangent, may be negligible at the
         beginning of a step and large a little later. Its argument may therefore change by at most
-        half the order, unless the function remains negligible. The mean order of the terms of a
-        product, weighted by magnitude, is limited likewise. A divisor must have no zero in the
-        circle around the beginning whose radius is the step.
+        half the order, unless the function remains negligible. The mean order of a product's terms,
+        weighted by magnitude, is limited likewise. The step must be shorter than the distance to
+        any zero of a divisor.
         """
         for _, operation in self._live_operations():
             most = self._largest_change(operation)
@@ -236,10 +231,9 @@ class TapeSeries:
         return length
 
     def _is_hidden(self, power: _Power, length: Decimal) -> bool:
-        """Return whether a product may matter in a step, although its computed terms do not.
-
-        The mean order of its terms, weighted by magnitude, is the sum of those of its factors.
-        """
+        """Return whether a product may matter in a step, although its computed terms do not."""
+        # The mean order of the product's terms, weighted by magnitude, is the sum of those of its
+        # factors.
         (factors, size, slots), order = power, Decimal(0)
         for slot, count in factors.items():
             terms = [abs(x) * length**k for k, x in enumerate(self._slots[slot])]
@@ -265,17 +259,14 @@ class TapeSeries:
         return max(Decimal(self._order) / 2, 2 * abs(x) - _INVISIBLE) / 2
 
     def next_change(self, time: Decimal, forward: bool) -> Decimal | None:
-        """Return the time (s) of the next change of a table after `time`, or None.
-
-        Unless `forward`, it is the last before `time`.
-        """
+        """Return the time (s) at which a table changes next, or changed last unless `forward`."""
         place = (bisect_right if forward else bisect_left)(self._changes, time) - (not forward)
         return self._changes[place] if 0 <= place < len(self._changes) else None
 
     def crosses_a_branch(self, offset: Decimal) -> bool:
         """Return whether a square root reaches 0 within `offset` (s) of the expansion's time.
 
-        Beyond a double zero the series is the negative of the root: for sqrt(x**2), it is x or -x.
+        Beyond a double zero, the series is the negative of the root, as for sqrt(x**2).
         """
         for slot, operation in self._live_operations():
             if operation.kind == "sqrt":
@@ -314,7 +305,7 @@ def _powers(tape: Tape) -> tuple[list[_Power], int]:
 
 
 def _divisors(tape: Tape) -> dict[int, set[int]]:
-    """Return, by slot, the divisors of quotients and the arguments of roots in which it occurs."""
+    """Return, by slot, the divisors and the arguments of roots in which the slot occurs."""
     found: dict[int, set[int]] = {}
     for slot, (kind, operands, linear, _) in reversed([*enumerate(tape.operations, N_INPUTS)]):
         parts = operands if linear is None else [each for each, _ in linear.terms]
@@ -330,7 +321,7 @@ def _divisors(tape: Tape) -> dict[int, set[int]]:
 
 
 def _sum(linear: Linear | None, change: Decimal) -> _Sum:
-    """Return a linear combination with rounded numbers, so that equal ones cancel exactly."""
+    """Return a linear combination with rounded numbers, so that equal ones cancel."""
     if linear is None:
         return Decimal(0), []
     constant, terms = +Decimal(linear.constant), []
@@ -348,14 +339,12 @@ def _expanded(table: Table, breaks: Row, time: Decimal, forward: bool) -> Row:
 
 
 def _root_coefficient(x: Row, root: Row, k: int) -> Decimal:
-    """Return Taylor coefficient k of the square root of x; `root` has those up to k - 1.
-
-    If x is 0 throughout, so is its root. Raise ArithmeticError where x is 0 and changes, because
-    the root then has no Taylor series.
-    """
+    """Return Taylor coefficient k of the square root of x; `root` has those up to k - 1."""
     if k == 0:
         return x[0].sqrt()
     rest = x[k] - product(root[1:], root[:0:-1])
+    # If x is 0 throughout, so is its root. Where x is 0 and changes, the division fails, because
+    # the root has no Taylor series.
     if root[0] == 0 == rest:
         return rest
     return rest / (2 * root[0])

@@ -1,1 +1,1 @@
-"""Output formats of reports, and files of pictures."""
+"""Output formats of reports and pictures."""

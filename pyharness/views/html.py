@@ -1,4 +1,4 @@
-"""Reports as HTML fragments, for insertion into web pages."""
+"""Reports as HTML fragments for web pages."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
@@ -9,14 +9,14 @@ from pyharness.model.report import Field, Line, Section, Table
 
 
 def sections(text: Sequence[Section]) -> str:
-    """Return sections of a report as HTML; numbers are rounded as in text output."""
+    """Return sections of a report as HTML, with numbers rounded as in text."""
     return "\n".join(part for section in text if section for part in _write_section(section))
 
 
 def table(given: Table, label: str = "table", links: Mapping[str, str] | None = None) -> str:
     """Return a table as HTML, which scrolls if it is wider than the page.
 
-    `label` is read by screen readers; `links` maps the text of a cell to the address of its link.
+    `label` is for screen readers; `links` maps cells' texts to addresses.
     """
     (head, *rows), columns = given.written(), given.columns
     lines = [f'<div class="wide" role="group" tabindex="0" aria-label="{escape(label)}">']

@@ -1,4 +1,4 @@
-"""Files of a picture: an image, identical in every run, and a CSV of its numbers."""
+"""Files of a picture: reproducible images, and a CSV of its numbers."""
 
 import io
 import textwrap
@@ -24,24 +24,24 @@ _MOST_LINES = 4
 
 
 def check_picture(path: str) -> None:
-    """Raise InputError unless `path` is .png, .svg or .pdf, and matplotlib is installed."""
+    """Raise InputError unless `path` is a picture and matplotlib is installed."""
     if _form(path) not in FORMATS:
         raise InputError(f"--plot '{path}': unknown picture format; allowed: {', '.join(FORMATS)}")
     check_matplotlib("--plot")
 
 
 def check_matplotlib(what: str) -> None:
-    """Raise InputError if matplotlib is missing, which `what` (an option or verb) needs."""
+    """Raise InputError if matplotlib, which `what` needs, is missing."""
     check_package("matplotlib", what, install_command("plots"))
 
 
 def numbers_beside(path: str) -> str:
-    """Return the path of the CSV file of a picture."""
+    """Return the path of a picture's CSV file."""
     return str(Path(path).with_suffix(".csv"))
 
 
 def saved(picture: Picture, *paths: str) -> dict[str, bytes]:
-    """Return, by path, the content of the images at `paths`, and of a CSV file beside the first."""
+    """Return, by path, the content of the images and of a CSV file beside the first."""
     _set_title(picture)
     content = {path: _image(picture.figure, _form(path)) for path in paths}
     return content | {numbers_beside(paths[0]): csv_text(picture.numbers).encode()}

@@ -1,4 +1,4 @@
-"""Reports in every output format: text, CSV, Markdown, JSON, JUnit XML, and HTML."""
+"""Reports as text, CSV, Markdown, JSON, JUnit XML and HTML."""
 
 import io
 import math
@@ -37,7 +37,6 @@ def _text(report: Report) -> str:
 
 
 def _lines(told: str | Field | Table) -> list[str]:
-    """Return the lines of a report's part: a Line is not wrapped, a Field begins with its label."""
     if isinstance(told, Line):
         return [told]
     if isinstance(told, Table):
@@ -51,10 +50,7 @@ def _lines(told: str | Field | Table) -> list[str]:
 
 
 def _aligned(table: Table) -> list[str]:
-    """Return a table's aligned lines; of more than 200 rows, only the first and the last ten.
-
-    A table that is too wide is written in parts below each other, each with the first column.
-    """
+    """Return a table's lines: in parts if too wide, without middle rows if too long."""
     n = len(table.rows)
     if n > _MOST_ROWS:
         table = table._replace(rows=[*table.rows[:_END_ROWS], *table.rows[-_END_ROWS:]])
@@ -111,7 +107,7 @@ def _block(columns: Sequence[Column], cells: Sequence[Sequence[str]]) -> list[st
 
 
 def csv_text(table: Table) -> str:
-    """Return a table as CSV; the first line has the column heads."""
+    """Return a table as CSV with column heads."""
     import csv
 
     buffer = io.StringIO()
@@ -139,17 +135,14 @@ def _markdown_section(section: Section) -> str:
 
 
 def markdown_table(cells: Sequence[Sequence[str]]) -> str:
-    """Return a Markdown table, whose heads are the first row."""
+    """Return a Markdown table, with the heads as first row."""
     head, *rows = cells
     lines = [head, ["---"] * len(head), *rows]
     return "".join("| " + " | ".join(line) + " |\n" for line in lines)
 
 
 def json_text(record: dict[str, Any], indent: int | None = None) -> str:
-    """Return strict JSON, in one line or indented.
-
-    Floats can be read back exactly; NaN and infinity become null.
-    """
+    """Return strict JSON; floats can be read back exactly, but NaN and infinity become null."""
     import json
 
     try:
@@ -169,10 +162,6 @@ def _finite(value: Any) -> Any:
 
 
 def _junit(report: Report) -> str:
-    """Return a report as JUnit XML: a test suite with a test case for each check.
-
-    A failed test case contains the reason, and the command that repeats the check.
-    """
     from xml.etree import ElementTree as xml
 
     failures = sum(bool(why) for _, _, why, _ in report.cases)

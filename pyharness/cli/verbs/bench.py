@@ -101,10 +101,7 @@ def run(options: argparse.Namespace) -> int:
 def _present(
     methods: Sequence[_Named], others: Sequence[_Named], named: bool
 ) -> tuple[list[_Named], list[_Named]]:
-    """Return the solvers to measure, and those not installed.
-
-    Raise InputError if there is no solver, or if one that the user `named` is not installed.
-    """
+    """Return the solvers to measure, and those not installed."""
     missing = [each for each in others if not each.is_installed]
     if missing and named:
         raise InputError(
@@ -142,7 +139,7 @@ def chosen(
 ) -> list[SceneContender]:
     """Return the solvers that `text`, the value of option `what`, selects, by default all.
 
-    Raise InputError if `attitude` is true and one named in `text` can't compute attitudes.
+    Raise InputError if `attitude` is true and a solver named in `text` can't compute attitudes.
     """
     found = named(contenders, text, what)
     lacking = [each.name for each in found if not each.attitude]

@@ -22,7 +22,7 @@ EXAMPLE = "defects stage-base"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print a list of entries, or one entry with its evidence and its effects."""
+    """List entries, or print one with its evidence and effects."""
     listed = entries(options.kind)
     if options.name is None:
         shared.check_outputs(options)

@@ -12,7 +12,7 @@ EXAMPLE = "doctor"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print build, machine, packages and environment, for bug reports.
+    """Print build, machine, packages and environment.
 
     Return 3 if the Fortran extension is not built, 1 if a compiler option or a library changes its
     arithmetic.

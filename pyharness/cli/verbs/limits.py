@@ -22,7 +22,7 @@ EXAMPLE = "limits --case 5 --program runge-kutta"
 def run(options: argparse.Namespace) -> int:
     """Print each original program's distance from its limit and from the true solution.
 
-    The limit is its result as the step size goes to 0.
+    The limit is the result as the step size goes to 0.
     """
     scene = shared.chosen_scene(options)
     programs = shared.chosen_programs(options)

@@ -22,7 +22,7 @@ EXAMPLE = "rotations --case 4 --disturbance 1e-3"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the steady rotations of a scene, their stability, and the time between flips."""
+    """Print a scene's steady rotations, their stability, and the time between flips."""
     scene = shared.chosen_scene(options)
     disturbance = shared.positive(options.disturbance, "--disturbance", 1e-3)
     if disturbance >= 1.0:

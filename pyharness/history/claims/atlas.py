@@ -1,7 +1,7 @@
 """The atlas of claims: which claims of the thesis hold for which initial omega (start).
 
-The starts cover the sphere of directions at several magnitudes of omega. A claim scores 1 point if
-it is reproduced, 1/2 if in part. The codes of verdicts are those of `over_starts`.
+The starts cover the sphere of directions at several magnitudes. A claim scores 1 point if it is
+reproduced, 1/2 if in part. Verdict codes are those of `over_starts`.
 """
 
 import math
@@ -44,7 +44,7 @@ _OMEGA = tuple(Column(f"omega{k}", digits(".3g"), unit="rad/s") for k in (1, 2, 
 
 @dataclass(frozen=True, eq=False)
 class Atlas:
-    """The verdict codes of claims over a grid of starts, readings and numbers of steps.
+    """The verdict codes of claims over a grid.
 
     The axes of `codes` are reading of doubtful lines, number of steps, magnitude of omega(0)
     (rad/s), height (omega3 over the magnitude) and longitude (rad).
@@ -58,16 +58,16 @@ class Atlas:
     longitudes: Array
 
     def score(self, reading: int = 0, steps: int = 0) -> Array:
-        """Return each start's sum of points, 1 or 1/2 for a claim; the arguments are indices."""
+        """Return each start's points, for the given indices of reading and number of steps."""
         return sum_of_points([codes[reading, steps] for codes in self.codes.values()])
 
     def none_fails(self, reading: int = 0, steps: int = 0) -> NDArray[np.bool_]:
-        """Return for each start whether no claim fails, by indices of the reading and the steps."""
+        """Return, for each start, whether no claim fails; the arguments are as in `score`."""
         held = [codes[reading, steps] != FAILS for codes in self.codes.values()]
         return np.asarray(np.all(held, axis=0))
 
     def start(self, at: Sequence[int] | NDArray[Any]) -> Triple:
-        """Return omega(0) (rad/s) at the three indices of magnitude, height and longitude."""
+        """Return omega(0) (rad/s) at the indices of magnitude, height and longitude."""
         size, height = self.magnitudes[at[0]], self.heights[at[1]]
         across, longitude = np.sqrt(1.0 - height * height), self.longitudes[at[2]]
         found = size * np.array([across * np.cos(longitude), across * np.sin(longitude), height])
@@ -90,18 +90,18 @@ def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Array]) -> Atlas:
 
 
 def sum_of_points(codes: Sequence[Codes]) -> Array:
-    """Return the sum of the claims' points (1, or 1/2 if in part) for each initial omega."""
+    """Return the sum of the claims' points for each start."""
     return np.asarray(sum(_POINTS[each] for each in codes))
 
 
 def shares(codes: Codes) -> tuple[float, float, float]:
-    """Return the fractions of verdicts "reproduced", "in part" and "not reproduced" in `codes`."""
+    """Return the fractions of HOLDS, IN_PART and FAILS in `codes`."""
     whole, part, not_at_all = (float((codes == each).mean()) for each in (HOLDS, IN_PART, FAILS))
     return whole, part, not_at_all
 
 
 def bits(codes: Codes) -> float:
-    """Return the entropy (bits) of the verdict on a claim over the initial omegas."""
+    """Return the entropy (bits) of a claim's verdict over the starts."""
     parts = np.array([(codes == code).mean() for code in _CODES])
     parts = parts[parts > 0.0]
     return float(-(parts * np.log2(parts)).sum()) + 0.0
@@ -118,7 +118,7 @@ def about(names: Sequence[str]) -> dict[int, list[str]]:
 
 
 def shown_starts(names: Sequence[str]) -> dict[Triple, dict[str, int]]:
-    """Return the original programs' verdict codes, by claim, for each initial omega of `starts`."""
+    """Return, for each of `starts`, the original programs' verdict codes by claim."""
     given = starts()
     bench = Starts(Laboratory(True, Assumptions()), np.array(given))
     found = {name: judged(claim(name), bench, len(given)) for name in names}

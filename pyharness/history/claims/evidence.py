@@ -1,9 +1,9 @@
 """Evidence on the choices that the thesis leaves open: a score for every combination.
 
-A combination fixes omega(0), the readings, the conjectures and the number of steps. Its omega(0) is
-one value for all cases in which the thesis gives none, or the value that we adopt for each case.
-The score is the number of testable claims about the original programs that are reproduced; a claim
-reproduced in part counts one half.
+A combination fixes omega(0), readings, conjectures and number of steps. Its omega(0) is one value
+for all cases in which the thesis gives none, or the value that we adopt for each case. The score
+is the number of testable claims about the original programs that are reproduced; those reproduced
+in part count 1/2.
 """
 
 from collections import Counter
@@ -51,7 +51,7 @@ _RULE = (
 
 @dataclass(frozen=True)
 class Combination:
-    """One combination of choices, with the verdict on each testable claim by identifier."""
+    """A combination of choices, with verdicts on the testable claims."""
 
     assumptions: Assumptions
     verdicts: dict[str, str]
@@ -63,7 +63,7 @@ class Combination:
 
     @property
     def holding(self) -> int:
-        """Return the number of claims that are reproduced at least in part."""
+        """Return the number of claims reproduced at least in part."""
         return sum(each in POINTS for each in self.verdicts.values())
 
     def choices(self) -> dict[str, str]:
@@ -77,12 +77,12 @@ class Combination:
         return found | {"steps": str(given.steps)}
 
     def verdict_on(self, name: str) -> str:
-        """Return the verdict on the claim `name`; "not testable" if it was not tested."""
+        """Return the verdict on the claim `name`, by default "not testable"."""
         return self.verdicts.get(name, NOT_TESTABLE)
 
 
 def evidence() -> Iterator[Combination]:
-    """Yield every combination of assumptions with its verdicts on the testable claims."""
+    """Yield every combination with its verdicts on the testable claims."""
     scored = {entry["id"]: entry for entry in claims() if entry["kind"] in KINDS}
     for chosen in combinations():
         found = {name: _verdict(name, _relevant(entry, chosen)) for name, entry in scored.items()}
@@ -107,17 +107,15 @@ def discriminating(found: list[Combination]) -> list[str]:
 
 
 def undecided(found: list[Combination]) -> dict[str, list[str]]:
-    """Return the values of each choice that occur in combinations with the highest score."""
+    """Return, by choice, the values that occur with the highest score."""
     best = max(each.score for each in found)
     choices = [each.choices() for each in found if each.score == best]
     return {axis: sorted({each[axis] for each in choices}) for axis in choices[0]}
 
 
 def _relevant(entry: dict[str, Any], chosen: Assumptions) -> Assumptions:
-    """Return `chosen` with the defaults for assumptions on which the claim does not depend.
-
-    Combinations that then agree share one test of the claim.
-    """
+    """Return `chosen` with the defaults for assumptions on which the claim does not depend."""
+    # Combinations that then agree share one test of the claim.
     hangs_on = entry["assumptions"]
     readings = frozenset(name for name in chosen.readings if f"reading {name}" in hangs_on)
     named = [each for each in hangs_on if each.startswith("conjecture ")]

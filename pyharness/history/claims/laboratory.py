@@ -1,4 +1,4 @@
-"""The laboratory, which runs the programs under assumptions to test claims, and caches the runs."""
+"""Runs of the programs under assumptions, cached, for the tests of claims."""
 
 import math
 from collections.abc import Sequence
@@ -42,13 +42,12 @@ class Assumptions:
 class Laboratory:
     """The three programs, original or corrected, run on the cases under assumptions.
 
-    The step size of a run is divided by `parts`; `runs` and `error` have results only at the
-    undivided steps. `may_stop` switches the stop test of the Runge-Kutta program. The defects in
-    `fixed` are corrected in the original programs. Errors are against the reference solution.
+    `parts` divides the step size of a run; `runs` and `error` have results only at the undivided
+    steps. `may_stop` switches the stop test of the Runge-Kutta program. The defects in `fixed` are
+    corrected in the original programs. Errors are against the reference solution.
 
     The collocation model has n points at the times k DT/(n+1) in the step, k = 1 ... n. In the
-    original programs DT grows by the step size in every step, and the points move out of the step;
-    the torque must then be constant.
+    original programs DT grows by the step size in every step; the torque must then be constant.
     """
 
     is_original: bool
@@ -87,7 +86,7 @@ class Laboratory:
         return _truth(self.scene(case))
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
-        """Return a program's run on a case, at the steps before their division into `parts`."""
+        """Return a program's run on a case, at the undivided steps."""
         run = self.run(program, case, may_stop, parts)
         reached = run.omega[parts - 1 :: parts]
         omega = np.full((self.assumptions.steps, 3), np.nan)
@@ -96,7 +95,7 @@ class Laboratory:
         return Runs(omega, np.asarray(len(reached)), complete, overflow)
 
     def solution(self, case: int) -> Array:
-        """Return the reference omega (rad/s) of a case at its steps, shape (steps, 3)."""
+        """Return the reference omega (rad/s) of a case, shape (steps, 3)."""
         return self.truth(case).omega
 
     def error(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> float:
@@ -123,7 +122,7 @@ class Laboratory:
 
 
 def starts() -> list[Triple]:
-    """Return all initial omegas (rad/s) that occur in the thesis, and one that we add."""
+    """Return all initial omegas (rad/s) in the thesis, and one that we add."""
     given = (each["omega"] for each in facts("claims")["start"])
     return [(float(a), float(b), float(c)) for a, b, c in given]
 
@@ -141,7 +140,7 @@ def distance(first: Array, second: Array) -> float:
 
 
 def largest(truth: Reference) -> float:
-    """Return the largest magnitude of any omega component of a reference (rad/s)."""
+    """Return the largest magnitude of any reference omega component (rad/s)."""
     return float(largest_of(truth.omega))
 
 
@@ -191,11 +190,11 @@ LITERALS = ("DT=", "T=", "DT+")
 def by_literals(
     scenes: tuple[Scene, ...], terms: int, changed: frozenset[str], parts: int
 ) -> Array:
-    """Return omega of an original collocation program with changed step literals.
+    """Return omega (rad/s) of an original collocation program with changed step sizes.
 
-    The step size is divided by `parts` in the literals `changed`, elements of `LITERALS`. The
-    torque must be constant. The result (rad/s) is at the steps of the unchanged program, shape
-    (scenes, steps, 3), and NaN after an overflow.
+    The literals in `changed`, elements of `LITERALS`, are divided by `parts`. The torque must be
+    constant. The result is at the steps of the unchanged program, shape (scenes, steps, 3), and not
+    finite after an overflow.
     """
     h, steps = scenes[0].step_size, scenes[0].steps
     dt, end, growth = (h / parts if name in changed else h for name in LITERALS)
@@ -215,8 +214,8 @@ def integrate_models(
 
     `omega` (rad/s) has the shape (n, 3); the last axis of `coefficients` is A, B and C. The
     constant `torque` is divided by the moments (rad/s2). The points divide the interval (0, dt)
-    evenly; `dt` (s) grows by `growth` (s) in every step of length `end` (s). The results equal
-    those of the programs except for rounding, and are NaN after an overflow.
+    evenly; `dt` (s) grows by `growth` (s) in every step of length `end` (s). Results equal those of
+    the programs except for rounding, and are not finite after an overflow.
     """
     a, b, c = coefficients.T
 

@@ -32,7 +32,7 @@ class Survival:
 
 @dataclass(frozen=True)
 class Judgement:
-    """The verdicts on a claim, with the adopted assumptions and with each one changed alone."""
+    """The verdicts on a claim, with the adopted assumptions and with each changed alone."""
 
     claim: dict[str, Any]
     original: Judged
@@ -42,10 +42,10 @@ class Judgement:
 
 @dataclass(frozen=True)
 class Assignment:
-    """An initial omega (rad/s) for a case in which the thesis gives none, with verdicts by claim.
+    """An initial omega (rad/s) for a case without one in the thesis, with verdicts by claim.
 
-    It `holds` if the original programs reproduce, at least in part, all claims about this case,
-    except those that fail with every start.
+    It `holds` if the original programs reproduce, at least in part, all claims about this case
+    except those with the same verdict from every start.
     """
 
     case: int
@@ -69,7 +69,7 @@ def claim(identity: str) -> dict[str, Any]:
 
 @cache
 def judgement(identity: str, word: str = BINARY64) -> Judgement:
-    """Return the verdicts on a claim, with `word` as the floating-point arithmetic."""
+    """Return the verdicts on a claim, in the floating-point arithmetic `word`."""
     entry = claim(identity)
 
     def outcomes(entry: dict[str, Any], assumptions: Assumptions) -> list[Judged]:
@@ -90,7 +90,7 @@ def judgement(identity: str, word: str = BINARY64) -> Judgement:
 
 
 def judgements() -> list[Judgement]:
-    """Return all judgements."""
+    """Return the judgements of all claims."""
     return [judgement(entry["id"]) for entry in claims()]
 
 
@@ -125,8 +125,8 @@ def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:
 def assignments() -> list[Assignment]:
     """Return the verdicts from each start in each case for which the thesis gives no omega(0).
 
-    Claims about a case do not depend on another case's start. If each case has a start with which
-    its claims hold, all claims can therefore hold at once.
+    Claims about a case do not depend on the start of another. All claims can therefore hold at once
+    if each case has a start with which its claims hold.
     """
     found = []
     for case in open_starts():
@@ -174,7 +174,7 @@ KINDS = {
 
 
 def claims_report(judgements: Sequence[Judgement]) -> Report:
-    """Return the report of our verdicts, one line for each claim."""
+    """Return the report of our verdicts, a line for each claim."""
     rows = []
     for each in judgements:
         place = [each.claim[name] for name in ("id", "kind", "where")]
@@ -209,7 +209,7 @@ def kinds_table(judgements: Sequence[Judgement]) -> Table:
 
 
 def explanation(judgement: Judgement) -> Report:
-    """Return the report of one claim: quotation, rule, verdicts and their numbers."""
+    """Return the report of one claim: quotation, rule, verdicts and numbers."""
     entry = judgement.claim
     labels = {"kind": "kind", "statement": "says", "rule": "rule", "source": "by"}
     fields = [Field(f"{x:6s}", entry[name]) for name, x in labels.items() if name in entry]
@@ -229,7 +229,7 @@ def explanation(judgement: Judgement) -> Report:
 
 
 def assignments_report(assignments: Sequence[Assignment]) -> Report:
-    """Return the report on the initial omegas with which the claims about each case hold."""
+    """Return the report on the starts with which the claims about each case hold."""
     head = (
         "omega(0) of Cases 1, 3, 4, 6 and 7 is not given. With each start that the thesis shows, "
         "and (1, 1, 1), which is ours, the claims about that case alone, for the original "

@@ -1,7 +1,7 @@
 """Tests of the thesis's claims about programs and methods over several cases.
 
-Arguments and verdicts are as in `verdicts`. For the original programs, tests of weightings other
-than collocation return "not testable", because the thesis prints no such program.
+Arguments and verdicts are as in `verdicts`. The thesis prints no programs for weightings other than
+collocation; for the original programs, tests of these weightings return "not testable".
 """
 
 import math
@@ -27,10 +27,9 @@ _OTHERS = WEIGHTINGS[1:]
 
 
 def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Judged:
-    """Judge the claim that collocation is superior to Runge-Kutta.
+    """Judge whether collocation is superior to Runge-Kutta.
 
-    Errors are compared over the steps that all programs ran. The cases in `shown` add only numbers,
-    no wins.
+    Errors are compared over the steps that all programs ran. Cases in `shown` do not count as wins.
     """
     numbers, wins = {}, 0
     for case in (*cases, *shown):
@@ -46,12 +45,12 @@ def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Jud
 
 
 def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Judge the claim that eq. 19 of the thesis, the Lipschitz condition, ends unbounded runs.
+    """Judge whether eq. 19 of the thesis, the Lipschitz condition, ends unbounded runs.
 
     A quotient is the change of a derivative between two stages, divided by the change of its
-    variable. Quotients of the differential equations are at most the largest norm of the Jacobian.
-    The stop test therefore applies eq. 19 only if its quotients do not exceed this norm, which is
-    computed along the reference solution and the run.
+    variable. For the differential equations it is at most the largest norm of the Jacobian. The
+    stop test applies eq. 19 only if its quotients do not exceed this norm along the reference
+    solution and the run.
     """
     numbers: dict[str, float] = {}
     for case in cases:
@@ -73,7 +72,7 @@ def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
 
 
 def higher_powers(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -> Judged:
-    """Judge the claim that more than four terms hardly reduce the error of a collocation model."""
+    """Judge whether more than four terms hardly reduce the error of a collocation model."""
     numbers = {}
     for case in cases:
         truth = lab.truth(case).omega
@@ -87,13 +86,13 @@ def higher_powers(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -
 
 
 def larger_constant(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Judge the claim that some case needs a larger Lipschitz constant than that on the cards."""
+    """Judge whether some case needs a larger Lipschitz constant than that on the cards."""
     numbers = {f"case {n}: constant needed (1/s)": lab.required_constant(n) for n in cases}
     return graded(numbers, max(numbers.values()) > facts("cases")["deck"]["lipschitz"])
 
 
 def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
-    """Judge the claim that the stop test ends all unbounded runs, and no other runs.
+    """Judge whether the stop test ends all unbounded runs, and no other runs.
 
     A run is unbounded if, without the stop test, it overflows or exceeds `bounded` times the
     largest reference omega.
@@ -123,11 +122,11 @@ def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
 
 
 def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
-    """Judge the claim that collocation improves if the step size is divided by ten.
+    """Judge whether collocation improves if the step size is divided by ten.
 
     The two-term program must not improve in case `exception`. The step size is a literal on several
     cards. For the original programs, the numbers also count the cases of constant torque that
-    improve if only some of these literals change.
+    improve if only some literals change.
     """
     found = judged(rules.small_step(lab, cases, exception))
     if lab.is_original:
@@ -137,7 +136,7 @@ def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
 
 
 def _by_literals(lab: Laboratory, cases: Sequence[int]) -> dict[str, float]:
-    """Return how many cases have at most half the error if some `LITERALS` are divided by ten."""
+    """Return how many cases at least halve the error if some `LITERALS` are divided by ten."""
     scenes = tuple(lab.scene(case) for case in cases)
     numbers = {}
     for program, terms in zip(COLLOCATION, (2, 4), strict=True):
@@ -156,10 +155,10 @@ def _by_literals(lab: Laboratory, cases: Sequence[int]) -> dict[str, float]:
 def suffices(
     lab: Laboratory, cases: Sequence[int], terms: Sequence[int], share: float, enough: int
 ) -> Judged:
-    """Judge whether both models have errors of at most `share` in at least `enough` cases.
+    """Judge whether three- or four-term collocation is "probably sufficient for most problems".
 
-    The claim: "a three or four term collocation model is probably sufficient for most problems".
-    For the original programs, the three-term model is omitted if the torque varies.
+    In `enough` cases, the errors of both models must be at most `share` of the largest omega. For
+    the original programs, the three-term model is omitted if the torque varies.
     """
     numbers, good = {}, 0
     for case in cases:
@@ -177,10 +176,10 @@ def suffices(
 def execution_time(
     lab: Laboratory, low: float, high: float, unit_times: Mapping[str, int]
 ) -> Judged:
-    """Judge the claim that collocation takes about twice the time of Runge-Kutta.
+    """Judge whether collocation takes about twice the time of Runge-Kutta.
 
-    The operations of a step, on the cards and in our LEQT1F (linear solver), are weighted by
-    `unit_times`. They are counted as written, and with repeated terms counted once.
+    Operations per step, on the cards and in our linear solver LEQT1F, are weighted by `unit_times`.
+    They are counted as written, and with repeated terms counted once.
     """
     listings = {program: lab.listing(program) for program in PROGRAMS}
     counts = {name: operations_per_step(each) for name, each in listings.items()}
@@ -201,7 +200,7 @@ def execution_time(
 
 
 def seconds(lab: Laboratory) -> Judged:
-    """Return "not testable" for claims on run times, with the number of operations in 100 steps.
+    """Return "not testable" for claims on run times, with the operations in 100 steps.
 
     A present computer's run times are no evidence on the original machine's.
     """
@@ -211,10 +210,10 @@ def seconds(lab: Laboratory) -> Judged:
 
 
 def complexity(lab: Laboratory, factors: Sequence[float]) -> Judged:
-    """Judge the claim that the three programs have about the same number of cards.
+    """Judge whether the three programs have about the same number of cards.
 
-    The verdict is "undecided" if it depends on which of `factors` is the threshold, or on whether
-    our linear solver LEQT1F counts.
+    The verdict is "undecided" if it depends on the threshold in `factors`, or on counting our
+    linear solver LEQT1F.
     """
     cards = {each: deck_text(lab.listing(each)).count("\n") for each in PROGRAMS}
     numbers = {f"{program}: cards": float(n) for program, n in cards.items()}
@@ -233,7 +232,7 @@ def complexity(lab: Laboratory, factors: Sequence[float]) -> Judged:
 
 
 def others_failed(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -> Judged:
-    """Judge the claim that the weightings other than collocation failed."""
+    """Judge whether the weightings other than collocation failed."""
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
     numbers, useless, worst = {}, False, 0.0
@@ -253,12 +252,11 @@ def others_failed(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -
 def computer_error(
     lab: Laboratory, limit: float, words: Sequence[str], cases: Sequence[int]
 ) -> Judged:
-    """Judge the claim that rounding error makes the weightings other than collocation fail.
+    """Judge whether rounding error makes the weightings other than collocation fail.
 
-    Rounding error (rad/s) is measured in two ways. The first is the error in Case 1 with decreasing
-    steps, because every method solves this case exactly except for rounding. The second is the
-    difference between runs of the methods of section IV.2 in binary64 and in the arithmetics
-    `words`.
+    Rounding error (rad/s) is measured in Case 1 with decreasing steps, because every method solves
+    this case exactly except for rounding. It is also the difference between the methods of section
+    IV.2 in binary64 and in the arithmetics `words`.
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
@@ -280,7 +278,7 @@ def computer_error(
 
 
 def only_collocation(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -> Judged:
-    """Judge the claim that of the four weightings only collocation succeeds."""
+    """Judge whether of the four weightings only collocation succeeds."""
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
     numbers = {}
@@ -297,7 +295,7 @@ def only_collocation(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]
 def all_succeed(
     lab: Laboratory, cases: Sequence[int], terms: Sequence[int], share: float
 ) -> Judged:
-    """Judge the claim that the weighted residual methods integrate the rigid body problem."""
+    """Judge whether the weighted residual methods integrate the rigid body problem."""
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
     numbers = {
@@ -313,10 +311,10 @@ def all_succeed(
 
 
 def predict_correct(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Compare the corrected programs with collocation that makes one correction in each step.
+    """Return "not testable" for the predict-correct technique, which the thesis only recommends.
 
-    A correction uses the right-hand sides along the previous estimate. The verdict is "not
-    testable", because the thesis only recommends this method.
+    The numbers compare the corrected programs with collocation that makes one correction, from the
+    right-hand sides along the first estimate.
     """
     best = Laboratory(False, lab.assumptions)
     numbers = {}

@@ -1,7 +1,7 @@
 """Verdicts on claims from many initial omegas (starts) at once, by the functions in `rules`.
 
-A sweep supplies the starts, the listing with its readings, and the number of steps. Each start is
-used in all cases in which the thesis gives none.
+A sweep supplies the starts, the listing with its readings, and the number of steps. A start is used
+in all cases for which the thesis gives none.
 """
 
 from dataclasses import replace
@@ -36,8 +36,8 @@ _EFFORT = 1e9  # so large that there is no limit; a sweep reports its expected t
 class Starts:
     """Runs for `rules` from n initial omegas.
 
-    The reference solution is a Taylor series with the relative tolerance 1e-12. Arrays have the
-    shape (n, steps, 3), or (steps, 3) if the thesis gives omega(0).
+    The reference solution is a Taylor series of relative tolerance 1e-12. Arrays have the shape
+    (n, steps, 3), or (steps, 3) if the thesis gives omega(0).
     """
 
     def __init__(self, one: Laboratory, omega0: Array) -> None:
@@ -96,9 +96,9 @@ JUDGED = tuple(entry["id"] for entry in claims() if entry["test"] in vars(rules)
 
 
 def codes(identity: str, batch: Batch) -> NDArray[np.int8]:
-    """Return the codes of the verdict on a claim for the scenes of a batch, shape (n,).
+    """Return the verdict codes of a claim for the scenes of a batch, shape (n,).
 
-    All codes are SILENT if the claims do not apply to the sweep.
+    All are SILENT if the claims do not apply to the sweep.
     """
     entry = claim(identity)
     chosen = Assumptions(readings=frozenset(batch.listing.readings if batch.listing else ()))
@@ -115,7 +115,7 @@ FUNCTIONS = {name: partial(codes, name) for name in JUDGED}
 
 
 def judged(entry: dict[str, Any], bench: Starts, n: int) -> NDArray[np.int8]:
-    """Return the codes FAILS, HOLDS or IN_PART of a claim from n initial omegas, shape (n,)."""
+    """Return a claim's codes FAILS, HOLDS or IN_PART from n initial omegas, shape (n,)."""
     grade = vars(rules)[entry["test"]](bench, **entry["parameters"])
     found = np.where(grade.whole, HOLDS, np.where(grade.part, IN_PART, FAILS))
     return np.broadcast_to(found, (n,)).astype(np.int8)
@@ -129,11 +129,8 @@ def _bench(one: Laboratory, batch: Batch) -> Starts:
 
 
 def _laboratory(batch: Batch, assumptions: Assumptions) -> Laboratory | None:
-    """Return the laboratory of a sweep, or None if the claims do not apply.
-
-    They apply only to original or corrected programs, to bodies, torques and step sizes of the
-    thesis's cases, and to the stop test as on the cards.
-    """
+    # The claims apply only to original or corrected programs, to bodies, torques and step sizes of
+    # the thesis's cases, and to the stop test as on the cards.
     if batch.listing is None or batch.arrays.keys() & _OF_CASES:
         return None
     deck = facts("cases")["deck"]

@@ -2,8 +2,8 @@
 
 A bench supplies runs and solutions: a `Laboratory` for one start, `Starts` for n starts. `parts`
 divides the step size; rows are at the undivided steps. Arrays of omega have the shape (steps, 3) or
-(n, steps, 3); values of a `Grade` are scalars or have the shape (n,). The `rule` of the claim in
-`data/claims.toml` describes when a claim holds, and when in part.
+(n, steps, 3), values of a `Grade` the shape () or (n,). A claim's `rule` in `data/claims.toml`
+describes when it holds, and when in part.
 
 An error is the largest deviation of any omega component from the reference solution, over the steps
 that the program ran. The range of a component is its largest minus its smallest value.
@@ -47,22 +47,22 @@ class Grade(NamedTuple):
 
 
 def omega3_varies(bench: Bench, case: int, limit: float) -> Grade:
-    """Grade the claim that the range of omega3 in a case exceeds `limit` (rad/s)."""
+    """Test whether the range of omega3 in a case exceeds `limit` (rad/s)."""
     moved = spread_of(bench.solution(case))[..., 2]
     return Grade({"range of omega3 (rad/s)": moved}, moved > limit)
 
 
 def no_deviation(bench: Bench, case: int, limit: float) -> Grade:
-    """Grade the claim that errors are below `limit` (rad/s), half a unit of the last decimal."""
+    """Test whether errors are below `limit` (rad/s), half a unit of the last decimal."""
     numbers = {f"{name}: largest error (rad/s)": bench.error(name, case) for name in PROGRAMS}
     return Grade(numbers, _most(numbers) < limit)
 
 
 def concur(bench: Bench, case: int, share: float) -> Grade:
-    """Grade the claim that the two-term and the four-term program agree in a case.
+    """Test whether the two-term and the four-term program agree in a case.
 
-    Their difference must be at most `share` times the largest omega and, in each component, at most
-    a tenth of the range. If only the first condition is true, the claim holds in part.
+    The omegas may differ by `share` times the largest omega and, in each component, a tenth of the
+    range. With only the first condition, the claim holds in part.
     """
     truth = bench.solution(case)
     two, four = (bench.runs(program, case) for program in COLLOCATION)
@@ -82,9 +82,9 @@ def concur(bench: Bench, case: int, share: float) -> Grade:
 
 
 def fails(bench: Bench, case: int, share: float) -> Grade:
-    """Grade the claim that the Runge-Kutta program ends early and is wrong in a case.
+    """Test whether the Runge-Kutta program ends early and is wrong in a case.
 
-    If only one of the two is true, the claim holds in part.
+    A wrong omega deviates by over `share` of a component's range.
     """
     runs = bench.runs("runge-kutta", case)
     error = share_of_range(runs.omega, bench.solution(case))
@@ -94,14 +94,14 @@ def fails(bench: Bench, case: int, share: float) -> Grade:
 
 
 def diverged(bench: Bench, case: int) -> Grade:
-    """Grade the claim that the run of the two-term collocation program diverged in a case."""
+    """Test whether the run of the two-term collocation program diverged in a case."""
     runs, error = bench.runs("two-term", case), bench.error("two-term", case)
     numbers = {"steps": runs.steps, "largest error (rad/s)": error}
     return Grade(numbers, runs.overflow | (error > largest_of(bench.solution(case))))
 
 
 def models_concur(bench: Bench, case: int, share: float, terms: Sequence[int]) -> Grade:
-    """Grade the claim that collocation models with different numbers of terms agree in a case."""
+    """Test whether collocation models with different numbers of terms agree in a case."""
     first, *others = terms
     model, largest = bench.models(case, first), largest_of(bench.solution(case))
     numbers = {}
@@ -115,7 +115,7 @@ def models_concur(bench: Bench, case: int, share: float, terms: Sequence[int]) -
 
 
 def dynamic(bench: Bench, case: int, factor: float) -> Grade:
-    """Grade the claim that a case has at least `factor` times the acceleration of any other."""
+    """Test whether a case has at least `factor` times the acceleration of any other."""
     rates = {}
     for each in range(1, 8):
         omega = bench.runs("four-term", each).omega
@@ -129,10 +129,10 @@ def dynamic(bench: Bench, case: int, factor: float) -> Grade:
 
 
 def small_step(bench: Bench, cases: Sequence[int], exception: int) -> Grade:
-    """Grade the claim that a tenth of the step size improves collocation, with one exception.
+    """Test whether a tenth of the step size improves collocation, except for one run.
 
-    Without the exception, errors must be finite and at least halve in four fifths of the pairs of
-    program and case. If they do in half of the pairs, the claim holds in part.
+    The exception is the two-term program in case `exception`. In four fifths of the other runs,
+    errors must be finite and at least halve; in half of them, for a grade in part.
     """
     numbers, improved, excepted = {}, [], np.False_
     for program in COLLOCATION:
@@ -151,10 +151,7 @@ def small_step(bench: Bench, cases: Sequence[int], exception: int) -> Grade:
 
 
 def small_step_runge_kutta(bench: Bench, cases: Sequence[int]) -> Grade:
-    """Grade the claim that a tenth of the step size does not improve the Runge-Kutta program.
-
-    The programs run without the stop test.
-    """
+    """Test whether a tenth of the step size fails to improve Runge-Kutta without the stop test."""
     numbers = {}
     for case in cases:
         before, after = (

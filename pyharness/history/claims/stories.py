@@ -1,4 +1,4 @@
-"""Sentences of the thesis with their claims, and each claim retold as a story of three sentences.
+"""Sentences of the thesis with their claims, and a story of three sentences for each claim.
 
 `data/claims.toml` has the stories, with placeholders for the numbers of our verdict.
 """
@@ -56,17 +56,16 @@ def prose(x: float, digits: int = 3) -> str:
 
 
 def power_of_ten(exponent: int) -> str:
-    """Return a power of ten as text, with the exponent in superscript digits."""
+    """Return a power of ten as text with a superscript exponent."""
     return f"10{str(exponent).translate(_SUPERSCRIPTS)}"
 
 
 class Sentence(NamedTuple):
     """A sentence of the thesis with its claims.
 
-    `text` is the whole sentence, with formulas in LaTeX, `quote` a few words of it, and `where` its
-    place. `why` says why a sentence has no claims. `laboratory` names the run that shows the
-    sentence best, as in ``case=2&program=two-term``. `command` is a command that shows more than
-    `claims --explain`.
+    `text` is the sentence, with formulas in LaTeX, `quote` a few words of it, `where` its place.
+    `why` explains a sentence without claims. `laboratory` names the run that shows the sentence
+    best, as in ``case=2&program=two-term``. `command` shows more than `claims --explain`.
     """
 
     where: str

@@ -1,7 +1,7 @@
 """Tests of the thesis's claims about history, theory and orders.
 
-Arguments and verdicts are as in `verdicts`. An error is the largest deviation of any omega
-component from the reference solution, `limit` its allowed ratio to the largest omega.
+Arguments and verdicts are as in `verdicts`, errors as in `rules`. `limit` is the largest allowed
+ratio of error to largest omega.
 """
 
 import math
@@ -28,7 +28,7 @@ Weights = Sequence[Callable[[Array], Any]]
 
 
 def known_in_closed_form(lab: Laboratory, cases: list[int], limit: float) -> Judged:
-    """Judge the claim that the solutions of some cases are not known."""
+    """Judge whether the solutions of some cases are unknown."""
     numbers = {}
     for case in cases:
         scene, truth = lab.scene(case), lab.truth(case)
@@ -45,9 +45,9 @@ def by_sources(lab: Laboratory, holds: bool) -> Judged:
 
 
 def hamilton_ordinary(lab: Laboratory, cases: list[int], limit: float) -> Judged:
-    """Judge the claim that Hamilton's equations of a rigid body are partial differential equations.
+    """Judge whether Hamilton's equations of a rigid body are partial differential equations.
 
-    The claim is false if six ordinary equations, in Euler angles and their momenta, reproduce omega
+    The claim is false if six ordinary equations, in Euler angles and momenta, reproduce omega
     within `limit`.
     """
     from scipy.integrate import solve_ivp
@@ -100,7 +100,7 @@ def _hamilton(moments: Triple, state: Array) -> Array:
 
 
 def bounded_not_lipschitz(lab: Laboratory, decades: float, above: float) -> Judged:
-    """Judge the claim that a bounded function satisfies a Lipschitz condition.
+    """Judge whether a bounded function satisfies a Lipschitz condition.
 
     The claim is false if a quotient of the square root between x and 2 x exceeds `above`, for x
     from .01 down to 10**-decades.
@@ -114,7 +114,7 @@ def bounded_not_lipschitz(lab: Laboratory, decades: float, above: float) -> Judg
 def local_error(
     lab: Laboratory, cases: list[int], method: str, power: float, within: float
 ) -> Judged:
-    """Judge the claim that the error of one step is proportional to a `power` of the step size."""
+    """Judge whether the error of one step is proportional to a `power` of the step size."""
     stepped = partial(_stepped, method=method)
     numbers = {f"case {n}: power of the step": _power(lab.scene(n), stepped) for n in cases}
     near = [abs(each - power) <= within for each in numbers.values()]
@@ -122,9 +122,9 @@ def local_error(
 
 
 def same_as_taylor(lab: Laboratory, cases: list[int], within: float) -> Judged:
-    """Judge the claim that Runge-Kutta and the Taylor series up to h**4 are the same method.
+    """Judge whether Runge-Kutta and the Taylor series up to h**4 are the same method.
 
-    It is reproduced in part if the results of one step differ by O(h**5).
+    The claim is reproduced in part if the results of one step differ by O(h**5).
     """
     numbers, same, near = {}, True, True
     for case in cases:
@@ -174,9 +174,9 @@ def _taylor_step(scene: Scene, order: int) -> Array:
 
 
 def crandall_example(lab: Laboratory, best: list[str], rate: float) -> Judged:
-    """Judge the claim that four weightings beat the Taylor series in Crandall's example.
+    """Judge whether four weightings beat the Taylor series in Crandall's example.
 
-    The example is dx/dt = `rate` x, x(0) = 1 on (0, 1), with the trial function 1 + c1 t + c2 t**2.
+    The example is dx/dt = `rate` x, x(0) = 1 on (0, 1), with trial function 1 + c1 t + c2 t**2.
     """
     t, weight = np.polynomial.legendre.leggauss(12)
     t, weight = (t + 1.0) / 2.0, weight / 2.0
@@ -206,10 +206,7 @@ def crandall_example(lab: Laboratory, best: list[str], rate: float) -> Judged:
 
 
 def _weighted(t: Array, weight: Array, factors: Weights, rate: float, by: Weights) -> Array:
-    """Return the equations for c1 and c2 of Crandall's example, a row for each weight function.
-
-    A row has the weighted integrals over (0, 1) of the `factors` of c1 and c2, and of `rate`.
-    """
+    """Return rows of Crandall's equations: integrals of each weight times `factors` and `rate`."""
     halves = [(t / 2.0, weight / 2.0), ((t + 1.0) / 2.0, weight / 2.0)]
     rows = []
     for function in by:
@@ -222,7 +219,7 @@ def _weighted(t: Array, weight: Array, factors: Weights, rate: float, by: Weight
 
 
 def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judged:
-    """Judge the claim that the rates Q of eq. 32 of the thesis determine stability.
+    """Judge whether the rates Q of eq. 32 of the thesis determine stability.
 
     A relative perturbation of a steady rotation by 1e-8 should grow at the rate Re Q (1/s) or, if
     Re Q is 0, remain within ten times its initial size for ten periods.
@@ -252,9 +249,9 @@ def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judge
 
 
 def trial_form_solves(lab: Laboratory, cases: list[int], limit: float) -> Judged:
-    """Judge the claim that a trial solution of eq. 32 of the thesis solves some cases exactly.
+    """Judge whether a trial solution of eq. 32 of the thesis solves some case exactly.
 
-    The trial solution is a steady rotation about axis 3 plus exponential functions of time.
+    It is a steady rotation about axis 3 plus exponential functions of time.
     """
     numbers = {}
     for case in cases:
@@ -270,7 +267,7 @@ def trial_form_solves(lab: Laboratory, cases: list[int], limit: float) -> Judged
 
 
 def one_term_suffices(lab: Laboratory, case: int, limit: float) -> Judged:
-    """Judge the claim that one-term collocation suffices for a linear top (Case 1: a sphere)."""
+    """Judge whether one-term collocation suffices for a linear top (Case 1: a sphere)."""
     found = run(lab.scene(case), Member("collocation", 1))
     truth = lab.truth(case)
     share = distance(found.omega, truth.omega) / largest(truth)
@@ -279,7 +276,7 @@ def one_term_suffices(lab: Laboratory, case: int, limit: float) -> Judged:
 
 
 def symmetric_uncoupled(lab: Laboratory, cases: list[int]) -> Judged:
-    """Judge the claim that Euler's equations of a symmetric body have no products of omegas."""
+    """Judge whether Euler's equations of a symmetric body have no products of omegas."""
     bodies = {case: lab.scene(case).euler_coefficients for case in cases}
     left = {f"case {n}: largest coefficient": max(map(abs, x)) for n, x in bodies.items()}
     none = [each == 0.0 for each in left.values()]
@@ -287,7 +284,7 @@ def symmetric_uncoupled(lab: Laboratory, cases: list[int]) -> Judged:
 
 
 def step_on_cards(lab: Laboratory, step: float) -> Judged:
-    """Judge the claim that each of the three decks sets DT to `step` (s) before its loop."""
+    """Judge whether each of the three decks sets DT to `step` (s) before its loop."""
     cards = [card for program in PROGRAMS for card in deck(program).cards.values()]
     setting = (card for card in cards if card.statement.startswith("DT=."))
     numbers = {f"{x.program}: DT (s)": float(x.statement.partition("=")[2]) for x in setting}
@@ -296,7 +293,7 @@ def step_on_cards(lab: Laboratory, step: float) -> Judged:
 
 
 def points_inside(lab: Laboratory, cases: list[int]) -> Judged:
-    """Judge the claim that the collocation points are within the step."""
+    """Judge whether the collocation points are within the step."""
     (case,) = cases
     numbers, shares = {}, []
     for program, last in (("two-term", 2.0 / 3.0), ("four-term", 0.8)):
@@ -310,7 +307,7 @@ def points_inside(lab: Laboratory, cases: list[int]) -> Judged:
 
 
 def possible_bodies(lab: Laboratory, cases: list[int]) -> Judged:
-    """Judge the claim that every case is a possible rigid body."""
+    """Judge whether every case is a possible rigid body."""
     excess = {}
     for case in cases:
         first, second, third = sorted(lab.scene(case).moments or (), reverse=True)

@@ -1,12 +1,11 @@
 """Tests of the thesis's claims about one case.
 
-Each function is the `test` of one or more claims in `data/claims.toml`; further tests are in
-`methods`, `theory` and `rules`. The claim's `rule` describes the decision, and its `parameters` are
-the keyword arguments. `lab` runs the programs, original or corrected; `case` is a number of Table
-1.
+Each function is the `test` of claims in `data/claims.toml`; further tests are in `methods`,
+`theory` and `rules`. The claim's `rule` describes the decision, its `parameters` are the keyword
+arguments. `lab` runs the programs, original or corrected; `case` is a number of Table 1.
 
 Errors and ranges are defined in `rules`. The amplitude is half the largest range of a component of
-the reference omega. A claim that fails is "not reproduced"; a test that passes `otherwise` calls it
+the reference omega. A claim that fails is "not reproduced" or, if the test passes `otherwise`,
 "false".
 """
 
@@ -50,13 +49,13 @@ def judged(grade: rules.Grade, otherwise: str = NOT_REPRODUCED) -> Judged:
 
 
 def constant_solution(lab: Laboratory, case: int) -> Judged:
-    """Judge the claim that the solution of a case is constant; it may vary by 1e-12 rad/s."""
+    """Judge whether the solution of a case is constant, within 1e-12 rad/s."""
     moved = float(rules.spread_of(lab.truth(case).omega).max())
     return graded({"change over the run (rad/s)": moved}, moved <= 1e-12, otherwise=FALSE)
 
 
 def known_solution(lab: Laboratory, case: int) -> Judged:
-    """Judge the claim that the solution of a case is (sin 5t, cos 5t, 10) rad/s, as printed."""
+    """Judge whether the solution of a case is (sin 5t, cos 5t, 10) rad/s, as printed."""
     truth = lab.truth(case)
     t = truth.time
     printed = np.column_stack([np.sin(5 * t), np.cos(5 * t), np.full_like(t, 10.0)])
@@ -67,14 +66,14 @@ def known_solution(lab: Laboratory, case: int) -> Judged:
 
 
 def omega3_varies(lab: Laboratory, case: int, limit: float) -> Judged:
-    """Judge the claim that omega3 varies in a case; if not, the claim is "false"."""
+    """Judge whether omega3 varies in a case by more than `limit` (rad/s)."""
     return judged(rules.omega3_varies(lab, case, limit), FALSE)
 
 
 def no_deviation(lab: Laboratory, case: int, limit: float) -> Judged:
-    """Judge the claim that all three programs coincide with the known solution of a case.
+    """Judge whether all three programs coincide with the known solution of a case.
 
-    The numbers include the count of Runge-Kutta steps from each initial omega in `starts`.
+    The numbers include the Runge-Kutta steps completed from each initial omega in `starts`.
     """
     found = judged(rules.no_deviation(lab, case, limit))
     for start in starts():
@@ -85,7 +84,7 @@ def no_deviation(lab: Laboratory, case: int, limit: float) -> Judged:
 
 
 def coincident(lab: Laboratory, case: int, share: float) -> Judged:
-    """Judge the claim that collocation coincides with the known solution on the printed graph."""
+    """Judge whether collocation coincides with the known solution on the printed graph."""
     numbers = {}
     for program in COLLOCATION:
         runs, truth = lab.runs(program, case), lab.solution(case)
@@ -95,7 +94,7 @@ def coincident(lab: Laboratory, case: int, share: float) -> Judged:
 
 
 def error_size(lab: Laboratory, case: int, low: float, high: float) -> Judged:
-    """Judge the claim that collocation errors are from `low` to `high` times the amplitude."""
+    """Judge whether collocation errors are from `low` to `high` times the amplitude."""
     amplitude = _amplitude(lab, case)
     numbers = {
         f"{program}: largest error over the amplitude": lab.error(program, case) / amplitude
@@ -105,7 +104,7 @@ def error_size(lab: Laboratory, case: int, low: float, high: float) -> Judged:
 
 
 def poor(lab: Laboratory, case: int, share: float) -> Judged:
-    """Judge the claim that the Runge-Kutta error exceeds `share` of the amplitude."""
+    """Judge whether the Runge-Kutta error exceeds `share` of the amplitude."""
     found = lab.error("runge-kutta", case) / _amplitude(lab, case)
     return graded({"largest error over the amplitude": found}, found > share)
 
@@ -115,7 +114,7 @@ def _amplitude(lab: Laboratory, case: int) -> float:
 
 
 def error_constant(lab: Laboratory, case: int) -> Judged:
-    """Judge the claim that the error of collocation does not grow during the run."""
+    """Judge whether the error of collocation does not grow during the run."""
     truth = lab.truth(case).omega
     numbers = {}
     for program in COLLOCATION:
@@ -127,9 +126,9 @@ def error_constant(lab: Laboratory, case: int) -> Judged:
 
 
 def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
-    """Judge the claim that the stop test ended the Runge-Kutta run at step `step`.
+    """Judge whether the stop test ended the Runge-Kutta run at step `step`.
 
-    The numbers describe the subsets of defects with which the run stops at that step.
+    The numbers describe the subsets of defects with which it stops there.
     """
     stop = lab.run("runge-kutta", case).stop
     name, readings = "runge-kutta", lab.listing("runge-kutta").readings
@@ -149,7 +148,7 @@ def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
 
 
 def growing(lab: Laboratory, case: int) -> Judged:
-    """Judge the claim that omega1 of Runge-Kutta becomes larger than the true sine function."""
+    """Judge whether omega1 of Runge-Kutta becomes larger than the true sine function."""
     run = lab.run("runge-kutta", case)
     value, solution = float(run.omega[-1, 0]), float(lab.truth(case).omega[run.steps - 1, 0])
     numbers = {"omega1 at the end (rad/s)": value, "solution there (rad/s)": solution}
@@ -159,7 +158,7 @@ def growing(lab: Laboratory, case: int) -> Judged:
 def search(lab: Laboratory, case: int) -> Judged:
     """Return "not testable" for the claim that the author searched Runge-Kutta for a fault.
 
-    The number is the original program's numerical error divided by the corrected program's.
+    The number is the Runge-Kutta error divided by that of the corrected program.
     """
     run = lab.run("runge-kutta", case)
     best = Laboratory(False, lab.assumptions).run("runge-kutta", case)
@@ -169,23 +168,23 @@ def search(lab: Laboratory, case: int) -> Judged:
 
 
 def differ(lab: Laboratory, case: int, share: float) -> Judged:
-    """Judge the claim that the collocation programs differ by over `share` of the largest omega."""
+    """Judge whether the collocation programs differ by over `share` of the largest omega."""
     two, four = (lab.run(program, case).omega for program in COLLOCATION)
     apart = distance(two, four) / largest(lab.truth(case))
     return graded({"difference over the largest omega": apart}, apart > share)
 
 
 def more_reliable(lab: Laboratory, case: int) -> Judged:
-    """Judge the claim that the four-term program is more accurate than the two-term program."""
+    """Judge whether the four-term program is more accurate than the two-term program."""
     ratio = lab.error("four-term", case) / lab.error("two-term", case)
     return graded({"four-term error over two-term error": ratio}, ratio <= 0.5, ratio <= 0.8)
 
 
 def too_fast(lab: Laboratory, case: int, same: float, worse: float) -> Judged:
-    """Judge the claim that the two-term error is due to a motion too fast for two terms.
+    """Judge whether the two-term error is due to a motion too fast for two terms.
 
-    The corrected programs run from all initial omegas in `starts`, because the thesis gives none
-    for some cases.
+    The corrected programs run from all `starts`, because the thesis gives no omega(0) for some
+    cases.
     """
     numbers = {}
     for start in starts():

@@ -108,13 +108,13 @@ class Listing:
 
 
 def flagged() -> list[dict[str, Any]]:
-    """Return the entries of `data/apparatus.toml` that have a switch; "flag" is the bit of each."""
+    """Return the entries of `data/apparatus.toml` with a switch, whose bit number is "flag"."""
     return [entry for entry in facts("apparatus")["entry"] if "flag" in entry]
 
 
 @cache
 def names_of(kind: str, program: str | None = None) -> tuple[str, ...]:
-    """Return the names of a kind, such as "defect", in one program or in all."""
+    """Return the names of a kind, such as "defect", in one program or all."""
     return tuple(
         entry["id"]
         for entry in flagged()
@@ -129,7 +129,7 @@ def switchable(program: str | None = None) -> tuple[str, ...]:
 
 @cache
 def switches(program: str) -> tuple[str, ...]:
-    """Return the defects and conjectures that are active in the original program."""
+    """Return the defects and conjectures of the original program."""
     return tuple(
         entry["id"]
         for entry in flagged()
@@ -213,7 +213,7 @@ def subset(
 
 
 def checked_listing(listing: object) -> Listing:
-    """Return the user's argument `listing`, or raise InputError."""
+    """Return `listing`; raise InputError unless it is a Listing."""
     if isinstance(listing, Listing):
         return listing
     raise InputError(f"listing is {kind_of(listing)}; it must be a Listing, as subset makes one")

@@ -1,8 +1,7 @@
-"""NumPy's functions for arrays of symbols, while a user's function is recorded.
+"""Replacements of NumPy's functions, used while a user's function is recorded with symbols.
 
-Symbols can't overload NumPy's choices (such as where), comparisons and linear algebra, nor be
-assigned to elements of numpy.zeros. During recording, these functions are therefore replaced in
-numpy, numpy.linalg and math. Calls from other threads or without symbols reach the originals.
+Symbols do not support choices (such as where), array comparisons, linear algebra, and assignment to
+elements of numpy.zeros. Calls from other threads or without symbols reach the originals.
 """
 
 import math
@@ -30,7 +29,7 @@ _originals: list[tuple[Any, str, Any]] = []
 
 @contextmanager
 def replaced_functions(with_targets: bool) -> Iterator[None]:
-    """Replace functions for this thread; with `with_targets`, also those that make arrays."""
+    """Replace functions in this thread; `with_targets` includes numpy.zeros, empty and ones."""
     global _installed
     before = getattr(_here, "targets", None)
     with _lock:
@@ -77,7 +76,7 @@ class _Replaced:
 
 
 class _Target(_Replaced):
-    """A replacement of a function that makes an array, to which symbols can be assigned."""
+    """A replacement of numpy.zeros, empty or ones, whose array accepts symbols."""
 
     def __init__(self, original: Callable[..., Any], value: float) -> None:
         super().__init__(original, lambda shape, *_, **__: symbol_array(np.full(shape, value)))
@@ -127,7 +126,7 @@ class SymbolArray(np.ndarray[Any, Any]):
 
 
 def symbol_array(values: Any) -> Any:
-    """Return symbols and numbers as an array."""
+    """Return an array of symbols and numbers."""
     return np.array(values, dtype=object).view(SymbolArray)
 
 
@@ -289,7 +288,7 @@ def called_once(
 ) -> list[Any]:
     """Return the components that a user's function returns for symbols.
 
-    Raise InputError, which describes `allowed` functions, if the function raises an exception.
+    Raise InputError, with the text `allowed`, for any other outcome.
     """
     for with_targets in (False, True):
         try:

@@ -12,7 +12,7 @@ from pyharness.model.pipes import write_waiting
 
 
 def check_writable(path: str, option: str) -> None:
-    """Raise InputError, which names `option`, if no file can be written at `path`."""
+    """Raise InputError, naming `option`, if no file can be written at `path`."""
     try:
         # A link is followed to its target, as in an ordinary write.
         target = Path(os.path.realpath(path)) if "\0" not in path else Path()
@@ -47,10 +47,10 @@ def check_writable(path: str, option: str) -> None:
 
 
 def write_files(contents: dict[str, bytes], option: str) -> None:
-    """Write several files, all or none; raise InputError, which names `option`, on failure.
+    """Write all files or none; raise InputError, naming `option`, on failure.
 
-    They get temporary names, then are renamed. After a failure or Ctrl-C, the previous files are
-    restored. Devices and pipes are written first, and never replaced.
+    Files get temporary names, then are renamed. After a failure or Ctrl-C, the old files are
+    restored. Devices and pipes are written first.
     """
     path = ""
     try:
@@ -82,10 +82,10 @@ def write_files(contents: dict[str, bytes], option: str) -> None:
 
 
 class DeferredInterrupt:
-    """A context that defers Ctrl-C, which might leave temporary files behind."""
+    """A context manager that defers Ctrl-C, so that no temporary files remain."""
 
     def __enter__(self) -> Self:
-        """Install a handler that only records an interrupt."""
+        """Install a handler that records interrupts."""
         self._came = False
         self._before = signal.getsignal(signal.SIGINT)
         # Python raises KeyboardInterrupt only in the main thread.

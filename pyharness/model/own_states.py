@@ -17,9 +17,9 @@ _TAKEN = (
 
 
 class OwnState(NamedTuple):
-    """An own state, in any unit: its name, and its value at time 0.
+    """An own state: its name, and its value at time 0 in any unit.
 
-    Its error is relative to its largest absolute value so far, or to `scale` if that is larger.
+    Its error is relative to its largest absolute value so far, or to a larger `scale`.
     """
 
     name: str

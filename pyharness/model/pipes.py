@@ -13,10 +13,10 @@ _PIECE = 1 << 20
 
 
 def read_input(path: str | os.PathLike[str], where: str, limit: int, what: str) -> bytes:
-    """Return the content of a file or pipe that a user named.
+    """Return the content of a user's file or pipe.
 
-    Raise InputError, beginning with `where`, for an unreadable path, a folder, a device, more than
-    `limit` bytes, or a pipe without data for 10 s; `what` is the expected content.
+    Raise InputError, beginning with `where`, for an unreadable path, a folder, a device, more
+    than `limit` bytes, or a pipe without data for 10 s. `what` names the expected content.
     """
     try:
         content = _read(os.fspath(path), limit)
@@ -58,7 +58,7 @@ def _is_quiet(handle: int) -> bool:
 
 
 def write_waiting(path: str, content: bytes) -> None:
-    """Write to a device, or a pipe; raise OSError if a pipe has no reader within 10 s."""
+    """Write to a device or pipe; raise OSError if a pipe has no reader within 10 s."""
     end = time.monotonic() + PATIENCE
     while True:
         try:

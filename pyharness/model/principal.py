@@ -20,26 +20,26 @@ from pyharness.model.waves import exact_law
 class PrincipalScene(Scene):
     """A scene about the principal axes, with moments in double-double precision.
 
-    In double precision, A, B, C of nearly equal moments would have large relative rounding errors.
+    In double precision, differences of nearly equal moments would have large relative errors.
     """
 
     moments_low: Triple = (0.0, 0.0, 0.0)
 
     @property
     def exact_moments(self) -> Exact:
-        """The sums of `moments` and `moments_low` (kg m2) as exact fractions."""
+        """The sums `moments` + `moments_low` (kg m2) as exact fractions."""
         pairs = zip(self.moments or (), self.moments_low, strict=True)
         return triple(Fraction(high) + Fraction(low) for high, low in pairs)
 
     @cached_property
     def euler_coefficients(self) -> Triple:
-        """The coefficients A, B, C from `exact_moments`, each rounded once."""
+        """The coefficients A, B, C of Euler's equations, each rounded once."""
         i1, i2, i3 = self.exact_moments
         return triple(map(nearest_float, ((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3)))
 
 
 def in_double(scene: Scene) -> Scene:
-    """Return a scene with moments in double precision."""
+    """Return the scene with moments in double precision."""
     if not isinstance(scene, PrincipalScene):
         return scene
     return Scene(**_fields(scene))
@@ -116,7 +116,7 @@ def in_scene_axes(found: Trajectory, axes: Array) -> Trajectory:
 def states_in_scene_axes(states: Array, axes: Array, own: int) -> Array:
     """Return rows of states, transformed from principal `axes` (columns) to the body axes.
 
-    Columns from `own` on, states that the user added, are unchanged.
+    The user's own states, columns from `own` on, are unchanged.
     """
     turned, rest = states[:, 3:own], states[:, own:]
     if own > 3:

@@ -1,4 +1,4 @@
-"""Reports of the progress of long computations, and the division of many bodies among threads."""
+"""Reports of progress, and the division of many bodies among threads."""
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
@@ -44,14 +44,14 @@ def bar_of_bodies(is_shown: bool) -> Iterator[None]:
 
 
 def expect_bodies(n: int) -> None:
-    """Set the number of bodies of the bar, if any, once."""
+    """Set the total of a progress bar that has none."""
     bar = _bar.get()
     if bar is not None and bar.total is None:
         bar.reset(total=n)
 
 
 def count_done(n: int) -> None:
-    """Add n completed bodies to the bar, if any."""
+    """Add n bodies to the progress bar, if any."""
     bar = _bar.get()
     if bar is not None:
         bar.update(n)
@@ -59,7 +59,7 @@ def count_done(n: int) -> None:
 
 @contextmanager
 def progress_of(choice: bool | Progress, what: str) -> Iterator[Progress]:
-    """Provide a function that reports progress: `choice`, or for True one with a bar."""
+    """Yield the function `choice`, or one that updates a bar (True) or does nothing (False)."""
     if callable(choice):
         yield choice
     elif not boolean("progress", choice):
@@ -82,9 +82,10 @@ def for_each_piece(
     threads: int,
     pieces: Sequence[slice] | None = None,
 ) -> None:
-    """Call ``work(piece, given_up)`` in threads for `pieces` of n bodies, by default equal ranges.
+    """Call ``work(piece, given_up)`` in threads for each of `pieces`, by default equal slices of n.
 
-    After an exception, for example Ctrl-C, `given_up[0]` is 1; kernels poll it, and then return.
+    With several threads, an exception (such as Ctrl-C) sets `given_up[0]` to 1; kernels poll it
+    and return.
     """
     if not n:
         return

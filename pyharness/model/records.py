@@ -15,8 +15,7 @@ from pyharness.model.trajectory import Trajectory
 def scene_record(scene: Scene) -> dict[str, Any]:
     """Return a scene for JSON, with the keys of a scene file and "case".
 
-    If the torque is a function, "torque" has the number of recorded operations, or "opaque" if it
-    has none.
+    For a function, "torque" has only the number of recorded operations, or "opaque".
     """
     body, values = body_of(scene)
     return {
@@ -73,7 +72,7 @@ def listing_record(listing: Listing) -> dict[str, Any]:
 
 
 def ending_record(trajectory: Trajectory) -> dict[str, Any]:
-    """Return the work and the end of a run for JSON."""
+    """Return the work and the ending of a run for JSON."""
     stop = trajectory.stop
     return {
         "steps": trajectory.steps,
@@ -84,7 +83,7 @@ def ending_record(trajectory: Trajectory) -> dict[str, Any]:
 
 
 def estimate_record(trajectory: Trajectory) -> dict[str, float | None]:
-    """Return a method's estimates for JSON."""
+    """Return a trajectory's error estimates for JSON."""
     return {name: getattr(trajectory, name) for name in ("error", "growth", "digits")}
 
 

@@ -1,6 +1,6 @@
 """Recurrences, slopes and rounding errors of recorded operations, as C.
 
-fortran/make_cases.py writes them for the interpreter, `pyharness.engine.leaves` for compiled code.
+They are for the interpreter (fortran/make_cases.py) and compiled code (`pyharness.engine.leaves`).
 """
 
 from typing import NamedTuple
@@ -9,13 +9,12 @@ from pyharness.model.codes import Operations
 
 
 class Operation(NamedTuple):
-    """The recurrence of an operation's Taylor series, and its partial derivatives (slopes), as C.
+    """The recurrence of an operation's Taylor series and its partial derivatives (slopes), as C.
 
-    The letters o, p and q stand for results, x and y for operands. For each letter, such as o, t_o
-    is term k of the series (l_o of a table, known before), b_o term k - 1, z_o term 0, f_o term 1,
-    and m_o the value at a node. i is 1/k. s0 and s1 are sums of products of terms 1 to k - 1 of the
-    series in `pairs`. To its own rounding error, a result adds those of the operands times the
-    absolute slopes.
+    Letters o, p and q are results, x and y operands. For o, for example, t_o is term k of the
+    series (l_o for a table), b_o term k - 1, z_o term 0, f_o term 1, and m_o the value at a
+    node. i is 1/k. s0 and s1 sum products of terms 1 to k - 1 of the series in `pairs`. The
+    rounding error of a result is its own plus those of the operands times the absolute slopes.
     """
 
     series: tuple[str, ...]

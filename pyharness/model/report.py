@@ -1,7 +1,6 @@
 """Reports: the results of a subcommand as data, which `pyharness.views` renders.
 
-The types are named tuples, because dataclasses would take five times as long to create at every
-start.
+Dataclasses would take five times as long as named tuples to create at every start.
 """
 
 import math
@@ -31,7 +30,7 @@ def plain(value: Any) -> str:
 
 
 def short(x: "float | Decimal | None") -> str:
-    """Return a number with two significant digits, such as 1.2e-3; None is a dash."""
+    """Return a number with two digits, such as 1.2e-3; None is a dash."""
     if x is None:
         return "-"
     if math.isnan(x) or math.isinf(x) or x == 0:
@@ -46,12 +45,12 @@ def digits(form: str, scale: float = 1.0) -> Callable[[float | None], str]:
 
 
 def counted(number: int, what: str) -> str:
-    """Return a number with its noun, such as 1 step, 2 steps."""
+    """Return a number with its noun, such as 2 steps."""
     return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 def format_duration(seconds: float) -> str:
-    """Return a duration as text, in a unit from seconds to days."""
+    """Return a duration (s) as text, in s, min, h or days."""
     for limit, unit, name in ((120.0, 1.0, "s"), (7200.0, 60.0, "min"), (172800.0, 3600.0, "h")):
         if seconds < limit:
             return f"{seconds / unit:{'.2g' if seconds < 99.5 else '.0f'}} {name}"
@@ -73,7 +72,7 @@ def format_bytes(number: float) -> str:
 
 
 class Column(NamedTuple):
-    """A column of a table: head and format for rounded numbers, and for CSV."""
+    """A table column: head and format for rounded numbers and for CSV."""
 
     head: str
     write: Callable[[Any], str] = plain
@@ -85,7 +84,7 @@ class Column(NamedTuple):
 
 
 def words(heads: str) -> list[Column]:
-    """Return left-aligned columns; `heads` are separated by blanks."""
+    """Return left-aligned columns; blanks separate `heads`."""
     return [Column(head, left=True) for head in heads.split()]
 
 
@@ -110,7 +109,7 @@ class Table(NamedTuple):
 
 
 def numbers(names: str, rows: Sequence[Sequence[Any]]) -> Table:
-    """Return a table for CSV only; `names` are its heads, separated by blanks."""
+    """Return a table for CSV only; blanks separate its heads `names`."""
     return Table([Column(name) for name in names.split()], rows)
 
 
@@ -132,7 +131,7 @@ Section = Sequence[str | Field | Table]
 
 
 class Picture:
-    """A matplotlib figure, its numbers, and the paragraphs of its title."""
+    """A matplotlib figure, its numbers, and paragraphs of its title."""
 
     def __init__(self, figure: "Figure", numbers: Table, title: Sequence[str] = ()) -> None:
         self.figure, self.numbers, self.title = figure, numbers, title
@@ -143,7 +142,7 @@ Case = tuple[str, str, str, str]
 
 
 class Report(NamedTuple):
-    """The results of a subcommand, from which every output format is written."""
+    """The results of a subcommand, for all output formats."""
 
     title: str  # the subcommand
     text: Sequence[Section]  # for the terminal; empty sections are skipped

@@ -383,7 +383,7 @@ Scene.__init__ = with_hints(Scene.__init__)  # type: ignore[method-assign]
 
 
 def breaks_triangle(moments: Iterable[Any]) -> bool:
-    """Return whether the largest moment exceeds the others' sum by more than rounding."""
+    """Return whether the largest moment exceeds the others' sum by more than 2**-50 of itself."""
     low, middle, high = sorted(moments)
     return bool((high - middle - low) * _ROUNDED > high)
 
@@ -425,8 +425,8 @@ def checked_scene(
 ) -> Scene:
     """Return `scene`; raise InputError unless it is a Scene that the flags allow.
 
-    They allow a full inertia matrix (`any_axes`), a torque about the axes of space (`any_torque`)
-    or dependent on the state (`any_state`), a changing inertia, and own states (`Scene.states`).
+    The flags allow a full inertia matrix (`any_axes`), torque about space axes (`any_torque`)
+    or of the state (`any_state`), `changing` inertia, and own `states`.
     """
     if isinstance(scene, Scene):
         if scene.states and not states:

@@ -1,6 +1,6 @@
-"""Scenes of the cases of Table 1 of the thesis, and the text of scene files (TOML).
+"""Scenes of Table 1 of the thesis, and the text of scene files (TOML).
 
-`pyharness.engine.scene_reader` reads these files. Messages begin with the argument `where`.
+`pyharness.engine.scene_reader` reads scene files. Messages begin with the argument `where`.
 """
 
 import os
@@ -82,7 +82,7 @@ def read_file(path: str | os.PathLike[str], where: str) -> bytes:
 
 
 def toml_of(content: bytes, where: str) -> dict[str, Any]:
-    """Return the data of a TOML text; raise InputError if it is not TOML."""
+    """Return the data of a TOML text; raise InputError if invalid."""
     try:
         return tomllib.loads(content.decode("utf-8-sig"))
     except UnicodeDecodeError:
@@ -182,7 +182,7 @@ def _has_form(torque: TorqueLaw | StateTorque) -> bool:
 
 
 def law_table(law: TorqueLaw) -> dict[str, Any]:
-    """Return the table [torque] of a torque law without its frame."""
+    """Return the table [torque] of a law, without its frame."""
     waves = {
         key: [{"amplitude": list(amplitude), "frequency": f} for amplitude, f in getattr(law, key)]
         for key in _WAVES
@@ -208,7 +208,7 @@ def _toml(value: Any) -> str:
 
 
 def body_of(scene: Scene) -> tuple[str, Any]:
-    """Return the key and the value of the body in a scene file."""
+    """Return key and value of the body in a scene file."""
     if isinstance(scene.changing, InertiaFunction):
         return scene.changing.place, scene.changing.values()
     if isinstance(scene.changing, ChangingMoments):
@@ -220,7 +220,7 @@ def body_of(scene: Scene) -> tuple[str, Any]:
 
 
 def as_lists(value: Any) -> Any:
-    """Return the value with lists for tuples, and tables for torque laws."""
+    """Return a value with lists for tuples and tables for torque laws."""
     if isinstance(value, TorqueLaw):
         return law_table(value)
     return list(map(as_lists, value)) if isinstance(value, tuple) else value
@@ -244,13 +244,13 @@ def _waves(where: str, entries: object) -> list[tuple[Any, Any]]:
 
 
 def check_written_schema(data: dict[str, Any], kind: str) -> None:
-    """Raise InputError if a user's file has an unsupported schema number."""
+    """Raise InputError if a file has an unsupported schema number."""
     given = data.get("schema", SCHEMAS[kind])
     check_schema("top level", kind, given, "write it in that form, or take a version that reads it")
 
 
 def check_keys(table: dict[str, Any], allowed: Iterable[str], where: str) -> None:
-    """Raise InputError if a table has a key that is not `allowed`."""
+    """Raise InputError for a table key that is not `allowed`."""
     for key in table:
         if key not in allowed:
             raise unknown("key", key, allowed, where)

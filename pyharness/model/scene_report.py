@@ -126,7 +126,7 @@ def _tuple(values: Sequence[float]) -> str:
 
 
 def ending(trajectory: Trajectory) -> str:
-    """Return a line on the end of a run."""
+    """Return a line on how a run ended."""
     steps = counted(trajectory.steps, "step")
     counts = f"{steps}, {counted(trajectory.evaluations, 'right-hand side')}"
     if trajectory.stop is not None:
@@ -153,7 +153,7 @@ def sensitive(growth: float | None, digits: float | None) -> str:
 
 
 def estimates(trajectory: Trajectory) -> list[str]:
-    """Return at most one line, with a method's estimates."""
+    """Return at most one line, with error estimates."""
     told = []
     if trajectory.error is not None and trajectory.digits is not None:
         of = "of the largest |omega|" + (" or of a state" if trajectory.states else "")

@@ -151,7 +151,7 @@ class StateTorque:
 
 
 def torque_of(tape: Tape, time: Any, omega: Any, attitude: Any, *own: Any) -> Array:
-    """Return the outputs of a tape for symbols as its inputs: torque, rates of `Scene.states`."""
+    """Return the torque and the rates of `Scene.states` that a tape gives for symbols."""
     return np.array(evaluate(tape, [time, *omega, *attitude, *own], SYMBOLS), dtype=object)
 
 
@@ -169,13 +169,13 @@ def _recorded_with(recorder: Recorder, function: Function) -> Tape:
 
 @lru_cache(maxsize=64)
 def of_law(law: TorqueLaw) -> StateTorque:
-    """Return a torque law about axes of body or space as a recorded torque."""
+    """Return a torque law as a recorded torque about the body axes."""
     given = turned_law if law.in_space else body_torque
     return replayed(lambda time, omega, attitude: given(law, time, attitude))
 
 
 def turned_law(law: TorqueLaw, time: Symbol, attitude: Any) -> Array:
-    """Return the components about the body axes of a law about the axes of space.
+    """Return the body components of a law about the axes of space.
 
     Laws with equally many frequencies have the same operations, and share compiled code.
     """
@@ -285,7 +285,7 @@ def _listed(names: Iterable[str]) -> str:
 
 
 def count_arguments(function: Function, where: str, allowed: str) -> int:
-    """Return the number of arguments of a function of `Scene.states`: 3, or 4 with the attitude."""
+    """Return the argument count of a torque with own states: 3, or 4 with attitude."""
     parameters = _parameters(function, where, f"allowed: {allowed}")
     count = sum(each.kind in _POSITIONAL for each in parameters)
     if count not in (3, 4):
@@ -327,17 +327,17 @@ def opaque(function: Any) -> StateTorque:
 
 
 def is_opaque(torque: object) -> bool:
-    """Return whether a torque calls a function that is not recorded."""
+    """Return whether a torque calls an unrecorded function."""
     return isinstance(torque, StateTorque) and torque.tape is None
 
 
 def has_switches(torque: object) -> bool:
-    """Return whether a torque is recorded and has operations that jump."""
+    """Return whether a recorded torque has operations that jump."""
     return isinstance(torque, StateTorque) and bool(torque.tape and torque.tape.n_switches)
 
 
 def checked_torque(value: object, states: tuple[str, ...] = ()) -> TorqueLaw | StateTorque:
-    """Return a user's torque, recorded if it is a function, or raise InputError."""
+    """Return a user's torque, with functions recorded, or raise InputError."""
     found: TorqueLaw | StateTorque
     if isinstance(value, (TorqueLaw, StateTorque)):
         found = value
@@ -391,7 +391,6 @@ def law_of(torque: StateTorque) -> TorqueLaw | None:
 
 
 def _with_parameters(torque: StateTorque, function: Function, called: Function) -> StateTorque:
-    """Return the torque with its parameters: the numeric keywords that can be recorded."""
     values = {
         each.name: value
         for each in signature(function).parameters.values()

@@ -1,8 +1,8 @@
-"""Symbols: arguments of a function that record its arithmetic on a tape.
+"""Symbols: function arguments that record arithmetic on a tape (a list of operations).
 
-A symbol is a linear combination of slots (places of inputs and results) of a tape. Sums, and
-products with numbers, only change its coefficients. Any other operation has a slot for its result;
-a repeated operation has the same slot.
+A symbol is a linear combination of slots, the places of inputs and results on the tape. Sums, and
+products with numbers, only change coefficients. Each other operation has a slot for its result; a
+repeated operation has the same slot.
 """
 
 import math
@@ -61,7 +61,7 @@ class Recorder:
     ) -> None:
         """Begin a tape; messages begin with `place`, and suggest `instead`.
 
-        With `has_lines`, they name the line of the recorded function.
+        With `has_lines`, messages name the recorded line.
         """
         self._has_lines = has_lines
         self.place = place
@@ -71,17 +71,17 @@ class Recorder:
         self.was_converted = False  # whether the function tried to make a symbol a float
 
     def inputs(self) -> list["Symbol"]:
-        """Return a symbol for each input: time, omega, attitude, and any parameters."""
+        """Return symbols for all inputs: time, omega, attitude, and parameters."""
         return [Symbol(self, 0.0, {slot: 1.0}) for slot in range(self._n_inputs)]
 
     def refusal(self, what: str, write: str = _ALLOWED) -> InputError:
-        """Return the exception for an operation that can't be recorded; it suggests `write`."""
+        """Return the exception for an operation that can't be recorded."""
         allowed = f"allowed: {write}, or {self._instead}"
         where = _line() if self._has_lines else ""
         return InputError(f"{self.place}: {what} can't be recorded{where}; {allowed}")
 
     def refusal_of_numbers(self, reason: str) -> InputError:
-        """Return the exception for a function that accepts no symbols, with the `reason`."""
+        """Return the exception for a function that accepts no symbols."""
         return InputError(
             f"{self.place}: the function accepts numbers only, not the symbols that record it "
             f"({reason}); allowed: a formula of {_ALLOWED}, or {self._instead}"
@@ -92,7 +92,7 @@ class Recorder:
         return InputError(f"{self.place}: {HAS_MEMORY}")
 
     def slot(self, operation: Operation) -> int:
-        """Return the slot of `operation`, which is recorded if new."""
+        """Return the slot of `operation`, recorded if new."""
         if operation not in self._slots:
             if len(self._slots) == self.most:
                 most = self.most
@@ -103,7 +103,7 @@ class Recorder:
         return self._slots[operation]
 
     def result(self, *operation: Any, factor: float = 1.0) -> "Symbol":
-        """Record an operation, given by its fields; return its result times `factor`."""
+        """Record an operation with these fields; return its result times `factor`."""
         return Symbol(self, 0.0, {self.slot(Operation(*operation)): factor})
 
     def tape(self, outputs: Sequence[Any]) -> Tape:
@@ -147,8 +147,6 @@ def _is_moderate(factor: float) -> bool:
 def _function(
     kind: str, derivative: "Callable[[Symbol], Symbol] | None" = None
 ) -> Callable[["Symbol"], "Symbol"]:
-    """Return a function of a symbol; the kernel needs the `derivative` of some functions."""
-
     def called(self: "Symbol") -> "Symbol":
         if not self._terms:
             return Symbol(self.recorder, getattr(FLOATS, kind)(self._constant), {})
@@ -374,7 +372,7 @@ class Symbol:
         return 2.0 * (self > 0.0) - 1.0
 
     def with_terms_of(self, others: "Iterable[Symbol]") -> "Symbol":
-        """Record this sum plus 0 times the terms of `others`, unless this symbol is 0."""
+        """Record and return this symbol plus 0 times the terms of `others`; 0 is not recorded."""
         if not (self._terms or self._constant):
             return self
         terms = {slot: 0.0 for each in others for slot in each._terms} | self._terms
@@ -386,7 +384,7 @@ class Symbol:
         return not self._constant and self._terms == {TIME: 1.0}
 
     def of_table(self, table: Table) -> "Symbol":
-        """Return a table's value at this symbol; raise InputError unless that is the time."""
+        """Return a table's value at this symbol; raise InputError unless it is the time."""
         if not self.is_time():
             raise InputError(
                 f"{self.recorder.place}: a table of a variable other than time can't be recorded"
@@ -399,7 +397,7 @@ class Symbol:
     __le__ = _of_symbols(lambda x, y: negated((x - y).switch()))
 
     def __eq__(self, other: object) -> Any:
-        """Refuse the comparison, which holds at isolated times at most."""
+        """Refuse equality, which holds at isolated times at most."""
         raise self.recorder.refusal("a comparison with == or !=", "< and > in numpy.where")
 
     __ne__ = __eq__
@@ -432,7 +430,7 @@ class Symbol:
     __rmod__ = _of_symbols(lambda x, y: y - x * (y / x).floor())
 
     def __getattr__(self, name: str) -> Any:
-        """Return a composed function, which NumPy looks up by name; refuse others."""
+        """Return a composed function, which NumPy looks up by name."""
         if name in _COMPOSED:
             return partial(_COMPOSED[name], self)
         # NumPy's mean works without `dtype`.
@@ -514,7 +512,6 @@ def _selected(condition: Any, x: Any, y: Any) -> Any:
 
 
 def _combined(linear: Linear, values: Sequence[Any]) -> Any:
-    """Return a linear combination of symbols and numbers, including terms of factor 0."""
     terms: dict[int, float] = {}
     constant, recorder = 0.0, None
     for slot, factor in linear.terms:

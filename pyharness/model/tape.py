@@ -1,7 +1,7 @@
 """The tape: a function of time, omega and attitude, recorded as a list of operations.
 
 It is recorded with symbols (`pyharness.model.symbols`), and evaluated with floats, decimal numbers,
-Taylor series, or symbols again. A slot is the place of an input or result.
+Taylor series or symbols. A slot is the place of an input or result.
 """
 
 import math
@@ -40,9 +40,9 @@ class Linear(NamedTuple):
 class Table:
     """A piecewise cubic function of time.
 
-    Row k of `pieces`, shape (n, 4), has c0 to c3 of c0 + c1 s + c2 s^2 + c3 s^3, where s is the
-    time (s) minus breaks[k]. Row k applies from breaks[k] to the next break, row 0 also before
-    breaks[0], and the last row to all later times.
+    Row k of `pieces`, shape (n, 4), has the coefficients of a cubic in the time (s) after
+    breaks[k], constant first. It applies until the next break, the first row also before, and
+    the last row to all later times.
     """
 
     def __init__(self, breaks: Any, pieces: Any) -> None:
@@ -65,9 +65,9 @@ class Table:
 class Operation(NamedTuple):
     """An operation of a tape: "linear", "table", or another kind on one to three slots.
 
-    "log", "atan" and "asin" have the slot of their derivative as second operand. "switch" is 1
-    where its operand is positive, else 0. "select" is its second operand where the first is 1, and
-    its third where the first is 0.
+    The second operand of "log", "atan" and "asin" is the slot of the derivative. "switch" is 1
+    where its operand is positive, else 0. "select" is its second operand where the first is 1,
+    else its third.
     """
 
     kind: str
@@ -86,7 +86,7 @@ class Tape:
 
     @property
     def inputs(self) -> frozenset[int]:
-        """The inputs, as slots, on which the function depends."""
+        """The slots of the inputs on which the function depends."""
         used = {slot for each in self.operations for slot in slots_of(each)}
         used |= {slot for output in self.outputs for slot, _ in output.terms}
         return frozenset(slot for slot in used if slot < self.n_inputs)
@@ -105,7 +105,7 @@ class Tape:
         return self._hash
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the fields for `pickle`, without the hash, which differs between processes."""
+        """Return the fields for `pickle`; the hash differs between processes."""
         return {name: value for name, value in vars(self).items() if name != "_hash"}
 
     @cached_property
@@ -120,7 +120,7 @@ class Tape:
 
     @property
     def breaks(self) -> list[float]:
-        """The times (s) between two pieces of a table, in ascending order."""
+        """The times (s) between pieces of tables, ascending."""
         tables = [each.table for each in self.operations if each.table is not None]
         # The first piece also holds before its break.
         times = [table.breaks[1:] for table in tables]
@@ -201,11 +201,11 @@ def live_slots(
     tape: Tape, compute: Callable[[int], object], is_true: Callable[[int], bool],
     for_series: bool = True,
 ) -> list[int]:  # fmt: skip
-    """Compute the operations on which the outputs depend, operands first, and return their slots.
+    """Compute the operations that the outputs need, operands first, and return their slots.
 
     Of a "select" only the chosen operand is computed; the other may be singular. `compute` is
-    called for each slot, `is_true` for that of a computed condition. Derivatives
-    (`WITH_DERIVATIVE`) are computed only if `for_series`.
+    called for each slot, `is_true` for a computed condition. Derivatives (`WITH_DERIVATIVE`)
+    are computed only if `for_series`.
     """
     known = set(range(tape.n_inputs))
     wanted = [slot for output in tape.outputs for slot, _ in output.terms]
@@ -253,7 +253,7 @@ def logarithm(x: float) -> float:
 
 
 def arcsine(x: float) -> float:
-    """Return asin(x), or NaN beyond 1."""
+    """Return asin(x), or NaN if abs(x) exceeds 1."""
     return math.asin(x) if abs(x) <= 1.0 else math.nan
 
 
@@ -263,7 +263,7 @@ def step(x: float) -> float:
 
 
 def whole(x: float) -> float:
-    """Return the largest whole number up to x, or NaN unless x is finite."""
+    """Return floor(x), or NaN if x is not finite."""
     return float(math.floor(x)) if math.isfinite(x) else math.nan
 
 
@@ -326,7 +326,7 @@ def float_outputs(tape: Tape, inputs: Sequence[float]) -> list[float]:
 
 
 def _without_branches(tape: Tape, inputs: Sequence[float]) -> Tape:
-    """Return the tape with 0 for operations without effect for these inputs."""
+    """Return the tape with 0 for operations that these inputs do not need."""
     values: list[Any] = [*inputs, *[0.0] * len(tape.operations)]
 
     def compute(slot: int) -> None:
@@ -339,7 +339,6 @@ def _without_branches(tape: Tape, inputs: Sequence[float]) -> Tape:
 
 
 def _saturated(kind: str, x: float) -> float:
-    """Return exp(x), or its replacement, a number of this `kind`, for abs(x) above 210."""
     if x < -_LARGE_ARGUMENT and kind in _SMALL:
         return _SMALL[kind]
     if not x > _LARGE_ARGUMENT:

@@ -1,4 +1,4 @@
-"""Tables and functions of a tape (recorded operations), for arrays."""
+"""Tables, and the functions of a tape (recorded operations), for arrays."""
 
 from typing import Any
 

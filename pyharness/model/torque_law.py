@@ -155,7 +155,7 @@ def _waves(where: str, values: object) -> tuple[Wave, ...]:
 
 
 def law_value(law: TorqueLaw, time: Any) -> Array:
-    """Return the components of a law at a time, about the law's axes."""
+    """Return a law's components at a time, about its own axes."""
     found: list[Any] = [c + r * time for c, r in zip(law.constant, law.rate, strict=True)]
     waves = [(amplitude, np.sin(frequency * time)) for amplitude, frequency in law.sines]
     waves += [(amplitude, np.cos(frequency * time)) for amplitude, frequency in law.cosines]
@@ -165,7 +165,7 @@ def law_value(law: TorqueLaw, time: Any) -> Array:
 
 
 def law_integral(law: TorqueLaw, time: Any) -> Array:
-    """Return the components of the integral of a law from 0 to `time`."""
+    """Return the integral of a law's components from 0 to `time`."""
     square = time * time
     found: list[Any] = [
         c * time + 0.5 * r * square for c, r in zip(law.constant, law.rate, strict=True)
@@ -191,9 +191,9 @@ def law_derivative(law: TorqueLaw) -> TorqueLaw:
 
 
 def to_body(vector: Any, attitude: Any) -> Array:
-    """Return a vector about the axes of space in components about the body axes.
+    """Return the body components of a vector about the axes of space.
 
-    The rotation matrix is used so that all terms of a recorded torque share its products.
+    Terms of a recorded torque share the products of the rotation matrix.
     """
     u, v, w = vector
     rows = rows_to_body(attitude)
@@ -201,6 +201,6 @@ def to_body(vector: Any, attitude: Any) -> Array:
 
 
 def body_torque(law: TorqueLaw, time: Any, attitude: Any) -> Array:
-    """Return the components about the body axes of a torque law."""
+    """Return the body components of a torque law."""
     value = law_value(law, time)
     return to_body(value, attitude) if law.in_space else value

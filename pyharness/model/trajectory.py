@@ -28,7 +28,7 @@ _SHOWN_ROWS = 3  # number of first, and of last, rows in HTML
 
 
 def short_repr(result: Any) -> str:
-    """Return a result as at most ten lines, with arrays by type and shape."""
+    """Return at most ten lines on a result, with arrays by type and shape."""
     shown = [
         f"{each.name}={_short(value)}"
         for each in fields(result)
@@ -285,8 +285,8 @@ def digits_left(error: float | None) -> float | None:
 class BatchResult:
     """The angular velocities of n bodies, and how the computation of each ended.
 
-    `omega` (rad/s), shape (n, ..., 3), is NaN where there is no result. `status`, shape (n,), has
-    integers of `pyharness.model.codes.Statuses`.
+    `omega` (rad/s), shape (n, ..., 3), is NaN where there is no result. `status`, shape (n,),
+    has codes of `pyharness.model.codes.Statuses`.
     """
 
     omega: Array

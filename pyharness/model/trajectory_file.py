@@ -1,9 +1,9 @@
 """Writing of trajectory files, which `pyharness.engine.trajectory_reader` reads.
 
-The archive has an array for each attribute, the text `scene` of a scene file, and `header` with
-everything else in JSON, such as a tape (recorded torque). In a tape, a linear combination is a list
-of its constant and of pairs of slot (input or result) and coefficient. An operation is a list of
-its kind and its operands, its linear combination, or the breaks and pieces of its table.
+The archive has an array for each attribute, the text `scene` of a scene file, and the JSON text
+`header` with the rest, such as a tape (recorded torque). A linear combination is a list of its
+constant and of pairs of slot (input or result) and coefficient. An operation is a list of its kind
+and its operands, its linear combination, or the breaks and pieces of its table.
 """
 
 import json
@@ -122,7 +122,7 @@ def _moments_record(moments: Any) -> Any:
 
 
 def _scene_record(scene: Scene) -> tuple[dict[str, Any], str]:
-    """Return, for JSON, the data that a scene file lacks, and the text of this file."""
+    """Return, for JSON, what a scene file lacks, and the scene file's text."""
     record: dict[str, Any] = {
         "masses": scene.masses,
         "forces": scene.forces,
@@ -163,7 +163,7 @@ def _tape_record(tape: Tape) -> dict[str, Any]:
 def tape_of(record: Any, n_own: int = 0, n_outputs: int = 3) -> Tape:
     """Return the tape that a dictionary from JSON describes, with `n_own` own states.
 
-    Raise ValueError, TypeError, KeyError or OverflowError if it describes no tape.
+    Raise ValueError, TypeError, KeyError or OverflowError for other data.
     """
     operations = record["operations"]
     if len(operations) > MOST_OPERATIONS:

@@ -1,6 +1,7 @@
 """Checks of user input, and conversions to plain Python numbers.
 
-A function with an argument `where` raises InputError, which begins with `where`, for other values.
+Functions with an argument `where` raise InputError for other values; its message begins with
+`where`.
 """
 
 import itertools
@@ -50,7 +51,7 @@ def unit_of(value: object) -> str:
 
 
 def converted(value: object) -> float | str:
-    """Return a real number as a float; for anything else, or beyond binary64, a description."""
+    """Return a real number as a float; for other values, or beyond binary64, a description."""
     if type(value) is float:
         return value
     if is_no_number(value):
@@ -115,7 +116,7 @@ def finite(where: str, value: object) -> float:
 
 
 def are_several(names: object) -> bool:
-    """Return whether names are an iterable that is no text and no array without a dimension."""
+    """Return whether `names` is an iterable, but neither text nor a zero-dimensional array."""
     is_whole = isinstance(names, (str, bytes)) or getattr(names, "shape", None) == ()
     return isinstance(names, Iterable) and not is_whole
 

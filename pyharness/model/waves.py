@@ -1,8 +1,8 @@
 """Exact sums of the waves of a torque law that have the same frequency.
 
 A solver rounds each quotient of amplitude and moment. If two amplitudes cancel to 1e-10 of their
-size, the sum of the rounded quotients has only six correct digits; the exact sum has all. A
-merged law has at most one sine and one cosine of each frequency, and none of frequency 0.
+size, the sum of the rounded quotients has only six correct digits. A merged law has at most one
+sine and one cosine of each frequency, none of frequency 0.
 """
 
 import math
@@ -27,7 +27,7 @@ _ZERO = (Fraction(0), Fraction(0), Fraction(0))
 
 
 def merged(law: TorqueLaw) -> TorqueLaw:
-    """Return the law with waves of equal frequency summed; itself if there are none."""
+    """Return the law with waves of equal frequency summed."""
     return exact_law(law) if is_mergeable(law) else law
 
 
@@ -42,7 +42,7 @@ def is_mergeable(law: TorqueLaw) -> bool:
 
 
 def exact_law(law: TorqueLaw, turn: Callable[[Exact], Exact] | None = None) -> TorqueLaw:
-    """Return a law with waves summed by frequency, and vectors rotated by `turn`, then rounded.
+    """Return a law with waves summed by frequency, vectors rotated by `turn`, then rounded.
 
     Raise InputError if an amplitude overflows.
     """
@@ -83,7 +83,7 @@ def _sum(x: Exact, y: Exact) -> Exact:
 
 
 def with_merged_waves(scene: Scene) -> Scene:
-    """Return the scene with waves of equal frequency summed in its torque law, if any."""
+    """Return the scene with its torque law, if any, merged."""
     if not isinstance(scene.torque, TorqueLaw):
         return scene
     law = merged(scene.torque)
@@ -93,8 +93,8 @@ def with_merged_waves(scene: Scene) -> Scene:
 def with_merged_rows(constant: Array, sines: Array, cosines: Array) -> tuple[Array, Array, Array]:
     """Return constants, sines and cosines of m torque laws, summed by frequency if finite.
 
-    Shapes are (m, 3), (m, k, 4) and (m, l, 4), or one row for all; a wave is three amplitudes and a
-    frequency (rad/s). Laws with fewer waves than others are padded with zeros.
+    Shapes are (m, 3), (m, k, 4) and (m, l, 4), or one row for all; a wave is three amplitudes
+    and a frequency (rad/s). Shorter rows are padded with zeros.
     """
     concerned = _mergeable_rows(sines, cosines)
     if not concerned.any():

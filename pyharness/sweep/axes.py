@@ -31,9 +31,9 @@ CHOICES = {
 class Field:
     """A number of a scene or solver that an axis may vary.
 
-    `allowed` describes the values that `takes` accepts. If `looped`, all scenes of a batch (solved
-    in one call) must share the value, except step size and Lipschitz constant of the thesis's
-    programs. If `whole`, values are rounded to integers.
+    `allowed` describes what `takes` accepts. If `looped`, all scenes of a batch (solved in one
+    call) share the value; programs of the thesis may vary step size and Lipschitz constant. If
+    `whole`, values are rounded to integers.
     """
 
     units: str
@@ -114,12 +114,12 @@ RIVALS = (
 
 
 def field_names() -> list[str]:
-    """Return the fields that an axis may vary, except constants of a torque's expressions."""
+    """Return the fields that an axis may vary, except constants of expressions."""
     return [*NUMBERS, *CHOICES]
 
 
 def number_field(name: str) -> Field:
-    """Return the field `name`, a key of `NUMBERS` or a constant; raise KeyError if unknown."""
+    """Return the field `name`, of `NUMBERS` or a constant; raise KeyError if unknown."""
     if name.startswith(CONSTANTS):
         return Field("", "constant of the torque's expressions", looped=True)
     return NUMBERS[name]
@@ -147,14 +147,11 @@ _SAMPLE = "sample"
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis of a sweep's grid: a field of the scene or solver, as in ``omega.1``.
+    """One axis of a sweep's grid, which varies a `field` such as ``omega.1``.
 
-    Axes with the same `dimension` (by default the field's name, or `sample` for random values) vary
-    together. `how` determines what `values` contains:
-
-    - `listed`: all values of the axis;
-    - a spacing of `SPACINGS`: the first and the last value;
-    - a distribution of `DRAWS`: its parameters; `seed` then determines the values.
+    Axes of the same `dimension` vary together. `values` has all values if `how` is `listed`,
+    the first and last for a spacing of `SPACINGS`, or the parameters of a distribution of
+    `DRAWS`, of which `seed` determines the values.
     """
 
     field: str
@@ -230,7 +227,7 @@ def check_name(what: str, name: object, allowed: Iterable[str], where: str = "")
 
 
 def axis_of(table: object, number: int) -> Axis:
-    """Return the axis in `table`, a file's [[axis]] `number` (from 1); raise InputError if bad."""
+    """Return the axis of a file's table [[axis]] `number` (from 1); raise InputError if invalid."""
     where = f"[[axis]] {number}"
     if not isinstance(table, dict):
         raise InputError(f"{where} is {kind_of(table)}; it must be a table [[axis]]")

@@ -30,9 +30,9 @@ Columns = dict[str, Array]
 
 
 def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
-    """Solve a chunk (numbered from 0); return an array for each reduction (stored quantity).
+    """Return an array for each reduction (stored quantity) of a chunk.
 
-    Each has the shape of the chunk, and one more dimension if the reduction has several components.
+    Its shape is that of the chunk, with one more dimension for several components.
     """
     box = sweep.box(chunk)
     shape = tuple(part.stop - part.start for part in box)
@@ -41,9 +41,9 @@ def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
 
 
 def solve_points(sweep: Sweep, where: list[Indices]) -> Arrays:
-    """Return reductions of the scenes at `where`, an array of indices for each dimension.
+    """Return reductions (stored quantities) of the scenes at `where`, indices for each dimension.
 
-    The first dimension of each reduction (stored quantity) runs over the scenes.
+    The first dimension of each array counts scenes.
     """
     n = len(where[0])
     found = {asked.name: empty(asked, n) for asked in sweep.reductions}
@@ -61,11 +61,11 @@ def leaves_of_sweep(sweep: Sweep) -> str | None:
 
 
 def listing_of(program: str, listing: str, reading: str) -> Listing:
-    """Return the version of a program that a sweep's `listing` and `reading` describe.
+    """Return the version of a program that `listing` and `reading` describe.
 
-    `listing` is ``original``, ``corrected``, ``fix:`` followed by the only defects to correct, or
-    ``keep:`` followed by the only defects to keep. `reading` is ``adopted`` (our reading of every
-    doubtful card), or the other readings to use. Names are joined by ``+``.
+    `listing` is ``original``, ``corrected``, or ``fix:`` or ``keep:`` with the only defects to
+    correct or to keep. `reading` is ``adopted`` (our readings of doubtful cards), or the other
+    readings to use. Names are joined by ``+``.
     """
     how, _, names = listing.partition(":")
     readings = [] if reading == "adopted" else reading.split("+")
@@ -77,7 +77,7 @@ def listing_of(program: str, listing: str, reading: str) -> Listing:
 
 
 def looped_fields(sweep: Sweep) -> list[str]:
-    """Return the varied fields that must be equal in all scenes of a batch (one call)."""
+    """Return the varied fields that all scenes of a batch (one call) share."""
     of_arrays = () if sweep.solver.program is None else OF_PROGRAMS
     own = ("body.",) if follows_body(sweep.scene) else ()
     names = [axis.field for axis in sweep.axes if axis.field not in of_arrays]
@@ -85,7 +85,7 @@ def looped_fields(sweep: Sweep) -> list[str]:
 
 
 def batches(sweep: Sweep, where: list[Indices]) -> Iterator[tuple[Indices, Batch]]:
-    """Yield batches, solved in one call, of the scenes in `where`, after their positions in it."""
+    """Yield the positions in `where` of each batch's scenes, and the batch."""
     columns = value_columns(sweep, where)
     looped = looped_fields(sweep)
     for members, values in groups([columns[name] for name in looped], len(where[0])):
@@ -201,12 +201,7 @@ def _omega(scene: Scene, own: Columns, moments: Array | None, n: int) -> Array:
 
 
 def _tilted(scene: Scene, moments: Array | None, tilt: Array, azimuth: Array) -> Array:
-    """Return unit vectors, shape (n, 3), at angles (rad) from the body's principal axes.
-
-    `tilt` is the angle from the axis of the middle moment. `azimuth` is the angle about this axis,
-    from the axis of the least moment towards the axis of the largest. `moments` (kg m2) has shape
-    (n, 3), or is None for the scene's body.
-    """
+    """Return unit vectors at angles `tilt` from the middle axis and `azimuth` about it."""
     bodies = np.array([scene.moments]) if moments is None else moments
     order = np.broadcast_to(np.argsort(bodies, axis=1, kind="stable"), (len(tilt), 3))
     sine = np.sin(tilt)
@@ -219,8 +214,8 @@ def _tilted(scene: Scene, moments: Array | None, tilt: Array, azimuth: Array) ->
 def check_state_axis(scene: Scene, field: str) -> None:
     """Raise InputError if the scene's torque lacks the field of an axis.
 
-    A torque that depends on the state has no constant and no linear term; only a torque given by
-    expressions has named constants.
+    A state-dependent torque has no constant or linear term; only expressions have named
+    constants.
     """
     torque = scene.torque
     if isinstance(torque, StateTorque):
@@ -260,7 +255,7 @@ def check_state_solver(scene: Scene, methods: Sequence[str], has_program: bool) 
 
 
 def follows_body(scene: Scene) -> bool:
-    """Return whether a ready-made term of the torque contains the inertia of the scene's body."""
+    """Return whether a term of the torque contains the inertia of the scene's body."""
     return isinstance(scene.torque, StateTorque) and any(
         _is_of_body(dict(term), scene) for term in _terms(scene.torque)
     )
@@ -271,7 +266,7 @@ def with_numbers(
 ) -> Scene:
     """Return the scene with other `constants` of its torque's expressions, and another body.
 
-    `values` are the body's moments, inertia or coefficients, or None for the scene's own.
+    `values` are moments, inertia or coefficients.
     """
     data: dict[str, Any] = tomllib.loads(scene_text(scene))
     if constants:

@@ -39,8 +39,8 @@ _ADDRESS = re.compile(r"(?:(?:tcp|tls)://)?(?P<host>[\w.-]+|\[[\da-fA-F:.]+\]):(
 class Engine(NamedTuple):
     """A started executor.
 
-    `computed` takes a sweep and the numbers of the chunks to compute. It yields the number of each
-    completed chunk, and an array for each stored quantity.
+    `computed` takes a sweep and numbers of chunks. It yields each number, and an array for each
+    stored quantity.
     """
 
     workers: int
@@ -54,9 +54,9 @@ def engine(
 ) -> Iterator[Engine]:
     """Start the executor ``here``, ``processes`` or ``dask``, and yield it as an Engine.
 
-    `workers` is by default the number of processors. Without the `address` of a scheduler, as in
-    ``tcp://host:8786``, ``dask`` starts a cluster on this machine. Raise InputError if no scheduler
-    with a worker answers; `computed` raises it if workers die repeatedly.
+    ``dask`` uses the scheduler at `address`, as in ``tcp://host:8786``, or starts a local
+    cluster. Raise InputError if no scheduler with a worker answers; `computed` raises it if
+    workers die repeatedly.
     """
     if executor == "here":
         yield Engine(1, _solve_here, is_here=True)
@@ -125,10 +125,9 @@ def _by_pool(sweep: Sweep, chunks: list[int], workers: int) -> Results:
 
 @contextlib.contextmanager
 def deaf_children() -> Iterator[None]:
-    """Block Ctrl-C in all processes and threads that are started within this context.
+    """Block Ctrl-C in this thread, and in processes and threads started within this context.
 
-    A terminal sends SIGINT to all its processes, but only the parent should react. Until the
-    context ends, the calling thread does not receive it either.
+    A terminal sends SIGINT to all its processes, but only the parent should react.
     """
     # Children inherit a blocked signal. Python would start the resource tracker with the first
     # child, and then unblock the signal.
@@ -147,7 +146,7 @@ def deaf_children() -> Iterator[None]:
 
 
 def end_with_parent() -> None:
-    """Start a thread that ends this process when its parent process, if any, ends."""
+    """Start a thread that ends this process when its parent ends."""
     parent = multiprocessing.parent_process()
     if parent is None:
         return
@@ -170,7 +169,6 @@ def check_dask() -> None:
 
 @contextlib.contextmanager
 def _local_cluster(dask: Any, workers: int) -> Iterator[Any]:
-    """Start a Dask cluster on this machine, interruptible by Ctrl-C, and yield a client."""
     started: list[Any] = []
     errors: list[Exception] = []
     wanted = threading.Event()
@@ -230,10 +228,7 @@ def _connected(dask: Any, address: str) -> Any:
 
 
 async def _has_workers(dask: Any, address: str, answered: list[bool]) -> None:
-    """Wait until the Dask scheduler has workers; the caller limits the time.
-
-    Each answer without workers appends True to `answered`.
-    """
+    """Wait until the scheduler has workers; append True to `answered` for other answers."""
     # A Dask client would wait half a minute for a server that accepts the connection but does not
     # answer; the scheduler is therefore called directly.
     async with dask.rpc(address) as scheduler:
@@ -243,7 +238,7 @@ async def _has_workers(dask: Any, address: str, answered: list[bool]) -> None:
 
 
 def _by_client(client: Any, sweep: Sweep, chunks: list[int]) -> Results:
-    """Yield number and results of each chunk; Dask recomputes the chunks of dead workers."""
+    """Yield results of chunks; Dask recomputes those of dead workers."""
     dask: Any = import_module("distributed")
     n_threads = sum(client.nthreads().values())
     rest = iter(chunks)

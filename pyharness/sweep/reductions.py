@@ -1,7 +1,7 @@
 """Reductions: the quantities that a sweep can store for each scene.
 
-Parameters of several reductions: `samples` is the number of times at which states are read; `of`
-names a principal axis by the rank of its moment (least, middle or largest).
+The parameter `samples` is the number of times at which states are read; `of` names a principal axis
+by the rank of its moment (least, middle or largest).
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -28,11 +28,10 @@ RANKS = ("least", "middle", "largest")
 class Reduction:
     """A quantity of each scene, and its computation.
 
-    `compute` takes a batch of n scenes and the parameters. It returns n values, or n rows with a
-    value for each of `labels`; `dimension` names this dimension in the store. `only` is `program`
-    or `method` if only programs or only methods have it. `needs` lists requirements of the scene:
-    `moments`, `no torque` or `attitude`. `parameters` has the defaults. If the values are codes of
-    outcomes, `flags` has their meanings.
+    `compute` takes a batch of n scenes and parameters (defaults: `parameters`). It returns n
+    values, or n rows with the components `labels` along `dimension`. `only` is `program` or
+    `method` if the other lacks the quantity. `needs` lists requirements: `moments`, `no
+    torque`, `attitude`. `flags` explains outcome codes.
     """
 
     title: str
@@ -48,7 +47,7 @@ class Reduction:
 
     @property
     def fill(self) -> Any:
-        """Return the value for scenes without result: NaN, or -1 in an integer array."""
+        """Return the value for scenes without result: NaN, or -1 for integers."""
         return np.nan if self.dtype == "f8" else -1
 
 
@@ -294,7 +293,7 @@ def empty(asked: ReductionSpec, n: int) -> Found:
 
 
 def reduced(asked: ReductionSpec, batch: Batch) -> Found:
-    """Return a stored quantity of a batch: a value or a row of components for each scene."""
+    """Return a stored quantity of a batch, a value or row for each scene."""
     given = {**dict(asked.parameters), "function": asked.function}
     # Infinities and NaN are valid results.
     with np.errstate(all="ignore"):

@@ -34,10 +34,10 @@ _FLAGS = (*words("reduction value"), Column("scenes"))
 
 
 class Found(NamedTuple):
-    """Statistics of one component of a reduction, in `units`.
+    """Statistics of one component of a stored quantity, in `units`.
 
-    `scenes` counts the scenes with a finite value, `none` the other scenes. `least`, `mean` and
-    `largest` are None if no value is finite.
+    `scenes` counts scenes with a value, `none` the others. Without values, `least`, `mean` and
+    `largest` are None.
     """
 
     name: str
@@ -51,9 +51,9 @@ class Found(NamedTuple):
 
 
 def summary(store: Store, asked: ReductionSpec) -> tuple[list[Found], Counter[int]]:
-    """Return statistics of a stored quantity's components, and counts of its codes of outcomes.
+    """Return statistics of a stored quantity's components, and counts of its outcome codes.
 
-    One of the two is empty.
+    One of the two results is empty.
     """
     reduction = REDUCTIONS[asked.reduction]
     labels = reduction.labels or ("",)
@@ -147,7 +147,7 @@ Scale = tuple[float, float, bool]
 def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
     """Return the stored quantity `name`, by default the first whose values are numbers.
 
-    If all have codes of outcomes, the default is the first. Raise InputError for an unknown name.
+    If all have outcome codes, the default is the first. Raise InputError for an unknown name.
     """
     names = [asked.name for asked in sweep.reductions]
     if name is not None and name not in names:
@@ -157,10 +157,10 @@ def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
 
 
 def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
-    """Return the picture of a stored quantity over the dimensions with several numbers.
+    """Return the picture of a stored quantity over dimensions with several numbers.
 
-    With two or more that are not random, it is a map over the last two of these; with one, a line,
-    or dots at listed values; with none, dots over a random dimension.
+    Over the last two dimensions that are not random, it is a map. Over only one, it is a line,
+    or dots at listed values. Over a random one, it is dots.
     """
     from matplotlib.figure import Figure
 
@@ -206,7 +206,7 @@ def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
 def _panels(
     store: Store, asked: ReductionSpec, axis_of: dict[str, Axis], places: dict[str, Array]
 ) -> list[tuple[str, Array]]:
-    """Return title and values of each panel; panels differ in component or in other dimensions."""
+    """Return title and values of each panel."""
     choices: dict[str, list[int]] = {}
     room = _MOST_PANELS
     for dimension in (d for d in store.sweep.dimensions if d not in places):

@@ -41,9 +41,9 @@ class Estimate(NamedTuple):
 
 
 def forecast(sweep: Sweep, path: str, n_missing: int, own: Engine) -> float:
-    """Return the time (s) to solve and write the missing chunks, and to read all chunks.
+    """Return the time (s) to solve and write missing chunks, and to read all.
 
-    If other processes compute, solving and writing overlap, and only the longer time counts.
+    If other processes solve, only the longer of solving and writing counts.
     """
     write, read = seconds_of_files(sweep, path)
     solve = n_missing * seconds_per_chunk(sweep) / own.workers
@@ -52,7 +52,7 @@ def forecast(sweep: Sweep, path: str, n_missing: int, own: Engine) -> float:
 
 
 def seconds_of_files(sweep: Sweep, path: str) -> tuple[float, float]:
-    """Return the mean times (s) to write, and to read, the files of a chunk beside `path`.
+    """Return the mean times (s) to write and to read a chunk's files beside `path`.
 
     Both are 0 if files can't be written.
     """
@@ -94,7 +94,7 @@ def _pattern(sweep: Sweep, chunk: int) -> Arrays:
 def seconds_per_chunk(sweep: Sweep) -> float:
     """Return the time (s) to solve a chunk in this process.
 
-    It is measured on sample scenes or, if these give less than 0.2 s, on whole chunks.
+    Below 0.2 s it is measured on whole chunks, else on sample scenes.
     """
     scenes = math.prod(sweep.chunk_shape)
     seconds = scenes * seconds_per_scene(sweep)
@@ -112,7 +112,7 @@ def seconds_per_chunk(sweep: Sweep) -> float:
 
 
 def seconds_per_scene(sweep: Sweep) -> float:
-    """Return the mean time (s) to solve a scene, from samples spread over the grid."""
+    """Return the mean time (s) to solve a scene, from samples."""
     # Not timed, because this call imports the solver's modules.
     solve_points(sweep, spread(sweep, 1))
     for count, larger in zip(_SAMPLES, (*_SAMPLES[1:], math.inf), strict=True):
@@ -128,10 +128,11 @@ def seconds_per_scene(sweep: Sweep) -> float:
 
 
 def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
-    """Return the indices of sampled scenes, changed so that many share a batch (one call).
+    """Return sample indices, changed so that many scenes share a batch (one call).
 
-    Along dimensions whose value all scenes of a batch share, only five distinct indices remain, or
-    more if a chunk has small batches. Batches are then about as large as in a chunk.
+    The scenes of a batch have equal indices along some dimensions. Along these, only five
+    distinct indices remain, or more if a chunk has small batches. Batches are then about as
+    large as in a chunk.
     """
     shared = {axis.dimension for axis in sweep.axes if axis.field in looped_fields(sweep)}
     found, scenes = [], math.prod(sweep.chunk_shape)
@@ -156,8 +157,8 @@ _MOST_CHUNKS = 1_000_000
 class Outcome:
     """The outcome of one run of a sweep, whose computation took `seconds` (s).
 
-    `estimate` is None if no chunk was missing. `before` counts the chunks of earlier runs,
-    `computed` those of this run, and `repaired` those of this run that had been damaged.
+    `before` counts chunks of earlier runs, `computed` those of this run, and `repaired` those
+    of this run that had been damaged. `estimate` is None if no chunk was missing.
     """
 
     estimate: Estimate | None
@@ -227,16 +228,15 @@ def swept(
     progress: bool | Progress = False,
     repair: bool = False,
 ) -> Iterator[tuple[Store, Outcome]]:
-    """Compute the chunks of a sweep that its store lacks; yield the open store and the outcome.
+    """Compute the chunks that a sweep's store lacks; yield the open store and the outcome.
 
-    `path` is the store's folder, made if missing, and locked until the context ends. `executor`,
-    `workers` and `address` are as in `executors.engine`. `before` receives the forecast before the
-    computation. `progress` is True for a progress bar, or a function called after each chunk with
-    the number of computed chunks, the number to compute, and "chunks". With `repair`, damaged
+    The store's folder `path` is made if missing, and locked until the context ends. `executor`,
+    `workers` and `address` are as in `executors.engine`. `before` receives the forecast.
+    `progress` is True for a bar, or a function called after each chunk. With `repair`, damaged
     chunks and metadata are made again.
 
-    Raise InputError if the store belongs to another sweep or is damaged, if no cluster answers, or
-    if disk or memory is too small. Chunks computed before an error remain in the store.
+    Raise InputError if the store belongs to another sweep or is damaged, if no cluster answers,
+    or if disk or memory is too small. Computed chunks remain in the store.
     """
     is_there = check_store(sweep, path)
     check_size(sweep, path, workers or 1, 0 if is_there else sweep.n_chunks)

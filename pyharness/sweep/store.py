@@ -1,7 +1,7 @@
 """The store of a sweep: a Zarr group in a folder, with one array for each reduction.
 
-A chunk of the grid has a file for each array, and a file with their checksums. Each is written
-under a temporary name and then renamed, the checksums last; so a chunk with checksums is complete.
+A chunk of the grid has a file for each array, and one of their checksums. Each is written under a
+temporary name and then renamed, the checksums last; so a chunk with checksums is complete.
 """
 
 import contextlib
@@ -137,10 +137,10 @@ class Store:
 
 @contextlib.contextmanager
 def opened(sweep: Sweep, path: str, repair: bool = False) -> Iterator[Store]:
-    """Make or open a sweep's store, lock it against other processes, check it, and yield it.
+    """Make or open a sweep's store, lock it, check it, and yield it.
 
-    Raise InputError, without changing files, if `path` is locked, damaged, or not the store of this
-    sweep. With `repair`, instead remove damaged chunks and rewrite damaged metadata.
+    Raise InputError, without changing files, if `path` is locked, damaged, or another sweep's
+    store. With `repair`, instead remove damaged chunks and rewrite damaged metadata.
     """
     check_zarr()
     folder = Path(path)
@@ -172,7 +172,7 @@ def opened(sweep: Sweep, path: str, repair: bool = False) -> Iterator[Store]:
 
 
 def check_store(sweep: Sweep, path: str) -> bool:
-    """Return whether `path` is the store of this sweep; False if the folder is missing or empty.
+    """Return whether `path` is this sweep's store; False for a missing or empty folder.
 
     Raise InputError for any other file or folder, or if the folder can't be made.
     """
@@ -216,7 +216,6 @@ def check_store(sweep: Sweep, path: str) -> bool:
 
 
 def _check_metadata(sweep: Sweep, folder: Path, repair: bool) -> None:
-    """Compare metadata with their checksums; raise InputError, or with `repair` rewrite them."""
     files = metadata_files(sweep)
     try:
         check_files(label(sweep), "metadata", folder, files, LARGEST_METADATA, METADATA)

@@ -1,9 +1,8 @@
-"""Layout of a sweep's store: its arrays, their metadata, its identity, and checksums of its files.
+"""Layout of a sweep's store: arrays, metadata, identity, and checksums of files.
 
 `sha256sum --check` can read a file of checksums. Its first line names the version of pyharness, the
-sweep and the part of the store, so that a file from elsewhere is detected. Each further line has
-the SHA-256 and the path of a file. In all functions `folder` is the store's folder, and `name` a
-path in it.
+sweep and the part of the store, so that a foreign file is detected. The argument `folder` is the
+store's folder, and `name` a path in it.
 """
 
 import contextlib
@@ -34,7 +33,7 @@ _PIECE = 1 << 20  # bytes read at once
 
 
 class DamageError(Exception):
-    """The exception for a damaged file of a store; its message names file and damage."""
+    """The exception that names a damaged file of a store and its damage."""
 
 
 class Label(NamedTuple):
@@ -46,10 +45,10 @@ class Label(NamedTuple):
 
 
 def checksum_text(label: Label, part: str, folder: Path, names: Sequence[str], limit: int) -> bytes:
-    """Return the content of a file of checksums for the files `names`.
+    """Return the content of a checksum file for the files `names`.
 
-    `part` is their part of the store, as in "chunk 0/1". Raise DamageError if a file is unreadable,
-    not regular, or larger than `limit` (bytes).
+    `part` is their part of the store, as "chunk 0/1". Raise DamageError for a file that is
+    unreadable, not regular, or above `limit` bytes.
     """
     identity = f"schema {label.schema}, version {label.version}, sweep {label.fingerprint}"
     lines = [f"# pyharness sweep store, {identity}, {part}"]
@@ -60,7 +59,7 @@ def checksum_text(label: Label, part: str, folder: Path, names: Sequence[str], l
 def check_files(
     label: Label, part: str, folder: Path, names: Sequence[str], limit: int, checksums: str
 ) -> None:
-    """Raise DamageError if the files `names` differ from the checksums in the file `checksums`."""
+    """Raise DamageError if files `names` differ from their checksums in the file `checksums`."""
     found = checksum_text(label, part, folder, names, limit)
     known = read_bounded(folder, checksums, 2 * len(found))
     if known != found:
@@ -114,7 +113,7 @@ def _opened(folder: Path, name: str, limit: int) -> Iterator[int]:
 
 
 def exists(folder: Path, name: str) -> bool:
-    """Return whether a path exists; a link without target exists too.
+    """Return whether a path exists, even as a link without target.
 
     Raise DamageError if the file system can't tell.
     """
@@ -171,7 +170,7 @@ _HEAD = re.compile(
 
 
 def label(sweep: Sweep) -> Label:
-    """Return the identity of a store that this version of pyharness makes."""
+    """Return the identity of a store that this version makes."""
     return Label(SCHEMAS["sweep store"], version(), sweep.fingerprint)
 
 
@@ -277,6 +276,6 @@ def _make_array(group: Any, sweep: Sweep, asked: ReductionSpec) -> None:
 
 
 def largest_chunk(sweep: Sweep) -> int:
-    """Return an upper bound on the size (bytes) of each file of a chunk."""
+    """Return an upper bound (bytes) on each file of a chunk."""
     scenes = math.prod(sweep.chunk_shape)
     return 65536 + 2 * scenes * max(empty(asked, 1).nbytes for asked in sweep.reductions)

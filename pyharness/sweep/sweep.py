@@ -24,7 +24,7 @@ Indices = NDArray[np.int64]
 class ReductionSpec:
     """A requested reduction: its array's `name`, its key in `REDUCTIONS`, and its parameters.
 
-    For the reduction `claim`, `function` returns for each scene of a batch whether a claim holds.
+    For the reduction `claim`, `function` checks a claim for each scene of a batch.
     """
 
     name: str
@@ -37,9 +37,9 @@ class ReductionSpec:
 class Sweep:
     """A sweep as a sweep file describes it.
 
-    `scene` supplies all quantities that no axis varies. `chunk` is the largest number of scenes in
-    a chunk. `text` is the content of the sweep file; `fingerprint` is the SHA-256 of `text` and of
-    the scene file that it names.
+    `scene` supplies what no axis varies. `chunk` is the largest number of scenes in a chunk.
+    `text` is the content of the sweep file; `fingerprint` is the SHA-256 of `text` and of its
+    scene file.
     """
 
     name: str
@@ -53,7 +53,7 @@ class Sweep:
 
     @property
     def dimensions(self) -> dict[str, int]:
-        """Return the length of each dimension by name, in the order of the axes."""
+        """Return the length of each dimension by name, in order of axes."""
         return {axis.dimension: axis.count for axis in self.axes}
 
     @property
@@ -70,9 +70,9 @@ class Sweep:
     def chunk_shape(self) -> tuple[int, ...]:
         """Return the number of scenes of a chunk along each dimension.
 
-        A chunk covers as many of the last dimensions as fit, and part of the dimension before them.
-        It has length 1 along programs, methods, listings and readings, so that its scenes have the
-        same solver.
+        A chunk covers as many of the last dimensions as fit, and part of the dimension
+        before them. It has length 1 along programs, methods, listings and readings, so that
+        its scenes share a solver.
         """
         single = {axis.dimension for axis in self.axes if axis.is_choice}
         room = self.chunk
@@ -98,7 +98,7 @@ class Sweep:
         return tuple(int(each) for each in np.unravel_index(chunk, self.chunk_counts))
 
     def box(self, chunk: int) -> tuple[slice, ...]:
-        """Return the part of the grid that a chunk covers, as a slice for each dimension."""
+        """Return the slice of each dimension that a chunk covers."""
         position = self.position_of(chunk)
         return tuple(
             slice(at * length, min(n, (at + 1) * length))
@@ -137,8 +137,7 @@ def value_columns(sweep: Sweep, where: list[Indices]) -> dict[str, NDArray[Any]]
 def groups(columns: list[NDArray[Any]], n: int) -> list[tuple[Indices, tuple[Any, ...]]]:
     """Return the groups of indices 0 to n - 1 with equal values in all columns.
 
-    Each has its indices, ascending, and its value in each column. Without columns there is one
-    group.
+    Each group has its indices, ascending, and its values. Without columns there is one group.
     """
     if not columns:
         return [(np.arange(n), ())]

@@ -48,9 +48,9 @@ _WITH_ATTITUDE = tuple(name for name in PREPARED if REGISTRY[name].attitude)
 def read_sweep(path: str | os.PathLike[str], claims: Mapping[str, Claim] | None = None) -> Sweep:
     """Return the sweep that a TOML file describes; raise InputError if it is invalid.
 
-    The path of a scene file is relative to the sweep file. `claims` maps the name of each claim to
-    the function that checks it. For a `Batch` of n scenes it returns n codes: 1 where the claim
-    holds, 0 where it fails, 2 where it does not apply, and 3 where it holds in part.
+    The path of a scene file is relative to the sweep file. `claims` has a function for each
+    claim. For a `Batch` of n scenes it returns n codes: 1 if the claim holds, 0 if it fails, 2
+    if it does not apply, 3 if it holds in part.
     """
     path = os.fsdecode(path)
     where = f"sweep file '{path}'"

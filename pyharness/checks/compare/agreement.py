@@ -1,4 +1,4 @@
-"""Errors of a trajectory against the reference, and differences between Fortran and Python."""
+"""Errors of trajectories against the reference, and differences between Fortran and Python."""
 
 import math
 from dataclasses import dataclass, replace
@@ -30,14 +30,14 @@ class Accuracy:
 
     @property
     def angle(self) -> float | None:
-        """Return the largest error of the attitude (rad), or None; infinite without any times."""
+        """The largest error of the attitude (rad), None without one; infinite without times."""
         return None if self.turned is None else _largest(self.turned)
 
 
 def accuracy(scene: Scene, trajectory: Trajectory, truth: Reference) -> Accuracy:
-    """Return the errors of a trajectory against `truth`, and the drifts of conserved quantities.
+    """Return errors against `truth`, up to the last common time, and drifts.
 
-    Errors extend to the last common time, and are infinite for an empty trajectory.
+    Errors of an empty trajectory are infinite.
     """
     n = min(len(trajectory.time), len(truth.time))
     with np.errstate(all="ignore"):
@@ -82,10 +82,7 @@ def _drift_in_space(scene: Scene, trajectory: Trajectory) -> float:
 
 
 def distance(first: Trajectory, second: Trajectory) -> float:
-    """Return the largest difference of two trajectories, in units in the last place.
-
-    It is infinite for different numbers of times.
-    """
+    """Return the largest difference in units in the last place; infinite if row counts differ."""
     if len(first.time) != len(second.time):
         return math.inf
     names = ("recorded_time", "omega", "velocity")
@@ -93,7 +90,7 @@ def distance(first: Trajectory, second: Trajectory) -> float:
 
 
 def differences(first: Trajectory, second: Trajectory) -> list[str]:
-    """Return the names of counts and endings that differ or, if these agree, of unequal arrays."""
+    """Return the names of differing counts and endings or, if none, of differing arrays."""
     names = {"steps": "steps", "evaluations": "evaluations", "ended": "ending", "stop": "stop"}
     found = [told for name, told in names.items() if getattr(first, name) != getattr(second, name)]
     if found:
@@ -116,9 +113,9 @@ def _rows(trajectory: Trajectory, name: str) -> Array:
 
 
 def ulps(x: Array | float, y: Array | float) -> float:
-    """Return the largest distance, counted in floats, between corresponding elements.
+    """Return the largest distance between corresponding elements, counted in floats.
 
-    It is 0 between two NaNs, infinite between a NaN and a number.
+    It is 0 between two NaNs, infinite between NaN and a number.
     """
     both_nan = np.isnan(x) & np.isnan(y)
     one_nan = np.isnan(x) ^ np.isnan(y)
@@ -129,6 +126,6 @@ def ulps(x: Array | float, y: Array | float) -> float:
 
 
 def _ordinal(x: Array | float) -> NDArray[np.uint64]:
-    """Return the rank of each float in the order of all floats; -0 is just below +0."""
+    """Return the rank of each float among all floats; -0 is just below +0."""
     bits = np.ascontiguousarray(x).view(np.uint64)
     return np.where(bits >> 63, ~bits, bits | np.uint64(1 << 63))

@@ -1,4 +1,4 @@
-"""Batches of scenes, with arrays of the quantities in which they differ."""
+"""Batches of scenes, with arrays of the quantities that differ."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -55,12 +55,12 @@ class Solver:
 class Batch:
     """Many scenes that one method or program solves; results are computed when first read.
 
-    Functions that check a claim of the thesis may read `omega0`, `omega`, `status`, `n_rows` and
-    `stop_variable`, and call `rows` and `by_method`.
+    `scene` has the shared quantities, `arrays` the others, with a row for each scene. The keys of
+    `arrays` are arguments of `solve_many` and `run_many`, and include `omega`. `listing` is None
+    for a method. `t_end` (s) has shape (n,). `attitude`, for methods only, requests attitudes.
 
-    `scene` has the quantities that all scenes share, `arrays` the others, with a row for each
-    scene; its keys are arguments of `solve_many` and `run_many`, and include `omega`. `listing` is
-    None for a method. `t_end` (s) has shape (n,). `attitude`, for methods only, requests attitudes.
+    Checks of the thesis's claims may use `omega0`, `omega`, `status`, `n_rows`, `stop_variable`,
+    `rows` and `by_method`.
     """
 
     scene: Scene
@@ -75,17 +75,17 @@ class Batch:
 
     @property
     def omega0(self) -> Array:
-        """Return the initial angular velocities, shape (n, 3), rad/s."""
+        """The initial angular velocities (rad/s), shape (n, 3)."""
         return self.arrays["omega"]
 
     @property
     def step_sizes(self) -> Array:
-        """Return the step sizes, shape (n,), s."""
+        """The step sizes (s), shape (n,)."""
         return self.arrays.get("step_size", np.full(len(self.omega0), self.scene.step_size))
 
     @property
     def bodies(self) -> Array:
-        """Return the principal moments (kg m2), shape (n, 3), or (1, 3) if shared."""
+        """The principal moments (kg m2), shape (n, 3), or (1, 3) if shared."""
         return self.arrays.get("moments", np.array([self.scene.moments]))
 
     @property
@@ -95,27 +95,27 @@ class Batch:
 
     @cached_property
     def omega(self) -> Array:
-        """Return omega at `t_end` (rad/s), shape (n, 3); NaN where there is no result."""
+        """Omega at `t_end` (rad/s), shape (n, 3); NaN without a result."""
         return self._program.omega[:, -1] if self.is_program else self._ends.omega
 
     @property
     def status(self) -> NDArray[np.int8]:
-        """Return the codes of the endings, from `pyharness.model.codes.Statuses`, shape (n,)."""
+        """The codes of the endings, from `pyharness.model.codes.Statuses`, shape (n,)."""
         return (self._program if self.is_program else self._ends).status
 
     @property
     def leaves(self) -> str | None:
-        """Return whether compiled code or an interpreter computed a torque's Taylor terms."""
+        """The kind of code that computed a recorded torque's Taylor series (`Ensemble.leaves`)."""
         return self._ends.leaves
 
     @property
     def n_rows(self) -> NDArray[np.int32]:
-        """Return the numbers of completed steps of a program, shape (n,)."""
+        """The numbers of completed steps of a program, shape (n,)."""
         return self._program.n_rows
 
     @property
     def stop_variable(self) -> NDArray[np.int8]:
-        """Return the number in STOP_VARIABLES of the variable that stopped each run, or 0."""
+        """The number in STOP_VARIABLES of the variable that stopped each run, or 0."""
         return self._program.stop_variable
 
     def sample_steps(self, samples: int) -> list[int]:
@@ -126,8 +126,8 @@ class Batch:
     def rows(self, samples: int) -> Array:
         """Return omega (rad/s) at the ends of `samples` equal parts, shape (n, samples, 3).
 
-        A method starts from time 0 for each part, so that errors do not accumulate. For a program,
-        the ends are the steps of `sample_steps`.
+        A method integrates from time 0 to each end, so that errors do not accumulate. A program's
+        ends are the steps of `sample_steps`.
         """
         if not self.is_program:
             return np.stack([each.omega for each in self._samples(samples)], axis=1)
@@ -149,7 +149,7 @@ class Batch:
 
     @property
     def first_attitudes(self) -> Array:
-        """Return the normalised attitudes at time 0, shape (n, 4), or (1, 4) if shared."""
+        """The normalised attitudes at time 0, shape (n, 4), or (1, 4) if shared."""
         first = np.array(self.arrays.get("attitude", [self.scene.attitude or IDENTITY]))
         return unit_quaternions(first)
 
@@ -158,13 +158,13 @@ class Batch:
         return self._solve(method, tolerance, self.t_end * part).omega
 
     def from_start(self, omega0: Array) -> "Batch":
-        """Return this batch, without results, with another initial omega (rad/s)."""
+        """Return the batch with another initial omega (rad/s), without results."""
         return replace(self, arrays={**self.arrays, "omega": omega0})
 
     def run(self, at: list[int]) -> ProgramEnsemble:
-        """Return a program's results at the steps `at`, ascending.
+        """Return a program's results at the ascending steps `at`.
 
-        If the scenes differ in `torque_rate`, or the program refuses one, they run one by one,
+        If the scenes differ in `torque_rate`, or the program refuses one, each scene runs alone,
         without the error codes IER. Only refused scenes have the status REFUSED.
         """
         if "torque_rate" not in self.arrays:  # `run_many` takes one rate for all bodies
@@ -177,7 +177,7 @@ class Batch:
     def scene_of(self, i: int) -> Scene:
         """Return scene `i` (from 0), with an attitude only if the torque needs it.
 
-        Raise InputError if the scene is invalid.
+        Raise InputError if it is invalid.
         """
         own = {name: array for name, array in self.arrays.items() if name != "lipschitz"}
         return scene_of_row(self._shared, own, i)
@@ -220,7 +220,7 @@ class Batch:
         return self._solve(method, tolerance, t_end, **more)
 
     def _solve(self, method: str, tolerance: float, t_end: Array, **more: Any) -> Ensemble:
-        """Return the states at `t_end` (s); one scene at a time if no kernel solves many bodies."""
+        """Return the states at `t_end` (s), scene by scene if no kernel solves many bodies."""
         by_state = isinstance(self.scene.torque, StateTorque)
         tolerance = max(tolerance, REGISTRY[method].finest)
         if method not in (PREPARED_FOR_STATE if by_state else PREPARED):

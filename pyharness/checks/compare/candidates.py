@@ -1,4 +1,4 @@
-"""Candidates, a common interface of methods, prepared solvers and programs.
+"""The common interface of methods, prepared solvers and programs: the candidates.
 
 A prepared solver, made by `prepare`, solves one scene by one method, from many initial states.
 Tolerances are relative to the largest omega; `effort` multiplies the work limit.
@@ -49,7 +49,7 @@ class End:
 
 @dataclass(frozen=True)
 class Ready:
-    """An integration from time 0 to one time; `read` converts the result of the timed `run`."""
+    """An integration from time 0 to one time: `run` is timed, `read` converts its result."""
 
     run: Callable[[], Any]
     read: Callable[[Any], End]
@@ -68,13 +68,13 @@ class Candidate:
     rows: Callable[..., Trajectory]
 
     def end(self, scene: Scene, time: float) -> End:
-        """Return the result at `time` (s); raise InputError if there is none."""
+        """Return the result at `time` (s); raise InputError without one."""
         ready = self.ready(scene, time)
         return ready.read(ready.run())
 
 
 def method_candidate(name: str, tolerance: float, effort: float = 1.0) -> Candidate:
-    """Return a candidate that calls `solve`; its trajectories have attitudes if the scene has."""
+    """Return a candidate that calls `solve`; `rows` has attitudes if the scene has one."""
 
     def rows(scene: Scene, times: Sequence[float] | None = None) -> Trajectory:
         times = scene.times() if times is None else times
@@ -149,7 +149,7 @@ def program_candidate(
 
 
 def unstopped(listing: Listing) -> Candidate:
-    """Return a compiled program without stop test and velocity as candidate."""
+    """Return a candidate that runs a compiled program without stop test and velocity."""
     return program_candidate(listing, may_stop=False, velocity=False)
 
 
@@ -159,7 +159,7 @@ def copied_result(values: Iterable[float]) -> Array:
 
 
 def not_finite(why: str = "overflow") -> End:
-    """Return an `End` without result: omega is NaN, `why` the ending."""
+    """Return an `End` with the ending `why` and NaN as omega."""
     return End(np.full(3, math.nan), why)
 
 

@@ -1,7 +1,7 @@
 """Comparisons of programs, original and corrected, and of methods, on one scene.
 
-Differences between Fortran and Python are in units in the last place. An error (rad/s) below the
-reference solution's own has no meaning.
+Errors (rad/s) below the reference solution's own have no meaning. Differences between Fortran and
+Python are in units in the last place.
 """
 
 import itertools
@@ -145,11 +145,11 @@ def listings_for(
     readings: Sequence[str] = (),
     conjectures: Sequence[str] | None = None,
 ) -> list[Listing]:
-    """Return the listings to compare: original, selected and corrected, for each program.
+    """Return each program's listings to compare: original, selected (if any) and corrected.
 
-    The selected listing is `base`, changed by `fix` and `keep`; `readings` and `conjectures` apply
-    to all listings. If `base` is specified without `fix` and `keep`, it is the only listing. Raise
-    InputError for a name that none of `programs` has.
+    `base`, changed by `fix` and `keep`, is the selected one; without a change, a specified `base`
+    is the only one. `readings` and `conjectures` apply to all. Raise InputError for a name that no
+    program has.
     """
     chosen = list(programs)
     assumed = [name for name in conjectures or () if name != "none"]

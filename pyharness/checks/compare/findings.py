@@ -37,7 +37,7 @@ class ProgramFinding:
 
     @property
     def who(self) -> str:
-        """Return the program and its listing's label, as in ``two-term original``."""
+        """The program and its listing's label, as in ``two-term original``."""
         return f"{self.listing.program} {self.listing.label}"
 
 

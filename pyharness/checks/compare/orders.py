@@ -1,4 +1,4 @@
-"""Measured orders of convergence: powers of the step size to which the error is proportional."""
+"""Measured orders of convergence: powers of the step size to which errors are proportional."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -76,16 +76,16 @@ class Order:
 
 
 class _SingularError(Exception):
-    """A run failed at a step size for which its matrix may be singular."""
+    """A run failed, perhaps because its matrix is singular."""
 
 
 def measured_order(
     scene: Scene, program: Program, listing: Listing, truth: Reference, pairs: int = 2
 ) -> Order:
-    """Return the measured order with which omega of a compiled program converges to `truth`.
+    """Return the measured order of convergence of a compiled program's omega to `truth`.
 
-    A program that does not converge has the state `misses` if a textbook method of the same order
-    converges, and `sensitive` if the error may be amplified rounding.
+    Without convergence, the state is `misses` if a textbook method of the same order converges, and
+    `sensitive` if the error may be amplified rounding.
     """
 
     def omega(finer: Scene) -> Array:
@@ -120,9 +120,9 @@ def order_of(
     """Return the order of a numerical solution, measured by halving the step size.
 
     `solution` returns `quantity` after each step, shape (n, 3), with fewer rows after an overflow.
-    The measurement ends when the orders from `pairs` consecutive halvings are all at least `due` -
-    0.5 or all smaller, or the error is only rounding. A run has at most `most_steps` steps, by
-    default 2**18, or more if eight halvings need it.
+    The measurement ends when `pairs` successive orders are all at least `due` - 0.5 or all smaller,
+    or the error is only rounding. A run has at most `most_steps` steps, by default 2**18, or more
+    if eight halvings need it.
     """
     n = len(truth.time)
     if n < scene.steps:
@@ -199,7 +199,7 @@ def _fastest(scene: Scene, omega: Array) -> float:
 
 
 def _is_grown_rounding(scene: Scene, found: Order) -> bool:
-    """Return whether the error may be amplified rounding; True if no bound can be computed."""
+    """Return whether the error may be amplified rounding; True without a bound."""
     if not found.steps or not math.isfinite(found.error):
         return False
     with suppress(InputError):
@@ -209,7 +209,6 @@ def _is_grown_rounding(scene: Scene, found: Order) -> bool:
 
 
 def _may_be_singular(program: str, step_size: float) -> bool:
-    """Return whether a collocation matrix overflows or has a condition number above 1e15."""
     from pyharness.checks.theory.collocation_matrices import PARTS
 
     if program not in PARTS:

@@ -31,7 +31,7 @@ _MARKERS: dict[str, dict[str, Any]] = {
 
 
 def _curves(comparison: Comparison) -> list[tuple[str, str, Trajectory, Accuracy]]:
-    """Return program or method (a column), listing if any, trajectory and errors of each curve."""
+    """Return program or method, listing label, trajectory and errors of each curve."""
     found: list[tuple[str, str, ProgramFinding | MethodFinding]]
     found = [(each.listing.program, each.listing.label, each) for each in comparison.programs]
     found += [(each.method, "", each) for each in comparison.methods if not comparison.programs]
@@ -42,8 +42,8 @@ def _curves(comparison: Comparison) -> list[tuple[str, str, Trajectory, Accuracy
 def comparison_picture(comparison: Comparison) -> Picture:
     """Return a picture with one column per program or method.
 
-    Its panels show the components of omega, their largest error (rad/s) and, if compared, the error
-    of the attitude (rad).
+    Its panels show omega's components, their largest error (rad/s) and, if compared, the attitude's
+    error (rad).
     """
     from matplotlib.figure import Figure
 

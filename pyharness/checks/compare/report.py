@@ -35,10 +35,7 @@ _DRIFTS = (Column("energy", short), Column("mom.sq", short))
 
 
 def comparison_report(comparison: Comparison, numerics: bool = False) -> Report:
-    """Return the report of a comparison.
-
-    Without `numerics`, it has only the programs' steps, stops and errors.
-    """
+    """Return the report; without `numerics`, only the programs' steps, stops and errors."""
     has_programs = bool(comparison.programs)
     numerics = numerics or not has_programs
     scene = heading(comparison.scene, [each.listing for each in comparison.programs])
@@ -95,7 +92,7 @@ def comparison_report(comparison: Comparison, numerics: bool = False) -> Report:
 
 
 def verdict(comparison: Comparison) -> list[str]:
-    """Return sentences on which results are as expected, unexpected, sensitive or not judged."""
+    """Return sentences on expected, unexpected, sensitive and unjudged results."""
     told = [f"UNEXPECTED: {each}" for each in comparison.unexpected] or [_as_expected(comparison)]
     if comparison.is_sensitive:
         told.append(sensitive(comparison.growth, comparison.digits))

@@ -27,8 +27,8 @@ def seconds(
 ) -> list[float]:
     """Return the time of one call of each function in `runs` (s), measured in several rounds.
 
-    In each round a function is called for about `length` seconds. The first call is not counted; if
-    it takes at least `slow` seconds, there are only three rounds, if five times as long, only one.
+    A round calls each function for about `length` seconds. If the first call, which is not counted,
+    takes at least `slow` seconds, there are only three rounds, if five times as long, only one.
     `statistic` combines the times of the rounds.
     """
     clocks = [perf_counter] * len(runs) if clocks is None else clocks
@@ -53,7 +53,7 @@ def seconds(
 
 
 def batch_seconds(run: Run, calls: int = 1, clock: Clock = perf_counter) -> float:
-    """Return the time of one call (s), averaged over `calls`, after a warm-up if `calls` > 1."""
+    """Return the mean time of `calls` calls (s), after a warm-up if there are several."""
     if calls > 1:
         run()
     begin = clock()
@@ -66,7 +66,7 @@ def batch_seconds(run: Run, calls: int = 1, clock: Clock = perf_counter) -> floa
 def ended_after(limit: float) -> Iterator[None]:
     """Raise RuntimeError if a ``with`` block takes longer than `limit` (s).
 
-    Only Python code in the main thread is interrupted, where signals arrive.
+    Only Python code in the main thread, where signals arrive, is interrupted.
     """
 
     def end(*_: object) -> None:
@@ -83,7 +83,7 @@ def ended_after(limit: float) -> Iterator[None]:
 
 @contextlib.contextmanager
 def silenced() -> Iterator[None]:
-    """Suppress Python warnings and NumPy's floating-point errors in a ``with`` block."""
+    """Suppress warnings of Python and floating-point errors of NumPy in a ``with`` block."""
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield

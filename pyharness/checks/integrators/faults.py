@@ -1,7 +1,7 @@
 """Known faults of integrators, each with the motion that a faulty integrator computes.
 
-This motion is our solution of another scene, or in other conventions. An integrator that converges
-to this motion has the fault.
+We compute this motion by solving a changed scene, or by changing the right states. An integrator
+that converges to this motion has the fault.
 """
 
 import math
@@ -34,10 +34,10 @@ class State(NamedTuple):
 class Fault:
     """A fault of an integrator: its name, a sentence on it, and its changes.
 
-    `scene` returns the scene whose motion the faulty integrator computes, or None if the fault has
-    no effect. `times` returns the times (s) of its states, from the requested times and the step
-    size (s). `state` then changes the states; its second argument is the right scene. If `of_step`,
-    the states approach the true ones as the step decreases.
+    `scene` returns the scene that the faulty integrator solves, or None if the fault has no effect.
+    `times` returns the times (s) of its states, from the requested times and the step size (s).
+    `state` then changes the states; its second argument is the right scene. If `of_step`, the
+    states approach the true ones as the step decreases.
     """
 
     name: str
@@ -48,7 +48,7 @@ class Fault:
     of_step: bool = False
 
     def motion(self, scene: Scene, times: Array, step: float) -> State | None:
-        """Return the states at `times` (s) with a step size (s); None if there is no effect."""
+        """Return the faulty states for `times` (s) and a step size (s); None without effect."""
         other = self.scene(scene)
         if other is None:
             return None
@@ -75,7 +75,7 @@ def _gyroscopic(scene: Scene, omega: Any) -> list[Any]:
 
 
 def _with_gyroscopic(*factors: float, applied: float = 1.0) -> Callable[[Scene], Scene]:
-    """Return a function that multiplies a torque by `applied`, -omega x (I omega) by `factors`."""
+    """Return a function that scales a torque by `applied`, -omega x (I omega) by `factors`."""
 
     def changed(scene: Scene) -> Scene:
         def torque(t: Any, omega: Any) -> list[Any]:
@@ -121,7 +121,7 @@ def _in_order(*order: int) -> Callable[[Scene], Scene]:
 
 
 def in_space(attitude: Array, vectors: Array) -> Array:
-    """Return vectors about the axes of space, shape (n, 3), from those about the body axes."""
+    """Return the components along the axes of space, shape (n, 3), of vectors in body axes."""
     q = attitude.T
     turned = product(product(q, (np.zeros(len(vectors)), *vectors.T)), _conjugate(q))
     return np.array(turned[1:]).T
@@ -132,18 +132,16 @@ def _conjugate(q: Any) -> Any:
 
 
 def _with_space_rates(scene: Scene) -> Scene:
-    """Return the scene of p, the conjugate of q, and -omega, if q' = (0, omega) q/2.
-
-    Correct is q' = q (0, omega)/2. The conjugate satisfies p' = p (0, -omega)/2, and -omega
-    satisfies Euler's equations with opposite gyroscopic term and torque.
-    """
+    """Return the scene of -omega and the conjugate of q, if q' = (0, omega) q/2."""
+    # Correct is q' = q (0, omega)/2. The conjugate p of q satisfies p' = p (0, -omega)/2, and
+    # -omega satisfies Euler's equations with the opposite gyroscopic term and torque.
     start, back = _conjugate(scene.attitude), np.negative(scene.omega).tolist()
     opposite = _with_gyroscopic(-1.0, -1.0, -1.0, applied=-1.0)(scene)
     return replace(opposite, omega=back, attitude=start)
 
 
 def _with_doubled_rates(scene: Scene) -> Scene:
-    """Return the scene of a body with twice omega, so that q' = q (0, omega)."""
+    """Return the scene with doubled omega, so that q' = q (0, omega)."""
     halved = _with_gyroscopic(0.5, 0.5, 0.5, applied=2.0)(scene)
     return replace(halved, omega=np.multiply(2.0, scene.omega).tolist())
 
@@ -234,10 +232,7 @@ OUTPUTS = ("quaternion-transposed", "scalar-last", "attitude-from-identity")
 
 
 def motions(scene: Scene, times: Array, step: float) -> Iterator[tuple[Fault, State]]:
-    """Yield each fault that has an effect in the scene, with its states at `times` (s).
-
-    The states are NaN if the motion does not reach the last time.
-    """
+    """Yield each fault with an effect, and its states, NaN if the last time is not reached."""
     for fault in FAULTS:
         with np.errstate(all="ignore"):
             try:

@@ -1,7 +1,7 @@
 """Checks of an integrator of rigid bodies in any language, against the true solution.
 
-Errors are measured in random scenes with decreasing steps or tolerances. If the integrator
-converges to a faulty motion, the fault is named (docs/how-to/integrators.md).
+Errors are measured in random scenes with decreasing steps or tolerances. If the results converge to
+the motion of a known fault, the fault is named (docs/how-to/integrators.md).
 """
 
 import math
@@ -77,7 +77,7 @@ class Verdict:
 
     @property
     def control(self) -> str:
-        """Return the field of the requests that sets the accuracy; empty without answers."""
+        """The field of the requests that sets the accuracy; empty without answers."""
         return self.judged[-1].finest.control if self.judged else ""
 
     def add(self, scene: str, *checks: Check) -> None:
@@ -95,9 +95,8 @@ def judge_integrator(
     """Return the results of all checks of an integrator, started by `command`.
 
     `chosen` are the problems (random scenes), `due` is the required order. ``again(name)`` returns
-    the command that repeats the checks in a scene; `told` receives the number of finished problems
-    and the name of the next. An invalid answer ends the checks. Raise InputError for an empty
-    command.
+    the command that repeats a scene's checks; `told` receives the number of finished problems and
+    the next one's name. An invalid answer ends the checks. Raise InputError for an empty command.
     """
     found = Verdict(command, again)
     where = "start"
@@ -129,11 +128,8 @@ def judge_integrator(
 
 
 def _unexplained(found: Verdict) -> tuple[str, ...]:
-    """Return the problems with failed checks that no fault explains.
-
-    A fault also explains an overflow of the faulty motion and, if it lowers the order, too low an
-    order.
-    """
+    """Return the problems with failed checks that no recognised fault explains."""
+    # A fault also explains an overflow of its motion and, if it lowers the order, too low an order.
     faults = {x.name: x.problems for x in found.findings if x.name not in FIRST_ORDER}
     explained = {*chain.from_iterable(faults.values()), *(["long"] if faults else [])}
     remarked = {problem for each in found.findings for problem in each.problems}
@@ -152,7 +148,7 @@ def _unexplained(found: Verdict) -> tuple[str, ...]:
 
 
 def judge_problem(ask: Ask, problem: Problem, due: float, found: Verdict) -> None:
-    """Append the checks in one problem to `found`; raise PortError for an invalid answer."""
+    """Append one problem's checks to `found`; raise PortError for an invalid answer."""
     answers = []
     for level in range(LEVELS):
         motion = ask(problem.request(level), len(problem.times))
@@ -218,7 +214,7 @@ def _same(one: Array, other: Array) -> Any:
 
 
 def _returned(ask: Ask, judged: Judged) -> list[Check]:
-    """Return checks that a torque-free body returns to its start after omega is reversed."""
+    """Return checks that a free body returns to its start after omega is reversed."""
     problem, level = judged.problem, LEVELS // 2
     forth = judged.answers[level]
     if not problem.scene.torque.is_zero or forth.attitude is None:
@@ -269,7 +265,7 @@ def _judge_long(ask: Ask, found: Verdict) -> None:
 
 
 def replay_command(command: str, seed: str, draws: int, name: str = "") -> str:
-    """Return the command that repeats an integrator's checks, in one problem or in all."""
+    """Return the command that repeats an integrator's checks, in one problem or all."""
     verb = f"python -m pyharness verify --integrator {shlex.quote(command)}"
     where = f" --cell {name}" if name else ""
     return f"{verb} --seed {shlex.quote(seed)} --draws {draws}{where}"

@@ -31,10 +31,10 @@ Advance = Callable[[Any, Array, Array, float], Any]
 
 @dataclass(frozen=True)
 class IntegratorPlant:
-    """A fault planted in an integrator, and the name by which it must be recognised.
+    """A fault planted in an integrator, which must be recognised by its name.
 
     `request` changes the request, `state` the answered states. `advance` computes the attitude
-    after a step from that before it, omega (rad/s) before and after, and the step size (s).
+    after each step.
     """
 
     name: str
@@ -83,7 +83,7 @@ def _held(asked: dict[str, Any]) -> None:
 
 
 def _turned_start(asked: dict[str, Any]) -> None:
-    """Rotate the initial angular momentum about a body axis by the step size (s), taken as rad."""
+    """Rotate the initial angular momentum by an angle (rad) equal to the step size (s)."""
     moments, h = np.array(asked["moments"]), asked["step_size"]
     vector = moments * np.array(asked["omega"])
     across = np.cross(_STEP_AXIS, vector)
@@ -182,13 +182,13 @@ def with_plant(ask: Ask, plant: IntegratorPlant, scene: Scene) -> Ask:
 
 
 def self_test(command: str, chosen: Sequence[Problem], due: float = 1.0) -> Iterator[Outcome]:
-    """Yield the outcome of the control, without a fault, then with each planted fault.
+    """Yield the outcome without a fault (the control), then with each planted fault.
 
-    If an answer of the control is invalid, only the failed control is yielded.
+    An invalid answer ends the self-test with a failed control.
     """
 
     def judge(plant: IntegratorPlant | None = None) -> tuple[Verdict, list[str], int]:
-        """Return results with a planted fault, the recognised faults, and the count of failures."""
+        """Return results, recognised faults, and the count of failed checks."""
         found = Verdict(command)
         for problem in chosen:
             asking = with_plant(ask, plant, problem.scene) if plant else ask
@@ -219,7 +219,7 @@ def _note(names: Sequence[str]) -> str:
 
 
 def _possible(right: Verdict) -> set[str]:
-    """Return which elements of `IntegratorPlant.needs` the integrator and its scenes have."""
+    """Return the elements of `IntegratorPlant.needs` that integrator and scenes have."""
     kinds = {each.problem.kind for each in right.judged}
     found = {
         "steps": right.control != "tolerance",

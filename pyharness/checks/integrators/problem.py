@@ -2,7 +2,7 @@
 
 The drift is the change of conserved quantities in a long torque-free motion: relative for energy
 and |L|, an angle (rad) for the direction of the angular momentum L in space. A level, from 0 to
-`LEVELS` - 1, sets a step size (s) and a tolerance, which decrease from level to level.
+`LEVELS` - 1, sets a step size (s) and a tolerance; both decrease with the level.
 """
 
 import math
@@ -64,34 +64,34 @@ class Problem:
 
     @property
     def name(self) -> str:
-        """Return the kind of torque and the number."""
+        """The kind of torque and the number."""
         return self.scene.name
 
     @property
     def kind(self) -> str:
-        """Return the kind of the torque, one of `scenes.random_scenes.MODERATE`."""
+        """The kind of the torque, one of `scenes.random_scenes.MODERATE`."""
         return self.scene.name.partition("-")[0]
 
     @cached_property
     def times(self) -> Array:
-        """Return the requested times (s)."""
+        """The requested times (s)."""
         steps = np.arange(_EACH, self.scene.steps + 1, _EACH)
         return np.asarray(self.scene.step_size * steps, dtype=float)
 
     @cached_property
     def truth(self) -> Reference:
-        """Return the true states at the requested times."""
+        """The true states at the requested times."""
         return reference(self.scene, self.times.tolist())
 
     @cached_property
     def bound(self) -> ErrorBound:
-        """Return the error bound of `truth`, relative to the largest omega."""
+        """The error bound of `truth`, relative to the largest omega."""
         bound = bound_of(self.scene, self.truth, any_torque=True)
         return bound.over(float(np.abs(self.truth.omega).max()))
 
     @cached_property
     def faulty(self) -> list[tuple[Fault, State]]:
-        """Return the known faults with an effect, and their states at the smallest step."""
+        """The known faults with an effect, and their states at the smallest step."""
         return list(motions(self.scene, self.times, self.step_size(LEVELS - 1)))
 
     def faulty_states(self, fault: Fault, level: int) -> State:
@@ -112,7 +112,7 @@ class Problem:
 
     @property
     def most_steps(self) -> float:
-        """Return the number of steps until the last time with the smallest step size."""
+        """The number of steps of the smallest size until the last time."""
         return float(self.times[-1] / self.step_size(LEVELS - 1))
 
     def floor(self, rounding: float) -> float:
@@ -120,12 +120,12 @@ class Problem:
         return _ROUNDINGS * rounding * math.sqrt(self.most_steps)
 
     def request(self, level: int, scene: Scene | None = None, times: Array | None = None) -> bytes:
-        """Return the line of JSON that requests states at a level, by default of this problem."""
+        """Return the JSON line that requests states at a level, by default of this problem."""
         asked = (self.times if times is None else times).tolist()
         return request(scene or self.scene, asked, self.step_size(level), self.tolerance(level))
 
     def errors(self, motion: Motion) -> tuple[float, float | None]:
-        """Return the errors of omega (relative) and attitude (rad, or None), possibly infinite."""
+        """Return the errors of omega (relative) and any attitude (rad), possibly infinite."""
         assert self.truth.attitude is not None
         return errors_between(State(self.truth.omega, self.truth.attitude), motion)
 
@@ -149,7 +149,7 @@ def finite_or_infinite(x: float) -> float:
 class Convergence:
     """The errors of a `part`, omega or attitude, in one problem, at decreasing settings.
 
-    The errors are proportional to the power `order` of the setting, a step size (s) or a tolerance;
+    They are proportional to the power `order` of the setting, a step size (s) or a tolerance;
     `order` is None if all errors are rounding errors.
     """
 
@@ -160,7 +160,7 @@ class Convergence:
 
     @property
     def is_first(self) -> bool:
-        """Return whether the order is about 1 over the last two settings and over the last four."""
+        """Return whether the order is about 1 at the last two settings and at the last four."""
         if self.order is None:
             return False
         far = _power(self.errors[-_SEVERAL] / max(self.errors[-1], _LEAST),
@@ -178,7 +178,7 @@ class Convergence:
         return self.order is None or self.order >= _ORDER_ONE
 
     def predicted(self, level: int) -> float:
-        """Return the error at a level, extrapolated from the next level by the order."""
+        """Return a level's error, extrapolated from the next level by the order."""
         ratio = self.settings[level] / self.settings[level + 1]
         return self.errors[level + 1] * math.pow(ratio, self.order or 0.0)
 
@@ -186,10 +186,10 @@ class Convergence:
 def convergence(
     part: str, settings: Sequence[float], errors: Sequence[float], floor: float, overall: bool
 ) -> Convergence:
-    """Return the measured order of convergence of errors above `floor`.
+    """Return a part's errors and their order of convergence, measured above `floor`.
 
-    It is from the last pair of settings. If `overall`, as for tolerances, with which errors
-    decrease irregularly, it is the smaller of two orders: from the first setting to the last, and
+    It is the order of the last two settings. If `overall`, for tolerances, with which errors
+    decrease irregularly, it is the smaller of the orders from the first setting to the last and
     from the fourth last to the last.
     """
     seen = [k for k in range(1, len(errors)) if not errors[k] <= floor]
@@ -205,7 +205,6 @@ def convergence(
 
 
 def _power(errors: float, settings: float) -> float:
-    """Return the power p in `errors` = `settings`**p; both are ratios."""
     if math.isnan(errors) or errors <= 0.0:  # the error of the smaller step is infinite
         return 0.0
     return math.log(errors) / math.log(settings)
@@ -221,15 +220,14 @@ class Judged:
 
     @property
     def finest(self) -> Motion:
-        """Return the answer at the finest setting."""
+        """The answer at the finest setting."""
         return self.answers[-1]
 
     @cached_property
     def lost(self) -> int:
-        """Return the number of states that should be finite and are not.
+        """The number of states that should be finite and are not.
 
-        A level may overflow if the order and the error of the next level predict an error of 1 or
-        more.
+        A level may overflow if the next level's error and the order predict an error of 1 or more.
         """
         rows = self.finest.lost
         for level in range(LEVELS - 2, -1, -1):
@@ -251,7 +249,7 @@ class Judged:
         return max(least, *(each.errors[level] for each in self.convergences))
 
     def order_of(self, part: str) -> Convergence | None:
-        """Return the measured order of omega or of the attitude, if any."""
+        """Return the measured order of omega or attitude, if any."""
         return next((each for each in self.convergences if each.part == part), None)
 
 
@@ -264,7 +262,7 @@ def problems(seed: str, draws: int, names: Sequence[str] = ()) -> list[Problem]:
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """The drifts since time 0 at n `times` (s), and the largest `change` between successive times.
+    """The drifts since time 0 at n `times` (s), and the largest `change` between successive ones.
 
     `named` has the drifts, shape (n,), of "energy", "momentum" and, with an attitude, "direction".
     """
@@ -277,8 +275,8 @@ class Drift:
 def long_motion(free: Judged) -> tuple[int, Array, float | None]:
     """Return level and times (s) of the long motion, and the limit of the drift between two times.
 
-    The level is the first that allows enough times; without one, the last or, if errors do not
-    decrease, the first. The limit is None if the errors in the problem `free` are too large.
+    The level is the first that allows enough times, else the last or, if errors do not decrease,
+    the first. The limit is None if the errors in the problem `free` are too large.
     """
     control = free.finest.control
     levels = range(_FIRST[control], LEVELS)

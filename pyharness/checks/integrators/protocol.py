@@ -25,10 +25,10 @@ ROUNDINGS = {"binary64": 2.0**-53, "binary32": 2.0**-24}
 class Motion:
     """An integrator's answer: the states at the requested times, or its refusal.
 
-    `omega` is about the body axes (rad/s), shape (n, 3). `attitude` is from body to space, scalar
+    `omega` (rad/s) is about the body axes, shape (n, 3). `attitude` is from body to space, scalar
     first, normalised, shape (n, 4); `norm` is the largest difference of its norm from 1 before
-    normalisation. `control` is the field of the request that sets the accuracy; `rounding` is the
-    relative rounding error of the integrator's arithmetic.
+    normalisation. `control` is the request's field that sets the accuracy; `rounding` is the
+    relative rounding error of the arithmetic.
     """
 
     omega: Array
@@ -40,13 +40,13 @@ class Motion:
 
     @property
     def lost(self) -> int:
-        """Return the number of states that are not finite."""
+        """The number of states that are not finite."""
         parts = [self.omega] if self.attitude is None else [self.omega, self.attitude]
         return int((~np.isfinite(np.hstack(parts)).all(axis=1)).sum())
 
 
 def request(scene: Scene, times: Sequence[float], step_size: float, tolerance: float) -> bytes:
-    """Return the line of JSON that requests the states of a scene at `times` (s).
+    """Return the line of JSON that requests a scene's states at `times` (s).
 
     Times are multiples of `step_size` (s); `tolerance` is relative to the largest omega.
     """
@@ -64,7 +64,7 @@ Ask = Callable[[bytes, int], Motion]
 
 
 def asking_of(process: PortProcess) -> Ask:
-    """Return the function that asks an integrator's process."""
+    """Return a function that sends requests to an integrator and returns its answers."""
     return lambda line, rows: read_motion(process.ask(line), rows)
 
 

@@ -57,7 +57,7 @@ def recognised(results: Sequence[Judged]) -> list[Finding]:
 
 
 def _explained(judged: Judged) -> list[str]:
-    """Return names of the fault that explains the errors, if any, and of faults of the output."""
+    """Return any fault that explains the errors, and faults of the output."""
     true = judged.convergences
     if judged.lost or all(each.is_higher for each in true):
         return []

@@ -1,7 +1,7 @@
-"""Faults of a chosen size: which function is faulty, and how its result changes.
+"""Faults of a chosen size, each planted in the running process while a context lasts.
 
-A fault is planted in the running process until its context ends. A faulty Python version of a
-program (twin) is a copy of the sources with one replacement.
+A fault replaces a function, or changes its result. The Python version of a program (twin) becomes
+faulty by one replacement in a copy of its sources.
 """
 
 import importlib
@@ -63,7 +63,7 @@ def in_method(name: str, faulty: Faulty) -> Fault:
 
 
 def changing(change: Change) -> Faulty:
-    """Return a faulty function that applies `change` to the result of the right function."""
+    """Return a faulty function that applies `change` to the right function's result."""
     return lambda size, right, *rest, **named: change(right(*rest, **named), size)
 
 
@@ -86,7 +86,7 @@ def change_at(path: str, change: Callable[[Any], Any]) -> Callable[[dict[str, An
 
 
 def change_attribute(name: str, change: Change) -> Change:
-    """Return a change of a result's attribute; it has no effect on None."""
+    """Return a change of a result's attribute `name`; None remains None."""
 
     def changed(found: Any, size: float) -> Any:
         value = getattr(found, name)
@@ -131,7 +131,7 @@ class PlantedTwin(Program):
 
 
 def twin(program: str, name: str, both: bool = True) -> Fault:
-    """Return the fault `name` of a program's Python version, as a context manager."""
+    """Return the fault `name` of a program's Python version and, if `both`, of Fortran."""
     fault = TWIN_FAULTS[name]
 
     @contextmanager

@@ -25,7 +25,7 @@ class Outcome:
 
     @property
     def check(self) -> Check:
-        """Return the outcome as a check, whose value is the number of failed checks."""
+        """The outcome as a check, whose value is the number of failed checks."""
         return Name("self-test", self.name).judged(self.passed, self.note, float(self.failed))
 
 
@@ -37,7 +37,7 @@ def control(failed: int, note: str) -> Outcome:
 def self_test_report(
     title: Sequence[str], found: Sequence[Outcome], again: str, **extra: Any
 ) -> Report:
-    """Return the report of a self-test; `again` is the command that repeats it.
+    """Return the report of a self-test, which the command `again` repeats.
 
     `extra` has further JSON fields.
     """

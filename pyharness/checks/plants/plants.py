@@ -1,6 +1,6 @@
 """Planted faults, which test what each check detects.
 
-Compiled programs are altered at their entry point, twins (Python versions) in a copy of the source.
+Compiled programs are altered at their entry point, twins (Python versions) in copied sources.
 """
 
 import itertools
@@ -58,7 +58,7 @@ def _plus(found: Any, size: float) -> Any:
 
 
 def _off(found: Array, size: float) -> Array:
-    """Return an array with elements enlarged by `size` times the largest one."""
+    """Return the array with elements enlarged by `size` times the largest one."""
     return np.asarray(found + size * np.abs(found).max(initial=0.0) * np.sign(found))
 
 
@@ -109,7 +109,7 @@ def _prepared(change: Callable[[Array, _Answer, float], _Answer]) -> Fault:
 
 
 def _stale_solver(size: float) -> AbstractContextManager[Any]:
-    """Return a context in which every second call of a prepared solver repeats the last result."""
+    """Return a context in which every second call of prepared solvers repeats a result."""
     calls = itertools.count()
     before: list[_Answer] = []
 
@@ -140,7 +140,7 @@ _Run = Callable[..., Trajectory]
 
 
 def _shorter_compiled(size: float, run: _Run, scene: Scene, *rest: Any) -> Trajectory:
-    """Return a compiled run with a smaller step size, but the times of the original steps."""
+    """Return a compiled run with a smaller step size, but the original times."""
     shorter = replace(scene, step_size=(1.0 - size) * scene.step_size)
     found, labels = run(shorter, *rest), run(scene, *rest)
     if found.steps != labels.steps:
@@ -166,7 +166,7 @@ def _label_both(
 def _shifted(
     size: float, solve: _Run, scene: Scene, times: Sequence[float], *rest: float
 ) -> Trajectory:
-    """Return results for later times as if for `times`; only the true solution reveals this."""
+    """Return results of later times, labelled with `times`; only the true solution reveals this."""
     late = size * scene.step_size if times[-1] >= 0.0 else -size * scene.step_size
     found = solve(scene, [t + late for t in times], *rest)
     time = np.array(times[: len(found.time)], dtype=float)
@@ -174,7 +174,7 @@ def _shifted(
 
 
 def _wrong_card(size: float) -> AbstractContextManager[Any]:
-    """Return a context in which the compiled programs exchange the flags of two defects."""
+    """Return a context in which compiled programs exchange the flags of two defects."""
     known = [entry["flag"] for entry in flagged() if entry["kind"] != "reading"]
     flags = Listing.flags.fget  # type: ignore[attr-defined]
 
@@ -289,7 +289,7 @@ def outcome(plant: Plant, chosen: Selection) -> Outcome:
 
 
 def _failed(chosen: Selection) -> tuple[Counter[str], str]:
-    """Return the numbers of failed checks by kind, and a note with one id."""
+    """Return the numbers of failed checks by kind, and a note with an example."""
     names = [check.id for check in verify(chosen) if not check.passed]
     failed = Counter(name.partition("/")[0] for name in names)
     example = min(names, key=lambda name: name.startswith(_NOT_ENOUGH), default="")

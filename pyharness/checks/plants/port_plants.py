@@ -174,7 +174,7 @@ PLANTS = (
 def self_test(command: str, cells: Sequence[Cell]) -> Iterator[Outcome]:
     """Yield the outcome without a fault, then with each planted fault.
 
-    Without valid answers, only a failed control is yielded.
+    If the port fails or its answer is invalid, a failed control ends the self-test.
     """
     chosen = _chosen(cells)
     try:
@@ -232,7 +232,7 @@ def _planted(process: PortProcess, cells: Sequence[Cell]) -> Iterator[Outcome]:
 
 
 def _parsed(line: bytes) -> dict[str, Any]:
-    """Return a valid answer as a dictionary, with numbers in text converted to floats."""
+    """Return a valid answer as a dictionary, with numbers as floats."""
     answer: dict[str, Any] = json.loads(line)
     answer["rows"] = [[read_number("rows", x) for x in row] for row in answer["rows"]]
     change_at("stop.quotient", partial(read_number, "stop"))(answer)

@@ -21,7 +21,7 @@ class Circumstance(NamedTuple):
 
 
 def speed(scene: Scene, largest: float) -> float:
-    """Return a bound (1/s) on torque-free abs(omega') over `largest`, the largest omega (rad/s)."""
+    """Return a bound (1/s) on torque-free abs(omega') / `largest`, if abs(omega) <= `largest`."""
     return max(map(abs, scene.euler_coefficients)) * largest
 
 
@@ -53,12 +53,9 @@ def quarter(disturbance: float) -> float:
 
 
 def _separatrix() -> Iterator[Circumstance]:
-    """Yield perturbed rotations about the axis of the middle moment.
-
-    Perturbations are from 1e-1 to 1e-15 rad/s. At a flip, omega about that axis changes its sign.
-    End times are before the first flip, during it, and during the fifth; further scenes start on
-    the separatrix.
-    """
+    """Yield rotations about the middle axis, perturbed by 1e-1 to 1e-15 rad/s."""
+    # At a flip, omega about the middle axis changes its sign. Motions end before the first flip, in
+    # it, or in the fifth; those named "on" start on the separatrix.
     for d in (10.0**-k for k in range(1, 16)):
         beside, on = (d, 1.0, 0.0), (d, 1.0, d)
         flip = quarter(d)
@@ -120,7 +117,7 @@ _BODIES: dict[str, Triple] = {
 
 
 def _shapes() -> Iterator[Circumstance]:
-    """Yield needles, coins, plates and impossible bodies, in several orders of axes, and Case 6."""
+    """Yield needles, coins, plates and impossible bodies, with permuted axes, and Case 6."""
     for name, moments in _BODIES.items():
         for axes in _ORDERS:
             first, second, third = (moments[axis] for axis in axes)

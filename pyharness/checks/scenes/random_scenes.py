@@ -1,4 +1,4 @@
-"""Random scenes by kind, listings and parameters, reproducible from a seed and a number."""
+"""Random scenes, listings and parameters, reproducible from a seed and a number."""
 
 import datetime
 import math
@@ -37,11 +37,11 @@ class Draw:
 
     @property
     def time(self) -> float:
-        """Return the end time (s) of a method's run; negative if backward."""
+        """The end time (s) of a method's run; negative if backward."""
         return self.scene.step_size * self.scene.steps * (-1.0 if self.backward else 1.0)
 
     def tolerance(self, finest: float) -> float:
-        """Return the relative tolerance that `digits` selects, from 1e-3 to a method's `finest`."""
+        """Return the relative tolerance that `digits` selects, from 1e-3 to `finest`."""
         return float(max(finest, COARSEST * (finest / COARSEST) ** self.digits))
 
 
@@ -82,7 +82,7 @@ def text_generator(seed: str) -> np.random.Generator:
 
 
 def random_scene(kind: str, seed: str | int, name: str = "") -> Scene:
-    """Return the scene of a kind, a key of `KINDS`, for a seed."""
+    """Return the scene of a `kind`, a key of `KINDS`, for a seed."""
     return replace(KINDS[kind](Random(seed)), name=name)
 
 
@@ -90,7 +90,7 @@ def draw_moderate(seed: str, kind: str, number: int) -> Scene:
     """Return scene `number` of a seed, with a torque of `kind`, an element of `MODERATE`.
 
     The moments are possible and differ by at least a tenth. The body rotates by some radians in 12
-    steps, 6 s in all. Torques over moments are some tenths of 1 rad/s2.
+    steps of 0.5 s. Torques over moments are some tenths of 1 rad/s2.
     """
     source = Random(f"{seed}/moderate/{kind}/{number}")
     size = 10.0 ** source.uniform(-1.0, 1.0)
@@ -148,7 +148,7 @@ def _near_separatrix(source: Random) -> Scene:
 
 
 def _disturbed(source: Random, spin: float, faint: float) -> list[float]:
-    """Return omega (rad/s): `spin` about axis 2, plus a perturbation of at most `faint`."""
+    """Return omega (rad/s): `spin` about axis 2, and a perturbation of at most `faint`."""
     return [w + faint * e for w, e in zip((0.0, spin, 0.0), _vector(source, 1.0), strict=True)]
 
 
@@ -184,7 +184,7 @@ def _slow_waves(source: Random) -> Scene:
 
 
 def _many_speeds(source: Random) -> Scene:
-    """Return a scene with torque waves of 1e-6 to 630 rad/s, some both sine and cosine."""
+    """Return a scene with torque waves of 1e-6 to 630 rad/s."""
     scene = _plain(source)
     some: list[list[tuple[list[float], float]]] = [[], []]
     for _ in range(source.randint(2, 6)):
@@ -212,7 +212,7 @@ def _far_scale(source: Random) -> Scene:
 
 
 def _sensitive(source: Random) -> Scene:
-    """Return a scene near a middle axis, where errors may grow by a factor of up to 1e6."""
+    """Return a scene near a middle axis, where errors may grow by up to 1e6."""
     low, middle, high = body = _body(source)
     spin = source.choice((-1.0, 1.0)) * 10.0 ** source.uniform(-1.0, 1.0)
     rate = abs(spin) * ((high - middle) * (middle - low) / (high * low)) ** 0.5
@@ -288,11 +288,8 @@ KINDS = {"plain": _plain, **NASTY, "pointing": _pointing, "driven": _driven}
 
 
 def _law(source: Random, size: float, kinds: int, frequencies: tuple[float, float]) -> TorqueLaw:
-    """Return a random torque law with components of at most `size` (N m, N m/s).
-
-    `kinds` is a sum of kinds of terms: 1 constant, 2 linear in time, 4 sine, 8 cosine.
-    `frequencies` are the lowest and the highest (rad/s).
-    """
+    """Return a random torque law of at most `size` (N m, N m/s), with `frequencies` in rad/s."""
+    # `kinds` is a sum of 1 for a constant term, 2 for a rate, 4 for a sine, 8 for a cosine.
     low, high = map(math.log10, frequencies)
     constant, rate = _vector(source, size), _vector(source, size)
     drawn = ((10.0 ** source.uniform(low, high), _vector(source, size)) for _ in range(2))
@@ -309,7 +306,6 @@ def _scene(
     coefficients: Sequence[float] | None = None,
     torque: bool = True,
 ) -> Scene:
-    """Return a scene with random torque and steps, from `moments` (kg m2) or `coefficients`."""
     size = (max(moments) if moments else 10.0) * source.uniform(0.1, 2.0)
     kind = source.randrange(4) if torque else 0
     if kind < 3:

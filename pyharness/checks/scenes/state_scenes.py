@@ -1,7 +1,7 @@
 """Random scenes with torques that depend on omega or attitude, reproducible from a seed.
 
-Torques are sums of functions whose arithmetic is recorded, or of ready-made terms, about as large
-as the gyroscopic torque, so that they affect slow and fast bodies alike. End times may be negative.
+Torques are sums of recorded functions, or of ready-made terms. They are about as large as the
+gyroscopic torque, to affect slow and fast bodies alike. End times may be negative.
 """
 
 from collections.abc import Callable
@@ -56,7 +56,7 @@ def draw(source: Random, names: tuple[str, ...] = STEADY + TURNING) -> tuple[Sce
 
 
 def draw_ready(source: Random, names: tuple[str, ...] = READY) -> tuple[Scene, float]:
-    """Return a random scene under one or two ready-made terms of `names`, and its end time (s)."""
+    """Return a random scene under one or two ready-made terms, and its end time (s)."""
     chosen = source.sample(names, source.choice((1, 2)))
     _, moments, speed = body = _body(source)
     torque = sum(ready(source, name, moments, speed) for name in chosen)
@@ -154,7 +154,7 @@ def term(source: Random, name: str, size: float, speed: float) -> Term:
 
 
 def orbit(t: Any, rate: float) -> Any:
-    """Return the direction, about the axes of space, to a satellite in a circular orbit."""
+    """Return the direction to a satellite in a circular orbit, in axes of space."""
     return np.array([np.cos(rate * t), np.sin(rate * t), 0.0 * t])
 
 

@@ -2,11 +2,9 @@
 
 A perturbation x of a steady rotation, or the velocity during it, obeys x' = J x with a constant
 Jacobian J. A step of size h multiplies x by a matrix of polynomials in z, where z is h times an
-eigenvalue of J, or hJ itself. The matrix has a row for each of the m vectors that a program
-propagates. The original Runge-Kutta program propagates two: the result, and U(1), at which the
-first stage is evaluated.
-
-A program is linearly stable where, in the plane of z, the spectral radius is at most 1.
+eigenvalue of J, or hJ itself. The matrix has a row for each vector that a program propagates. The
+original Runge-Kutta program propagates two: the result, and U(1), at which the first stage is
+evaluated. A program is linearly stable for z where the spectral radius is at most 1.
 
 A collocation program evaluates the right-hand side along its first estimate, a straight line, and
 corrects once. At time s of this line the right-hand side is F + s J F + s**2 Q(F), where F is its
@@ -54,7 +52,7 @@ class Amplification:
 
     @property
     def size(self) -> int:
-        """Return m, the number of propagated vectors."""
+        """The number of propagated vectors, m."""
         return len(self.coefficients)
 
     def evaluate(self, z: Complex) -> Complex:
@@ -69,7 +67,7 @@ class Amplification:
     def moving(self) -> "Amplification":
         """Return the matrix without the row and column of the step's result.
 
-        If the old result affects more than the new one, return the whole matrix.
+        Return the whole matrix if the old result affects more than the new one.
         """
         column = self.coefficients[:, -1]
         if self.size > 1 and not column[:-1].any() and not column[-1, 1:].any():
@@ -77,7 +75,7 @@ class Amplification:
         return self
 
     def exact_matrix(self, matrix: Exact) -> Fractions:
-        """Return the exact matrix of order m n for n equations x' = J x, from `matrix`, hJ."""
+        """Return the exact matrix, of order m n, for n equations x' = J x; `matrix` is hJ."""
         power = np.eye(len(matrix), dtype=object)
         total = np.kron(self.coefficients[..., 0], power)
         for k in range(1, _HIGHEST):
@@ -94,7 +92,7 @@ class Amplification:
 def amplification(listing: Listing, step: int = 1) -> Amplification:
     """Return the amplification matrix of step `step` (from 1) of a program.
 
-    `step` matters only with the defect `dt-accumulates`, which moves the collocation points.
+    Steps differ only with the defect `dt-accumulates`, which moves the collocation points.
     """
     if listing.program == "runge-kutta":
         return _runge_kutta(listing)
@@ -105,7 +103,7 @@ def amplification(listing: Listing, step: int = 1) -> Amplification:
 
 
 def weight_of_squares(listing: Listing, step: int) -> Fraction:
-    """Return the weight of h**3 Q(F) in a collocation step; exact integration would give 1/3.
+    """Return the weight of h**3 Q(F) in a collocation step; exact integration gives 1/3.
 
     F is the right-hand side, Q its quadratic part.
     """
@@ -121,11 +119,9 @@ def _quadrature(listing: Listing, step: int) -> tuple[Fractions, Fractions]:
 
 
 def _runge_kutta(listing: Listing) -> Amplification:
-    """Return the matrix of the Runge-Kutta program (cards 770-1200).
-
-    Stages depend linearly on U(1) and on the base of the step, the previous result. A stage has the
-    shape (2, powers of z).
-    """
+    """Return the matrix of the Runge-Kutta program (cards 770-1200)."""
+    # Stages, of shape (2, powers of z), are linear in U(1) and in the base of the step, the
+    # previous result.
     first, base = np.full((2, 2, _HIGHEST), Fraction(0), dtype=object)
     first[0, 0] = base[1, 0] = Fraction(1)
     stages, slopes = [first], []

@@ -1,8 +1,8 @@
 """Bounds, by Brouwer's law, of rounding errors over many steps of a torque-free motion.
 
 Brouwer 1937, Astronomical Journal 46: with random rounding, errors of energy and momentum grow with
-the power 1/2 of the number of steps, the phase error with the power 3/2. With biased rounding the
-powers are 1 and 2.
+the power 1/2 of the number of steps, the phase error with 3/2. With biased rounding the powers are
+1 and 2.
 """
 
 import math
@@ -86,7 +86,7 @@ class Orbit:
 
 
 def orbit(scene: Scene) -> Orbit:
-    """Return an Orbit: samples of omega over two periods, and the factors of error bounds.
+    """Return samples of omega over two periods, and the factors of error bounds.
 
     The scene must have moments and no torque.
     """
@@ -116,14 +116,14 @@ def floats(rows: Sequence[Sequence[Decimal]]) -> Array:
 
 
 def taylor_noise(body: Orbit, scene: Scene, step: float, order: int, left_out: float) -> Noise:
-    """Return error bounds of a Taylor step, by a running error analysis.
+    """Return error bounds of a Taylor step of size `step` (s), by a running error analysis.
 
-    `step` is in s; `left_out` is the truncation error relative to the largest omega. Term k is a
-    sum of k products of lower terms, each with the errors of its factors and at most k + 3
-    roundings. The sum rounds each term three times.
+    `left_out` is the truncation error relative to the largest omega.
     """
     a = np.abs(np.array(scene.euler_coefficients))
     terms, errors = _terms(body, scene, step, order), [np.abs(body.states)]
+    # Term k is a sum of k products of lower terms, with the errors of its factors and at most k + 3
+    # roundings. The sum of the terms rounds each of them three times.
     for k in range(1, order + 1):
         size, carried = np.zeros((2, *body.states.shape))
         for j in range(k):
@@ -137,17 +137,7 @@ def taylor_noise(body: Orbit, scene: Scene, step: float, order: int, left_out: f
 
 
 def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
-    """Return error bounds of a step h (s) of Gauss collocation with s = `stages` stages.
-
-    The sum at each node has s + 3 roundings of the right-hand sides and one of omega. Its error is
-    multiplied by the inverse of 1 - h A J, where A is the tableau's matrix and J the Jacobian.
-
-    The truncation error is the integral of the state-transition matrix times the residual, which is
-    zero at the nodes, the zeros of an orthogonal polynomial. In the Taylor series of the integrand
-    divided by this polynomial, only the power s of time contributes. By Leibniz's rule its
-    coefficient is a sum over j of multiples of (h J)**j / j! times the Taylor term 2s + 1 - j of
-    omega.
-    """
+    """Return error bounds of a step of Gauss collocation of size `step` (s)."""
     from pyharness.checks.theory.tableau import tableau
 
     matrix = tableau("collocation", stages, "gauss").matrix
@@ -155,11 +145,19 @@ def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
     stiffness = float(np.abs(body.jacobians).sum(axis=2).max())
     spread = float(np.abs(matrix).sum(axis=1).max())
     eye = np.eye(3 * stages)
+    # With s stages and a step h, the sum at each node has s + 3 roundings of the right-hand sides
+    # and one of omega. Its error is multiplied by the inverse of 1 - h A J, where A is the
+    # tableau's matrix and J the Jacobian.
     inverses = [np.linalg.inv(eye - step * np.kron(matrix, each)) for each in body.jacobians[::8]]
     resolvent = max(float(np.abs(each).sum(axis=1).max()) for each in inverses)
     state = body.largest
     at_node = step * spread * ((stages + 3.0) * rate + stiffness * state) * resolvent
     total = step * ((stages + 4.0) * rate + stiffness * (state + at_node))
+    # The truncation error is the integral of the state-transition matrix times the residual, which
+    # is zero at the nodes, the zeros of an orthogonal polynomial. In the Taylor series of the
+    # integrand over this polynomial, only the power s of time contributes. By Leibniz's rule its
+    # coefficient is a sum over j of multiples of (h J)**j / j! times the Taylor term 2s + 1 - j of
+    # omega.
     factor = math.factorial(stages) ** 4 / math.factorial(2 * stages) ** 2 / (2 * stages + 1)
     terms = [float(np.abs(each).max()) for each in _terms(body, scene, step, 2 * stages + 1)]
     left_out = factor * sum(
@@ -170,7 +168,7 @@ def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
 
 
 def _terms(body: Orbit, scene: Scene, step: float, order: int) -> list[Array]:
-    """Return the Taylor terms of a step (s) from n states (rad/s), each of shape (n, 3)."""
+    """Return the Taylor terms of a step (s) from n states, each of shape (n, 3)."""
     a = np.array(scene.euler_coefficients)
     terms = [body.states]
     for k in range(1, order + 1):
@@ -187,8 +185,7 @@ def errors(
     """Return the signed errors of energy and momentum (relative) and of the phase (rad).
 
     The phase error is the time by which `omega` is ahead of the exact solution, times the frequency
-    of the motion. If `rounded`, this solution is for A, B, C rounded to binary64, as methods use
-    them.
+    of the motion. If `rounded`, the exact solution uses A, B, C rounded to binary64, as methods do.
     """
     start = [Decimal(w) for w in scene.omega]
     found = [Decimal(float(w)) for w in omega]
@@ -232,7 +229,7 @@ def _frequency(a: Array, omega: Array) -> float:
 
 
 def _steepness(a: Array, omega: Array) -> float:
-    """Return the sum of magnitudes of the derivatives of `_frequency` with respect to omega."""
+    """Return the sum of magnitudes of the derivatives of `_frequency`."""
     size = 1e-6 * float(np.abs(omega).max())
     return sum(
         abs(_frequency(a, omega + shift) - _frequency(a, omega - shift)) / (2.0 * size)

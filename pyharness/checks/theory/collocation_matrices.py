@@ -1,7 +1,7 @@
 """The collocation matrices (eq. 36 of the thesis), and the accuracy of their solution by LEQT1F.
 
-LEQT1F is the linear solver of the collocation programs, "two-term" and "four-term". Exact solutions
-are computed in fractions.
+LEQT1F is the linear solver of the programs "two-term" and "four-term". Exact solutions are computed
+in fractions.
 """
 
 import math
@@ -114,7 +114,7 @@ class Solved:
 
 
 def points(program: str, step: float) -> list[float]:
-    """Return the collocation points (s), with the rounding of a program's formulas."""
+    """Return the collocation points (s), rounded as by a program's formulas."""
     if program == "two-term":
         return [step / 3.0, 2.0 * step / 3.0]
     return [step * 0.2, step * 0.4, step * 0.6, step * 0.8]
@@ -152,7 +152,6 @@ def solved(program: str, step: float) -> Solved:
     powers = np.array([Fraction(step) ** k for k in range(1, count + 1)], dtype=object)
 
     def errors(solutions: Array) -> list[float]:
-        """Return the `residual`, `forward`, `increment` and `increment_error` of `Solved`."""
         every = []
         for solution, side in zip(solutions.T, sides, strict=True):
             x, b = fractions(solution), fractions(side)
@@ -198,16 +197,16 @@ def solver_roundings(program: str) -> tuple[float, float]:
     """Return two bounds on the rounding error that the solver adds to a step's result.
 
     Both are in units of 2**-53 times step size times rate. The first is for equal rates at all
-    points, where only the coefficient of t is not zero. The second, times the relative deviation
-    from equal rates, is for unequal rates. For n points they are 3n abs(powers) abs(inverse) abs(L)
-    abs(U) abs(X) (Higham 2002, theorem 9.4), with the matrix's inverse and factors L and U, the
-    solution X and the powers of the step size. They do not depend on the step size while the
-    largest element of each row is 1.
+    points, where only the coefficient of t is not zero. The second, for unequal rates, is to be
+    multiplied by their relative deviation from equal rates. Both are independent of the step size
+    while the largest element of each row is 1.
     """
     step, matrix = _small_step(program)
     count = len(matrix)
     reach = abs(inverse(matrix))
     powers = np.array([step**k for k in range(1, count + 1)], dtype=object)
+    # Higham 2002, theorem 9.4: 3n abs(powers) abs(inverse) abs(L) abs(U) abs(X), with the matrix's
+    # inverse and factors L and U, the solution X, and powers of the step size.
     factor_sizes = np.zeros_like(matrix)
     for j, (chosen, candidates, rows) in enumerate(_columns(matrix)):
         for i in candidates:
@@ -220,14 +219,15 @@ def solver_roundings(program: str) -> tuple[float, float]:
 def singular_below(program: str, bits: int = 53) -> float:
     """Return the largest step size (s) for which LEQT1F must report a singular matrix.
 
-    With N rows, LEQT1F does so if the computed sum N + p equals N, that is, if a scaled pivot p is
-    at most half a unit in the last place of N. As N is a power of 2, this unit is N 2**(1 - bits),
-    and a tie is rounded to N. The last scaled pivot, proportional to step**(N-1), is the first to
-    be so small.
+    LEQT1F reports this if adding the last scaled pivot to the number of rows, in a precision of
+    `bits` bits, leaves the number unchanged.
     """
     step, matrix = _small_step(program)
     count = len(matrix)
     *_, (chosen, candidates, _) = _columns(matrix)
+    # With N rows, the computed sum N + p equals N if the scaled pivot p is at most half a unit in
+    # the last place of N, which is N 2**(1 - bits), as N is a power of 2; a tie is rounded to N.
+    # The last pivot, proportional to step**(N-1), is the first to be so small.
     last_pivot = candidates[chosen] / step ** (count - 1)
     half_unit = count * Fraction(1, 2**bits)
     return math.pow(half_unit / last_pivot, 1.0 / (count - 1))
@@ -260,11 +260,8 @@ def _share(error: Fraction, bound: Fraction) -> float:
 
 
 def _pivoting(matrix: Fractions, order: Sequence[int], sizes: Fractions) -> tuple[float, float]:
-    """Return the largest relative shortfall of a pivot, and the largest that rounding can cause.
-
-    The shortfall is relative to the best candidate, in exact elimination in the solver's `order`.
-    `sizes` is abs(L) abs(U).
-    """
+    """Return a pivot's largest relative shortfall from the best candidate, and its bound."""
+    # Exact elimination in the solver's `order`; `sizes` is abs(L) abs(U).
     shortfall, allowed = Fraction(0), Fraction(0)
     scale = 1 / abs(matrix).max(axis=1)
     for j, (chosen, candidates, _) in enumerate(_columns(matrix, order)):
@@ -279,11 +276,9 @@ def _pivoting(matrix: Fractions, order: Sequence[int], sizes: Fractions) -> tupl
 def _columns(
     matrix: Fractions, order: Sequence[int] | None = None
 ) -> Iterator[tuple[int, dict[int, Fraction], Fractions]]:
-    """Eliminate a matrix exactly; before each column, yield the pivot's row number and all rows.
-
-    The candidates between them are elements' magnitudes over the largest in their rows of `matrix`.
-    `order` has the pivots' rows; by default the largest candidate is the pivot, as in LEQT1F.
-    """
+    """Eliminate exactly; before each column, yield the pivot's row, scaled candidates, and rows."""
+    # A candidate is an element's magnitude over the largest in its row of `matrix`. `order` has the
+    # pivots' rows; by default the largest candidate is the pivot, as in LEQT1F.
     rows = matrix.copy()
     scale = 1 / abs(matrix).max(axis=1)
     left = list(range(len(rows)))

@@ -2,8 +2,8 @@
 
 An error of omega at time s, multiplied by the state-transition matrix Phi(t, s) of the equations
 linearised along the solution, is the resulting error at time t. Under a torque that depends on
-omega or attitude, the equations' Jacobian follows from the tape, their recorded operations, and Phi
-includes the scene's attitude, if any.
+omega or attitude, the Jacobian follows from the tape, the recorded operations of the equations, and
+Phi includes the scene's attitude, if any.
 """
 
 import math
@@ -109,7 +109,7 @@ def conditioning(scene: Scene, time: float) -> Conditioning:
 def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
     """Return the final sensitivity along `omega` (rad/s), the solution at n `times` (s).
 
-    `omega` has the shape (n, 3). Times begin at 0, and omega changes little between them. Raise
+    `omega` has the shape (n, 3), and changes little between times, which begin at 0. Raise
     InputError if the amplification exceeds binary64.
     """
     with np.errstate(all="ignore"):
@@ -121,10 +121,10 @@ def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
 def sampled(
     sample: Callable[[Array], tuple[float, _Sample]], time: float, fewest: int, most: int
 ) -> tuple[Array, _Sample]:
-    """Return equally spaced times up to `time` (s), between which the state changes little.
+    """Return equally spaced times (s), close enough for the rates, and results at them.
 
-    `sample` takes times, and returns the largest rate (1/s) at them and results, which are returned
-    too. The first attempt has `fewest` intervals. Raise InputError if more than `most` are needed.
+    `sample` takes times up to `time`, and returns the largest rate (1/s) and the results. The first
+    attempt has `fewest` intervals. Raise InputError if more than `most` are needed.
     """
     count = fewest
     while True:
@@ -144,9 +144,9 @@ def sampled(
 def of_flow(flow: Array, times: Array, state: Array, source: Array, largest: float) -> Conditioning:
     """Return the sensitivity of a final state, from state-transition matrices.
 
-    `flow` has the matrix from each time to the last, shape (n, m, m). `state` has the shape (n, m),
-    and so has `source`, the sums of magnitudes of the terms of its derivative. Errors are divided
-    by `largest`. Raise InputError if the amplification exceeds binary64.
+    `flow` has the matrix from each time to the last, shape (n, m, m). `state` and `source`, the
+    sums of magnitudes of the terms of its derivative, have the shape (n, m). Errors are divided by
+    `largest`. Raise InputError if the amplification exceeds binary64.
     """
     steps, sizes = np.diff(times), np.abs(flow)
 
@@ -193,9 +193,9 @@ _OF_ANGLE = 0.5
 def conditioning_at(scene: Scene, times: Sequence[float]) -> Conditioning:
     """Return the sensitivity of a scene's solution at `times` (s) to earlier errors.
 
-    Under a torque law it is the sensitivity at the last time; under other torques the largest at
-    any of the times, because damping may reduce errors. Raise InputError as `conditioning` does, or
-    if the torque can't be recorded.
+    Under a torque law it is that at the last time; under other torques the largest at any of the
+    times, because damping may reduce errors. Raise InputError as `conditioning` does, or if the
+    torque can't be recorded.
     """
     if not isinstance(scene.torque, StateTorque):
         return conditioning(scene, times[-1])
@@ -225,7 +225,7 @@ def _of_state(scene: Scene, time: float) -> Conditioning:
 
 
 def _path(scene: Scene, times: Array) -> Array:
-    """Return omega and the scene's attitude at `times` (s), which begin at 0."""
+    """Return omega and any attitude of the scene at `times` (s), which begin at 0."""
     if times[-1] == 0.0:
         return np.tile([*scene.omega, *(scene.attitude or ())], (len(times), 1))
     attitude = scene.attitude is not None
@@ -239,11 +239,8 @@ def _path(scene: Scene, times: Array) -> Array:
 
 
 def _sources(tape: Tape, times: Array, state: Array) -> Array:
-    """Return bounds on the rounding errors of the equations (1/s), divided by the unit roundoff.
-
-    In this running error analysis each operation adds the rounding error of its result, or, for a
-    sum, of its terms' magnitudes.
-    """
+    """Return bounds on the equations' rounding errors (1/s), over the unit roundoff."""
+    # Each operation adds the rounding error of its result or, for a sum, of its terms' magnitudes.
     given = [_Bounded(each, np.zeros(len(times))) for each in inputs_of(times, state)]
     with np.errstate(all="ignore"):
         found = evaluate(tape, given, _BOUNDS)

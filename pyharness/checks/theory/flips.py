@@ -17,10 +17,9 @@ _NEAR = 2.0**-27
 
 
 def flip_times(moments: ArrayLike, omega0: ArrayLike) -> Array:
-    """Return the time (s) between flips of each body, shape (n,).
+    """Return the time (s) between flips of each body, half the period of omega, shape (n,).
 
-    It is half the period of omega: pi over the arithmetic-geometric mean of two rates (1/s), and
-    infinite on the separatrix and for a steady rotation. `moments` (kg m2, in any order) and
+    It is infinite on the separatrix and for a steady rotation. `moments` (kg m2, in any order) and
     `omega0` (rad/s) have the shape (n, 3) or (3,).
     """
     bodies, omega = np.broadcast_arrays(np.atleast_2d(moments), np.atleast_2d(omega0))
@@ -35,6 +34,7 @@ def flip_times(moments: ArrayLike, omega0: ArrayLike) -> Array:
     lower = np.sqrt(np.abs(about1 - about3)) * np.sqrt(about1 + about3)
     turns = (lower > 0.0) & ((w2 > 0.0) | ((w1 > 0.0) & (w3 > 0.0)))
     with np.errstate(divide="ignore", invalid="ignore"):
+        # Half the period is pi over the arithmetic-geometric mean of two rates (1/s).
         return np.where(turns, np.pi / mean(upper, lower), np.inf)
 
 

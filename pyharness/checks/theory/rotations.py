@@ -5,8 +5,8 @@ small perturbation proportional to exp(Q t). With the coefficients A, B, C of Eu
 torque over moment M = N / I, (a, b, c) is steady if A bc = -M1, B ca = -M2, C ab = -M3. The rates Q
 (1/s) are the roots of Q**3 - (BC a**2 + CA b**2 + AB c**2) Q - 2 ABC abc = 0.
 
-In the functions, `share` is the initial perturbation divided by the rotation. Of a continuous
-family of steady rotations only some members are reported.
+`share` is the initial perturbation divided by the rotation. Of a continuous family of steady
+rotations only some members are reported.
 """
 
 import cmath
@@ -53,13 +53,13 @@ class SteadyRotation:
 
     @property
     def doubling_time(self) -> float | None:
-        """Return the doubling time (s) of the fastest growth, or None without growth."""
+        """The doubling time (s) of the fastest growth, or None without growth."""
         rate = self.rates[0].real
         return math.log(2.0) / rate if rate > 0.0 else None
 
     @property
     def period(self) -> float | None:
-        """Return the period of the fastest oscillation (s), or None."""
+        """The period of the fastest oscillation (s), or None."""
         rate = max(abs(each.imag) for each in self.rates)
         return 2.0 * math.pi / rate if rate > 0.0 else None
 
@@ -74,7 +74,7 @@ class SteadyRotations:
 
 
 def steady_rotations(scene: Scene, disturbance: float) -> SteadyRotations:
-    """Return the steady rotations of a scene, and the development of perturbations.
+    """Return a scene's steady rotations, and the development of perturbations.
 
     `disturbance` is the perturbation divided by the rotation. Raise InputError if the torque varies
     with time, or a rotation or its rates exceed binary64.
@@ -108,7 +108,7 @@ def rates(coefficients: Triple, omega: Triple) -> Rates:
 
 
 def _roots(slope: float, half: float) -> Rates:
-    """Return the roots of Q**3 - slope Q - 2 half = 0, without loss of digits in small roots."""
+    """Return the roots of Q**3 - slope Q - 2 half = 0, accurate even if small."""
     if half == 0.0:
         root = cmath.sqrt(slope)
         return root, 0j, -root
@@ -158,13 +158,8 @@ def _rotation(scene: Scene, place: str, omega: Triple, disturbance: float) -> St
 def _growing(
     scene: Scene, omega: Triple, rate: complex, matrix: Array, share: float
 ) -> float | None:
-    """Return the time (s) when second-order terms reach a tenth of a growing perturbation.
-
-    It is infinite if these terms are zero, None if they exceed binary64. `rate` is the complex rate
-    (1/s) of fastest growth, `matrix` the Jacobian (1/s), `share` the initial perturbation divided
-    by the rotation.
-    """
-    # The eigenvector of `rate`.
+    """Return the time (s) when second-order terms reach a tenth of a growing perturbation."""
+    # The eigenvector of `rate`, the complex rate (1/s) of fastest growth; `matrix` is the Jacobian.
     grows = np.linalg.svd(matrix - rate * np.eye(3))[2][-1].conj()
     second = 0.0
     for twice, other in ((2.0 * rate, grows), (2.0 * rate.real, grows.conj())):
@@ -181,36 +176,30 @@ def _growing(
 
 
 def _phase(coefficients: Sequence[float], rate: float, share: float) -> float | None:
-    """Return the time (s) when the phase error about a stable axis reaches 0.1 rad.
-
-    `coefficients` are in cyclic order from the axis; `rate` is the frequency (rad/s) by linear
-    theory. A tilt by `share` (rad) towards another axis changes the frequency by the fraction
-    `share`**2 / 4 times the first coefficient over that of the other axis. The time is infinite if
-    the first coefficient is 0, else None if the frequency is 0, when only the spin drifts.
-    """
+    """Return the time (s) when the phase error about a stable axis reaches 0.1 rad."""
+    # `coefficients` are in cyclic order from the axis; `rate` is the frequency (rad/s) by linear
+    # theory. A tilt by `share` (rad) towards another axis changes the frequency by the fraction
+    # `share`**2 / 4 times the first coefficient over that of the other axis.
     spun, *others = map(abs, coefficients)
     if spun != 0.0 and rate == 0.0:
-        return None
+        return None  # only the spin drifts
     shift = 0.25 * share**2 * spun * rate / min(others) if spun else 0.0
     return OFF / shift if shift else math.inf
 
 
 def _flip_interval(coefficients: Sequence[float], spin: float, share: float) -> float | None:
-    """Return the shortest time (s) between flips about the middle axis.
-
-    `coefficients` are in cyclic order from that axis; `spin` is in rad/s. The time is 2 K / lambda,
-    where K is the complete elliptic integral of the first kind with complementary modulus k', and
-    lambda is near the growth rate; for a small k' the time is near (2 / lambda) ln(4 / k'). It is
-    shortest for a relative perturbation `share` along the other axis with the smaller coefficient.
-    Return None if the signs of the coefficients are impossible for a middle axis.
-    """
+    """Return the shortest time (s) between flips about the middle axis, or None without flips."""
+    # `coefficients` are in cyclic order from the middle axis, which requires opposite signs.
     first, second, third = coefficients
     if first * second >= 0.0 or first * third >= 0.0:
         return None
     scale = math.sqrt(abs(first)) * math.sqrt(abs(second)) * math.sqrt(abs(third))
+    # Flips are most frequent for a perturbation along the axis with the smaller coefficient.
     tilt = share / math.sqrt(min(abs(second), abs(third)))
     high, low = scale * math.hypot(tilt, 1.0 / math.sqrt(abs(first))), scale * tilt
-    # K = pi / 2 over the arithmetic-geometric mean of 1 and k'.
+    # The time is 2 K / lambda, near (2 / lambda) ln(4 / k') for a small k'. K is the complete
+    # elliptic integral with complementary modulus k', pi / 2 over the arithmetic-geometric mean of
+    # 1 and k'; lambda is near the growth rate.
     while high - low > 4.0 * ROUNDING * high:
         high, low = 0.5 * (high + low), math.sqrt(high) * math.sqrt(low)
     return math.pi / high / spin
@@ -225,7 +214,7 @@ def _places(scene: Scene) -> tuple[str, Places]:
         if coefficients[axis] == 0.0:
             told = f"none: {'ABC'[axis]} = 0, so that nothing holds the torque about axis"
             return f"{told} {axis + 1}", []
-    # The products w2 w3, w3 w1 and w1 w2 that balance the torque.
+    # The products w2 w3, w3 w1 and w1 w2 that balance the torque (rad2/s2).
     products = [-m / k if k else 0.0 for m, k in zip(torque, coefficients, strict=True)]
     if len(held) == 3:
         return _points(products)
@@ -256,11 +245,8 @@ def _axes(coefficients: Triple, spin: float) -> tuple[str, Places]:
 
 
 def _hyperbola(coefficients: Triple, product: float, held: int) -> tuple[str, Places]:
-    """Return a text and places for a torque about the axis `held` (counted from 0).
-
-    `product` is the product of the other components (rad2/s2). One branch is shown; the other is
-    its opposite.
-    """
+    """Return a text and places on one branch, for a torque about the axis `held` (from 0)."""
+    # `product` is that of the other components (rad2/s2). The other branch is opposite.
     one, other = (held + 1) % 3, (held + 2) % 3
     told = (
         f"torque about axis {held + 1}: the hyperbola w{one + 1} w{other + 1} = {product:.6g}, "
@@ -284,11 +270,7 @@ def _three(components: dict[int, float]) -> Triple:
 
 
 def _across(products: Sequence[float], axis: int) -> tuple[str, Places]:
-    """Return a text and places for a torque perpendicular to the axis of symmetry, `axis`.
-
-    `products` are the w2 w3, w3 w1 and w1 w2 that balance the torque (rad2/s2). One branch is
-    shown.
-    """
+    """Return a text and places on one branch, for a torque across the axis of symmetry."""
     one, other = (axis + 1) % 3, (axis + 2) % 3
     # w_one w_axis and w_other w_axis.
     across = products[other], products[one]

@@ -1,4 +1,4 @@
-"""The report of the command `rotations`, and its picture of polhodes and growth rates.
+"""The report of the command `rotations`, with a picture of polhodes and growth rates.
 
 Polhodes, curves of torque-free omega, are drawn as directions of the angular momentum.
 """
@@ -178,7 +178,6 @@ def _sphere(axes: "Axes", scene: Scene) -> list[list[Any]]:
 
 
 def _project(points: Array, upward: Array, toward: Array) -> tuple[Array, Array, Array]:
-    """Return the points' coordinates rightward, upward and toward the viewer."""
     right = np.cross(upward, toward)
     right /= np.linalg.norm(right)
     return points @ right, points @ np.cross(toward, right), points @ toward
@@ -224,11 +223,10 @@ def _square(axes: "Axes", scene: Scene) -> list[list[Any]]:
 
 
 def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
-    """Yield the name and the points, shape (n, 3), of torque-free curves of L / abs(L).
+    """Yield name and points, shape (n, 3), of torque-free curves of L / abs(L).
 
-    L is the angular momentum along the body axes. The last two curves are the separatrix: if axis 2
-    is the middle one, it is in the planes L3 / L1 = +- sqrt((j1 - j2) / (j2 - j3)), j = 1 / I. With
-    two equal moments both planes are perpendicular to the third axis. A sphere has no curves.
+    L is the angular momentum in body axes. The last two curves are the separatrix; with two equal
+    moments their planes are perpendicular to the third axis. A sphere has no curves.
     """
     high, middle, low = sorted(range(3), key=lambda axis: moments[axis])
     j = min(moments) / np.array(moments)
@@ -248,7 +246,8 @@ def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
                 curve = np.outer(to_middle, unit[middle]) + np.outer(to_far, unit[far])
                 name = f"around axis {'+' if sign > 0.0 else '-'}{axis + 1}"
                 yield name, curve + np.outer(sign * up, unit[axis])
-    # Angle of the separatrix from the axis of the largest 1 / I.
+    # Angle of the separatrix from the axis of the largest 1 / I. If axis 2 is the middle one, the
+    # planes are L3 / L1 = +- sqrt((j1 - j2) / (j2 - j3)).
     tilt = math.atan2(math.sqrt(j[high] - j[middle]), math.sqrt(j[middle] - j[low]))
     for sign in (1.0, -1.0):
         across = math.cos(tilt) * unit[high] + sign * math.sin(tilt) * unit[low]

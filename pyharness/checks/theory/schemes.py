@@ -1,8 +1,8 @@
-"""The schemes of programs and fixed-step methods, implemented again.
+"""Independent implementations of the schemes of programs and fixed-step methods.
 
-A scheme computes one step from `omega` under constant torque (equations 16-18 of the thesis),
-sharing no code with the methods. Its argument `on` is a `Numbers`, or a `Series` for power series
-in the step size, which yield each term of the truncation error.
+A scheme computes one step from `omega` under constant torque (equations 16-18 of the thesis). Its
+argument `on` is a `Numbers`, or a `Series` for power series in the step size, which yield each term
+of the truncation error.
 """
 
 import math
@@ -26,7 +26,7 @@ class Numbers:
     """Euler's equations for numbers; omega (rad/s) has the shape (..., 3)."""
 
     def __init__(self, scene: Scene, step: float = 1.0, sizes: bool = False) -> None:
-        """Store a step size (s) and the equations, with `sizes` the magnitudes of their numbers."""
+        """Store a step size (s), coefficients and torque, with `sizes` their magnitudes."""
         self._step = step
         size = np.abs if sizes else np.positive
         self._coefficients = size(np.array(scene.euler_coefficients))
@@ -109,8 +109,8 @@ def collocation(program: str) -> Scheme:
 def collocation_singular(program: str) -> Scheme:
     """Return the scheme of a collocation program whose matrix is reported as singular.
 
-    The linear solver LEQT1F then returns the right-hand sides of the system, which the program uses
-    as the coefficients c1, c2, ... of its trial functions.
+    The linear solver LEQT1F then returns the right-hand sides, which the program uses as
+    coefficients c1, c2, ... of its trial functions.
     """
     parts = PARTS[program]
 
@@ -136,8 +136,8 @@ def collocation_singular(program: str) -> Scheme:
 def runge_kutta_4(on: Numbers, omega: Array, punched: bool = False) -> Array:
     """Return omega after a step of classical Runge-Kutta (eq. 31).
 
-    If `punched`, it is the first step of the original program, whose third and fourth stage start
-    from the point of the stage before instead of from `omega`.
+    If `punched`, it is the original program's first step, whose third and fourth stage start from
+    the point of the stage before instead of from `omega`.
     """
     first = on.times_step(on.rate(omega))
     at = omega + 0.5 * first
@@ -158,12 +158,9 @@ def improved_euler(on: Numbers, omega: Array) -> Array:
 
 
 def taylor_3(on: Numbers, omega: Array) -> Array:
-    """Return omega after a step of the Taylor method with three terms (eq. 30).
-
-    As the right-hand side F is quadratic, its derivative along F is exactly half of F(omega + F) -
-    F(omega - F).
-    """
+    """Return omega after a step of the Taylor method with three terms (eq. 30)."""
     rate = on.rate(omega)
+    # The derivative of the right-hand side along itself; exact, because it is quadratic.
     along = 0.5 * (on.rate(omega + rate) - on.rate(omega - rate))
     return omega + on.times_step(rate + 0.5 * on.times_step(along))
 
@@ -208,8 +205,8 @@ def local_error(scheme: Scheme, scene: Scene, omega: Array) -> Array:
 def spacing(count: int) -> Sequence[Fraction]:
     """Return the weights of a central difference for the first derivative.
 
-    Weight i, from 1, multiplies the difference of the values at i and -i spacings. The sum, divided
-    by the spacing, is exact for polynomials up to degree 2 `count`.
+    Weight i, from 1, multiplies the difference of the values at i and -i spacings. The sum over the
+    spacing is exact for polynomials up to degree 2 `count`.
     """
     middle = math.comb(2 * count, count)
     return [

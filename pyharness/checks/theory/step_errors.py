@@ -1,7 +1,7 @@
 """Predicted truncation and rounding errors of fixed steps at the end of a scene.
 
 The state-transition matrix propagates the steps' errors to the end. Truncation errors come from
-`schemes`, without a run of the methods.
+`schemes`, without running the methods.
 """
 
 import math
@@ -35,7 +35,7 @@ FORECAST = Basis(
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """The solution of a scene, with the state-transition matrices from each time to the end."""
+    """A scene's solution, with the state-transition matrices from each time to the end."""
 
     scene: Scene  # with constant torque
     times: Array  # shape (n,), s: from 0 to the end
@@ -47,7 +47,7 @@ class Path:
 
     @property
     def norms(self) -> Array:
-        """Return the row-sum norms of the matrices, shape (n,)."""
+        """The row-sum norms of the matrices, shape (n,)."""
         return np.asarray(np.abs(self.propagators).sum(axis=2).max(axis=1))
 
     def over_time(self, values: Array) -> Array:

@@ -3,7 +3,7 @@
 The methods are collocation, subdomain, Galerkin and least squares, with the trial function omega(0)
 + c1 t + ... + cn t**n. Its derivative is a projection of the right-hand side f along the step on
 the polynomials of degree n - 1, computed on the unit interval s = t / h in the well-conditioned
-basis of Legendre polynomials.
+Legendre basis.
 """
 
 from dataclasses import dataclass
@@ -35,12 +35,13 @@ class Tableau:
 def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None = None) -> Tableau:
     """Return the tableau of one weighted residual method.
 
-    `weighting` is "collocation", "subdomain", "galerkin" or "least-squares", `terms` is n; `points`
-    is for collocation, as in `grid`. The other weightings use Gauss-Legendre quadrature, exact
-    under constant torque: products of two omegas have degree 2n, and the weight functions n
-    (Galerkin), n - 1 (least squares) or 0 (subdomain). Under torques that vary with time its error
-    is of order 2n + 1 or higher, above the method's order.
+    `weighting` is "collocation", "subdomain", "galerkin" or "least-squares", `terms` is n;
+    `points`, for collocation, is as in `grid`. The other weightings use Gauss-Legendre quadrature,
+    exact under constant torque. Under torques that vary with time, its error is of order 2n + 1 or
+    higher, above the method's order.
     """
+    # Products of two omegas have degree 2n, and the weight functions n (Galerkin), n - 1 (least
+    # squares) or 0 (subdomain).
     n = terms
     if weighting == "collocation":
         nodes = grid(points, n)

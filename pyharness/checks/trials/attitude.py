@@ -91,7 +91,7 @@ def _limit(truth: Truth, tried: MethodRun) -> float:
 
 
 def _allowed(method: str, tolerance: float, flow: Conditioning, time: float) -> float:
-    """Return a method's largest allowed error of the attitude (rad) at `time` (s)."""
+    """Return the largest allowed error of the attitude (rad) at `time` (s)."""
     made = tolerance * lively(flow.amplification)
     return ATTITUDE if method in FORMS else flow.angle_limit(made, time)
 
@@ -165,12 +165,11 @@ def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterato
 
 
 def _montgomery(name: Name) -> Check:
-    """Return the check of the body's rotation in a period against Montgomery's formula.
-
-    The angle about the angular momentum L is 2 E T/L, with energy E and period T, minus the solid
-    angle that the direction of L encloses in the body, about the axis along which its component
-    keeps its sign. Only this check detects a wrong rate of the angle, which is not conserved.
-    """
+    """Return the check of a body's rotation in a period against Montgomery's formula."""
+    # The angle about the angular momentum L in a period T is 2 E T/L, with the energy E, minus the
+    # solid angle that the direction of L encloses in the body, about the axis along which its
+    # component keeps its sign. No other check detects a wrong rate of this angle, which is not
+    # conserved.
     scene = scene_of(name)
     period = float(period_of(scene) or 0.0)
     momentum = np.array(scene.moments) * scene.omega
@@ -190,13 +189,10 @@ def _montgomery(name: Name) -> Check:
 
 
 def _solid_angle(scene: Scene, period: float) -> float:
-    """Return the solid angle that the angular momentum encloses in the body in a period (s).
-
-    The trapezoidal rule converges exponentially.
-    """
+    """Return the solid angle of the angular momentum's path in the body in a period (s)."""
     moments = np.array(scene.moments)
     before, count, rows = math.inf, 32, np.empty((0, 3))
-    while True:
+    while True:  # the trapezoidal rule converges exponentially
         times = [period * n / count for n in range(count)]
         rows = np.array([[float(x) for x in torque_free(scene, t)] for t in times])
         m = rows * moments
@@ -243,7 +239,7 @@ def _back(name: Name) -> Check:
 
 
 def _angles(off: float, name: Name) -> Check:
-    """Return the check, against SciPy's rotations, of Euler angles `off` (rad) from a pole."""
+    """Return the check, against SciPy, of Euler angles `off` (rad) from a pole."""
     from scipy.spatial.transform import Rotation
 
     sequence = name.circumstance

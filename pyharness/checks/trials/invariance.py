@@ -52,7 +52,7 @@ SCENES = {
 class Symmetry:
     """A rotation or rescaling of a problem, with its inverse for omega.
 
-    `turn` transforms the scene, `back` the resulting omega. A time t becomes t/`faster`; the
+    `turn` transforms the scene, `back` the resulting omega. A time t becomes t/`faster`. The
     methods in `bitwise` must return the same bits.
     """
 

@@ -1,6 +1,6 @@
 """Trial of length: energy, momentum and phase over a million revolutions, by Brouwer's law.
 
-The phase is the position along the closed curve of omega; for the law see `theory.brouwer`.
+The phase is the position along the closed curve of omega; `theory.brouwer` has the law.
 """
 
 import math
@@ -70,9 +70,8 @@ class Integrator:
     """A method whose error growth is measured, with bounds on the errors of its steps.
 
     `run` returns omega, shape (n, 3), and the number of steps until each time; `noise` bounds the
-    errors of a step of given size (s). `revolutions` is the length of the run from the first
-    initial condition, `others` of each other run, both in revolutions. `preference` tells whether
-    rounding errors are biased.
+    errors of a step of given size (s). `revolutions` is the length of the first run, `others` of
+    each run from another initial condition. `preference` tells whether rounding errors are biased.
     """
 
     run: Runner
@@ -139,7 +138,7 @@ def _attempts() -> Iterator[Attempt]:
 
 
 def check_growth(integrator: Integrator, name: Name) -> Iterator[Check]:
-    """Yield checks of fitted powers, and of errors after each number of revolutions."""
+    """Yield checks of fitted powers, and of errors after numbers of revolutions."""
     motion = name.circumstance
     for what, found, steps, limits in measured(integrator, MOTIONS[motion], orbit_of(motion)):
         horizons = np.array(REVOLUTIONS[: len(steps)])
@@ -157,7 +156,7 @@ def check_growth(integrator: Integrator, name: Name) -> Iterator[Check]:
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """The errors of a quantity of a motion, integrated by one method, after n numbers of `steps`.
+    """The errors of one quantity of a motion, by one method, after n numbers of `steps`.
 
     `what` is the quantity, `error` the root mean square over `starts` initial conditions; `limits`
     are its bounds by Brouwer's law.
@@ -187,8 +186,7 @@ def measured(
 ) -> Iterator[tuple[str, Array, Array, list[float]]]:
     """Yield name, errors, numbers of steps and error bounds of each quantity.
 
-    Errors have the shape (initial conditions, numbers of revolutions), with NaN after the end of a
-    run.
+    Errors have the shape (initial conditions, numbers of revolutions), NaN after the end of a run.
     """
     turn = 2.0 * math.pi / body.largest
     reached = [r for r in REVOLUTIONS if r <= 1.01 * integrator.revolutions]

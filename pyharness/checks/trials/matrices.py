@@ -77,15 +77,13 @@ def _threshold(name: Name) -> Check:
 
 
 def _counted(listing: Listing, name: Name) -> Check:
-    """Return the check of the number of steps with IER = 129.
-
-    With `dt-accumulates` the matrix is singular in the first steps only.
-    """
+    """Return the check of the number of steps with IER = 129."""
     scene = scene_of(name)
     ier = compiled.run(scene, listing, velocity=False).ier
     assert ier is not None
     count = int((ier == SINGULAR).sum())
     singular = singular_below(listing.program) / scene.step_size
+    # With `dt-accumulates` the matrix is singular in the first steps only.
     expected = min(scene.steps, math.floor(singular))
     if not listing.has("dt-accumulates"):
         expected = scene.steps if singular >= 1.0 else 0

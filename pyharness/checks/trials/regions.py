@@ -97,7 +97,7 @@ def _probed(
 
 
 def _spin(listing: Listing, name: Name) -> Check:
-    """Return the growth of a wobble about axis 3, the spectral radius minus 1, as a check."""
+    """Return, as a check, the growth per step of a wobble about axis 3."""
     scene = scene_of(name)
     z = eigenvalues(replace(scene, omega=(0.0, 0.0, scene.omega[2])))
     spin = z[np.argmax(np.abs(z))]

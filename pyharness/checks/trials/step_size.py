@@ -80,7 +80,7 @@ def _of_case(case: int, listing: Listing | None, place: Name) -> Iterator[Attemp
 
 
 def _crossing(method: str, case: int, error: Callable[[int], float], name: Name) -> Check:
-    """Return the check, against theory, of the smallest step with which truncation dominates."""
+    """Return the check, against theory, of the smallest step where truncation dominates."""
     forecaster = _forecaster(case, method)
     smallest = SMALLEST
     if method in PARTS:
@@ -104,7 +104,7 @@ def _crossing(method: str, case: int, error: Callable[[int], float], name: Name)
 
 
 def _error(scene: Scene, name: str, case: int, listing: Listing | None) -> tuple[float, str]:
-    """Return omega's relative error at the end, not finite if the run is incomplete, and a note."""
+    """Return omega's relative final error, not finite for an incomplete run, and a note."""
     largest = _path(case).flow.largest
 
     def error(omega: Array) -> float:
@@ -121,7 +121,7 @@ def _error(scene: Scene, name: str, case: int, listing: Listing | None) -> tuple
 
 
 def _divergence(case: int, listing: Listing | None, name: Name) -> Check:
-    """Return the check, against linear stability if it applies, of the smallest divergent step."""
+    """Return the check of the smallest divergent step, by linear stability if it applies."""
     scene, method = case_scene(case), name.subject
     alike = "runge-kutta" if SCHEMES[method].order == 4 else "two-term"
     scheme = listing or Listing.corrected(alike)

@@ -87,7 +87,7 @@ def different(jobs: Sequence[Job], repeats: int = _REPEATS) -> list[Job]:
 
 
 def bits(job: Job) -> bytes:
-    """Return the bits of a job's results, or of the message of its InputError."""
+    """Return the bits of a job's results, or of its InputError's message."""
     try:
         return job.call()
     except InputError as refusal:
@@ -95,7 +95,7 @@ def bits(job: Job) -> bytes:
 
 
 def jobs() -> list[Job]:
-    """Return jobs for every method, prepared solver and program, for LEQT1F, and for refusals."""
+    """Return jobs for every method, prepared solver and program, LEQT1F, and refusals."""
     found = []
     for scene in SCENES:
         found += [Job(name, scene, partial(_rows, scene, name)) for name in METHODS]

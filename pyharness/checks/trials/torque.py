@@ -1,6 +1,6 @@
 """Trial of torques: waves too fast for the step, huge and tiny torques, resonance.
 
-A wave is a sine or cosine term of the torque; in resonance it has the frequency of the precession.
+A wave is a sine or cosine term of the torque; in resonance it has the precession's frequency.
 """
 
 import math
@@ -59,13 +59,11 @@ class Circumstance:
 
 
 def axial(scene: Scene, time: float) -> Truth:
-    """Return the true omega at `time` (s) of a symmetric body with a torque along its axis.
-
-    The phase of a wave has a rounding error in each of n evaluations, at least one in a period.
-    `conditioning` adds all n; as they are random, 4 sqrt(n) suffice (Hoeffding 1963).
-    """
+    """Return the true omega at `time` (s) of a symmetric body with a torque along its axis."""
     flow = conditioning(scene, time)
     waves = scene.law.sines + scene.law.cosines
+    # The phase of a wave has a rounding error in each of n evaluations, at least one in a period.
+    # `conditioning` adds all n; as they are random, 4 sqrt(n) suffice (Hoeffding 1963).
     periods = max(frequency * time for _, frequency in waves) / (2.0 * math.pi)
     chance = min(1.0, 4.0 / math.sqrt(periods))
     omega = np.array([[float(w) for w in axial_top(scene, [time])[0]]])
@@ -74,7 +72,7 @@ def axial(scene: Scene, time: float) -> Truth:
 
 
 def averaged(scene: Scene, time: float) -> Truth:
-    """Return the true omega at `time` (s) without very fast waves, and a bound on their effect."""
+    """Return the true omega at `time` (s) without very fast waves, and a bound of their effect."""
     moments = np.array(scene.moments)
     waves = scene.law.sines + scene.law.cosines
     moved = sum(float((2.0 * np.abs(a) / moments).max()) / f for a, f in waves)
@@ -83,10 +81,8 @@ def averaged(scene: Scene, time: float) -> Truth:
 
 
 def summed(scene: Scene, time: float) -> Truth:
-    """Return the true omega at `time` (s) of a sphere, with a bound on its rounding errors.
-
-    The phase of a wave is computed in double-double; only the final sum is rounded.
-    """
+    """Return the true omega at `time` (s) of a sphere, with a bound on its rounding errors."""
+    # The phase of a wave is computed in double-double; only the final sum is rounded.
     known = reference(scene, [time])
     largest = float(np.abs([known.omega[-1], scene.omega]).max())
     rounding = 16.0 * ROUNDING
@@ -110,7 +106,7 @@ def _spun(frequency: float, time: float, programs: bool) -> Circumstance:
 
 
 def _huge(size: float, start: Triple = _START) -> Circumstance:
-    """Return a scene with a constant torque (N m) that rotates the body by some fifty radians."""
+    """Return a scene whose constant torque (N m) rotates the body by some fifty radians."""
     law = TorqueLaw((size, 0.7 * size, -0.5 * size))
     scene = Scene("huge torque", start, moments=_BODY, torque=law, steps=6)
     return Circumstance(scene, math.sqrt(4e3 / size), programs=size == 1e6)
@@ -123,7 +119,7 @@ def _tiny(size: float) -> Circumstance:
 
 
 def _resonant(moments: Triple) -> Circumstance:
-    """Return a scene whose torque rotates with the precession of Case 2's top, 5 rad/s."""
+    """Return a scene whose torque rotates with the precession of Case 2's top."""
     law = TorqueLaw(sines=(((0.0, -40.0, 0.0), 5.0),), cosines=(((40.0, 0.0, 0.0), 5.0),))
     scene = Scene("resonance", (0.0, 1.0, 10.0), moments=moments, torque=law, steps=2000)
     return Circumstance(scene, 20.0, programs=True)
@@ -183,7 +179,7 @@ def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check
 
 
 def _describe_axial(name: Name) -> Iterator[Attempt]:
-    """Yield deferred reports of errors where the phase advances 100 rad or more in a step."""
+    """Yield deferred reports of errors where a phase advances 100 rad or more in a step."""
     scene = scene_of(name)
     truth = cache(lambda: brouwer.floats(axial_top(scene, scene.times())))
 

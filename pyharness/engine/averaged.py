@@ -1,12 +1,10 @@
 """The method `averaged`: weak torques over very many revolutions, by two-scale averaging.
 
-A weak torque changes the periodic torque-free motion slowly. A macro-step computes this change over
-very many revolutions from the stroboscopic solution, the state once per revolution.
+A weak torque slowly changes the periodic torque-free motion. A macro-step computes this change from
+the state once per revolution (the stroboscopic solution).
 
-Stroboscopic averaging: Calvo, Chartier, Murua and Sanz-Serna 2011, Numerical stroboscopic averaging
-for ODEs and DAEs, Applied Numerical Mathematics 61. Two scales: Chartier, Crouseilles, Lemou and
-Mehats 2015, Uniformly accurate numerical schemes for highly oscillatory Klein-Gordon and nonlinear
-Schroedinger equations, Numerische Mathematik 129.
+Stroboscopic averaging: Calvo, Chartier, Murua and Sanz-Serna 2011, Applied Numerical Mathematics
+61. Two scales: Chartier, Crouseilles, Lemou and Mehats 2015, Numerische Mathematik 129.
 """
 
 import math
@@ -56,7 +54,7 @@ _LARGEST_PHASE = 1e15  # rad
 
 
 class Done(NamedTuple):
-    """A completed macro-step; a point is (p1, p2, p3, t): slow coordinates of omega, and time."""
+    """A completed macro-step; a point is (p1, p2, p3, t), as in `Coordinates`."""
 
     start: Array  # shape (4,); the point at the start of the step
     by_omega: Array  # shape (8, 3, 3); d(p1, p2, p3)/d(omega) at the start, for eight angles psi
@@ -67,9 +65,9 @@ class Done(NamedTuple):
 def estimates(
     coordinates: Coordinates, coefficients: Triple, done: Sequence[Done], omega: Array, angle: float
 ) -> tuple[float, float]:
-    """Return the largest error of omega (rad/s), and the largest error amplification.
+    """Return the estimated error of omega (rad/s), and the error amplification.
 
-    They are taken at the ends of the last macro-step and of up to four earlier ones.
+    Both are maxima over the ends of up to five macro-steps, including the last.
     """
     a, b, c = coefficients
     error, growth, count = 0.0, 1.0, len(done)
@@ -99,14 +97,14 @@ def averaged(
 ) -> Trajectory:
     """Return the trajectory of a scene with a weak torque at `times` (s), by averaging.
 
-    `steps` of the result counts macro-steps, of 100 revolutions or more; `error` is the difference
-    from a solution with more nodes and a higher order of averaging. A recorded torque must be a sum
-    of polynomials in omega and time, multiplied by sines and cosines of time; a macro-step might
-    miss changes of another torque.
+    The result's `steps` are macro-steps, of 100 revolutions or more. Its `error` is estimated from
+    a solution with more nodes and a higher order of averaging. A recorded torque must be a sum of
+    polynomials in omega and time, times sines and cosines of time; a macro-step might miss changes
+    of another torque.
 
-    Raise InputError if the torque has another form, is opaque, depends on the attitude, is not
-    weak, or may be in resonance; if the torque-free omega is near the separatrix, or does not
-    circle a principal axis, as for a sphere; or if the work limit is exceeded.
+    Raise InputError for another torque, or one that is opaque, depends on the attitude, is not
+    weak, or may be in resonance with omega. Raise it also near the separatrix, for a sphere, and at
+    the work limit.
     """
     # The next macro-step refuses a point that is not finite.
     with np.errstate(all="ignore"):
@@ -198,7 +196,7 @@ class _Run:
         return self.coordinates.rate * math.sqrt(0.5 * (low + high) * math.sqrt(low * high))
 
     def _forecast(self) -> float:
-        """Return a first guess of the length (rad) of the next macro-step."""
+        """Return a guess of the next macro-step's length (rad)."""
         point = self.point
         fast, times = fast_nodes(_FEWEST_ANGLES), np.full(_FEWEST_ANGLES, self.begin[0])
         slopes = self.forward * self.coordinates.slopes(
@@ -226,7 +224,6 @@ class _Run:
         return min(self.longest, _RELATIVE / change, rest + _TURNS_BEYOND * _TURN)
 
     def _step(self) -> MacroStep:
-        """Return the next macro-step, shortened until it is accurate, or raise TimedError."""
         time = self.begin[0]
         angles = self._angles(float(self.coordinates.modulus(self.point)))
         length = self._forecast()
@@ -274,7 +271,7 @@ class _Run:
         )
 
     def _angles(self, modulus: float) -> int:
-        """Return the number of angles for a squared elliptic modulus; raise TimedError near 1."""
+        """Return how many angles psi a squared elliptic modulus needs; raise TimedError near 1."""
         # The oscillation is analytic up to this distance from the real axis of the angle.
         width = math.acosh(1.0 / math.sqrt(min(1.0, max(modulus, 1e-4))))
         if width * _MOST_ANGLES < _DIGITS:

@@ -1,16 +1,15 @@
 """Coordinates of omega that a weak torque changes slowly, and the torque, for `averaged`.
 
-The body rotates about principal axis a; b and c are the next axes in cyclic order. Euler's
-equations are w_b' = P w_c w_a + n_b, w_c' = Q w_a w_b + n_c and so on, where n is the torque over
-the moment (rad/s2). The coefficients P and Q have opposite signs. Let x = |Q|^(1/2) w_b, y =
-+-|P|^(1/2) w_c, u = w_a^2, and let psi be the angle with psi' = |PQ|^(1/2) |w_a|. Without torque
-the motion is exactly 2 pi-periodic in psi, with a suitable sign of y:
+The body rotates about principal axis a; axes b and c follow in cyclic order. Euler's equations are
+w_b' = P w_c w_a + n_b, w_c' = Q w_a w_b + n_c and so on, where n is torque over moment (rad/s2),
+and P Q < 0. Let x = |Q|^(1/2) w_b, y = +-|P|^(1/2) w_c, u = w_a^2 and psi' = |PQ|^(1/2) |w_a|.
+Without torque, with a suitable sign of y, the exact period in psi is 2 pi:
 
     dx/dpsi = -y,  dy/dpsi = x,  du/dpsi = 2 k x y,  with a constant k.
 
-Therefore x + i y = (p1 + i p2) exp(i psi) and u = p3 + k y^2 with constant p1, p2 and p3, which a
-torque changes slowly. These coordinates need no elliptic function, and are regular at a rotation
-about axis a. They are not defined on the separatrix, where w_a reaches 0.
+Therefore x + i y = (p1 + i p2) exp(i psi) and u = p3 + k y^2 with constant p1, p2, p3. These
+coordinates need no elliptic function. They are regular at rotation about axis a, but undefined on
+the separatrix, where w_a reaches 0.
 """
 
 import math
@@ -36,9 +35,9 @@ Torque = Callable[[Array, list[Array]], list[Array] | Array]
 
 
 class Coordinates(NamedTuple):
-    """The constants of coordinates of omega. A point is (p1, p2, p3, t), with t in s.
+    """Constants that define coordinates of omega; a point is (p1, p2, p3, t), t in s.
 
-    x + i y = (p1 + i p2) exp(i psi) and w_a^2 = p3 + k y^2.
+    At the angle psi, x + i y = (p1 + i p2) exp(i psi) and w_a^2 = p3 + k y^2.
     """
 
     axes: tuple[int, int, int]  # b, c, a
@@ -50,7 +49,7 @@ class Coordinates(NamedTuple):
 
     @classmethod
     def from_omega(cls, coefficients: Triple, omega: Triple) -> Self | None:
-        """Return the coordinates for an omega (rad/s); None for a sphere, or on the separatrix."""
+        """Return the coordinates for an omega (rad/s); None for a sphere or the separatrix."""
         found: list[tuple[float, Self]] = []
         for a in range(3):
             b, c = (a + 1) % 3, (a + 2) % 3
@@ -70,7 +69,7 @@ class Coordinates(NamedTuple):
         return min(found)[1] if found else None
 
     def point(self, omega: Triple) -> Array:
-        """Return the point (p1, p2, p3, t) with this omega (rad/s) at psi = 0 and t = 0."""
+        """Return the point (p1, p2, p3, t) of an omega (rad/s) at psi = t = 0."""
         b, c, a = (omega[axis] for axis in self.axes)
         y = self.on_c * c
         return np.array([self.on_b * b, y, a * a - self.bend * y * y, 0.0])
@@ -84,7 +83,7 @@ class Coordinates(NamedTuple):
         return found
 
     def scale(self, point: Array) -> Array:
-        """Return the sizes of a point's components, to which errors are relative."""
+        """Return the sizes of a point's components, for relative errors."""
         size = math.sqrt(abs(point[2]) + point[0] * point[0] + point[1] * point[1])
         return np.array([size, size, size * size, 1.0 / (self.rate * size)])
 
@@ -96,7 +95,7 @@ class Coordinates(NamedTuple):
         return math.sqrt(max(float(on_axis), float(on_others)))
 
     def by_omega(self, omega: Array, cosine: Array, sine: Array) -> Array:
-        """Return the derivatives d(p1, p2, p3)/d(omega) at n fixed angles psi, shape (n, 3, 3)."""
+        """Return d(p1, p2, p3)/d(omega) at n fixed angles psi, (n, 3, 3)."""
         b, c, a = self.axes
         found = np.zeros((len(cosine), 3, 3))
         found[:, 0, b], found[:, 0, c] = cosine * self.on_b, sine * self.on_c
@@ -106,7 +105,7 @@ class Coordinates(NamedTuple):
         return found
 
     def omega(self, point: Array, cosine: Array, sine: Array) -> tuple[list[Array], Array, Array]:
-        """Return omega (rad/s), y and |w_a| at a point, for the cosine and the sine of psi."""
+        """Return omega (rad/s), y and |w_a| at points, from the cosine and sine of psi."""
         y = point[0] * sine + point[1] * cosine
         fast = np.sqrt(point[2] + self.bend * y * y)
         b, c, a = self.axes
@@ -119,7 +118,7 @@ class Coordinates(NamedTuple):
     def slopes(
         self, point: Array, time: Array, cosine: Array, sine: Array, torque: Torque, mean: float
     ) -> Array:
-        """Return d/dpsi of a point (p1, p2, p3, t), with `mean` (s/rad) subtracted from dt/dpsi."""
+        """Return d/dpsi of points (p1, p2, p3, t), less `mean` (s/rad) in dt/dpsi."""
         omega, y, fast = self.omega(point, cosine, sine)
         pace = 1.0 / (self.rate * fast)
         torques = torque(time, omega)
@@ -134,7 +133,7 @@ class Coordinates(NamedTuple):
 
 
 def torque_of(scene: Scene) -> tuple[Torque, bool]:
-    """Return torque over moment of inertia as a function, and whether it may depend on time."""
+    """Return the torque over the moments as a function, and whether it may depend on time."""
     given = scene.torque
     if isinstance(given, StateTorque):
         tape = given.tape
@@ -168,7 +167,7 @@ def torque_of(scene: Scene) -> tuple[Torque, bool]:
 
 
 class _Slot(NamedTuple):
-    """The dependence of a slot (value) of a tape on omega and time."""
+    """The dependence of a recorded value on omega and time."""
 
     degree: float = 0.0  # of the polynomial factor; infinite if another factor is no wave
     fastest: float = 0.0  # highest frequency of the waves, rad/s
@@ -176,10 +175,10 @@ class _Slot(NamedTuple):
 
 
 def fastest_of(torque: TorqueLaw | StateTorque) -> float:
-    """Return the highest frequency of the waves (sines and cosines of time) of a torque (rad/s).
+    """Return the highest frequency (rad/s) of a torque's waves (sines and cosines of time).
 
-    Raise InputError unless a recorded torque is a sum of polynomials of degree 8 at most,
-    multiplied by waves: a macro-step may miss a pulse, or an effect in a narrow range of omega.
+    Raise InputError unless a recorded torque is a sum of polynomials of degree 8 at most, times
+    waves. In another torque, a macro-step may miss a pulse or an effect in a narrow range of omega.
     """
     if isinstance(torque, TorqueLaw):
         return max((abs(f) for a, f in torque.sines + torque.cosines if any(a)), default=0.0)

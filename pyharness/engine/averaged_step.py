@@ -1,20 +1,20 @@
 """One macro-step of the method `averaged`: the two-scale solution over very many revolutions.
 
-The unknowns v are p1, p2, p3 of `averaged_coordinates`, and the time. They depend on the fast angle
-psi, with period 2 pi, and on the slow variable s = psi/length, from 0 to 1; `length` (rad) is the
-angle of the step. The equation dv/dpsi = F(v, psi) becomes
+The unknowns v are the time and p1, p2, p3 of `averaged_coordinates`. They depend on the fast angle
+psi, with period 2 pi, and on the slow s = psi/length, from 0 to 1; `length` (rad) is the step's
+angle. The equation dv/dpsi = F(v, psi) becomes
 
     dv/dpsi + (1/length) dv/ds = F(v, psi).
 
-Let V(s) be v at psi = 0, the stroboscopic solution, W = v - V the oscillation, and < > the mean
-over psi. The equation is equivalent to
+Let V(s) be v at psi = 0 (the stroboscopic solution), W = v - V the oscillation, and < > the mean
+over psi. An equivalent form is
 
     V + <W> = V(0) + <W>(0) + length (integral of <F> over s from 0),
     W = integral of G - <G> over psi from 0, where G = F - (1/length) dW/ds.
 
-A sweep inserts V and W into the right-hand sides, and raises the order of averaging by one. In it,
-Newton's method solves the first equation at all Chebyshev points (nodes) of s together. Two more
-sweeps, with more nodes and angles, measure the error.
+A sweep inserts V and W into the right sides, and raises the order of averaging by one. Newton's
+method solves the first equation at Chebyshev points (nodes) of s. Two more sweeps, with more nodes
+and angles, measure the error.
 """
 
 from functools import lru_cache
@@ -39,7 +39,7 @@ _CLOSE = 1e-7  # rad; the error of the last Newton step is about its square
 
 
 class Slow(NamedTuple):
-    """The n Chebyshev points from 0 to 1, their weights, and matrices of shape (n, n)."""
+    """The n Chebyshev points from 0 to 1, and matrices of shape (n, n)."""
 
     nodes: Array
     integral: Array  # from values to their integral from 0
@@ -48,7 +48,7 @@ class Slow(NamedTuple):
 
 
 class Fast(NamedTuple):
-    """Arrays of n equidistant angles in a period."""
+    """The n equidistant angles in a period, and arrays for them."""
 
     angles: Array
     cosine: Array
@@ -79,7 +79,7 @@ def slow_nodes(count: int) -> Slow:
 
 @lru_cache(maxsize=16)
 def fast_nodes(count: int) -> Fast:
-    """Return the arrays of `count` equidistant angles; `count` is even."""
+    """Return `count` equidistant angles (an even number) and their arrays."""
     angles = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
     waves = np.fft.rfft(np.eye(count), axis=1)
     divided = np.zeros_like(waves)
@@ -90,7 +90,7 @@ def fast_nodes(count: int) -> Fast:
 
 
 def between_nodes(count: int, at: Array) -> Array:
-    """Return the barycentric interpolation matrix from `count` nodes to points `at` from 0 to 1."""
+    """Return the barycentric interpolation matrix from `count` nodes to points from 0 to 1."""
     slow = slow_nodes(count)
     distance = at[:, None] - slow.nodes
     hit = np.abs(distance) < 1e-17
@@ -114,15 +114,14 @@ def between_angles(count: int, at: Array) -> Array:
 
 
 class NotResolvedError(Exception):
-    """The exception for a macro-step that is too long, or has no solution."""
+    """The exception for a macro-step that is too long or has no solution."""
 
 
 class MacroStep:
     """The solution over one macro-step.
 
-    `stroboscopic`, shape (4, nodes), has V, the solution at psi = 0, at the nodes; its times lack
-    the part proportional to psi. `error` is the measured error of V, and `modulus` the largest
-    squared elliptic modulus.
+    `stroboscopic`, (4, nodes), is V, the solution at psi = 0; its times lack the part proportional
+    to psi. `error` is the measured error of V; `modulus` is the largest squared elliptic modulus.
     """
 
     def __init__(
@@ -137,8 +136,8 @@ class MacroStep:
     ) -> None:
         """Solve over the angle `length` (rad), a multiple of 2 pi, or raise NotResolvedError.
 
-        `sizes` are the even numbers of nodes and angles, `start_time` is in s, and `varies` is true
-        if the torque depends on time.
+        `sizes` are the even numbers of nodes and angles. `varies` says whether the torque depends
+        on time.
         """
         self.coordinates, self._torque, self._start_time = coordinates, torque, start_time
         self._start, self.length, self._sizes = start[:, None], length, sizes
@@ -181,13 +180,12 @@ class MacroStep:
         self.error = self._measured()
 
     def _check(self, mean: Array) -> None:
-        """Set `modulus`; raise NotResolvedError unless it is below 1 and the points are finite."""
         self.modulus = float(self.coordinates.modulus(mean).max())
         if not (np.isfinite(mean).all() and self.modulus < 1.0):
             raise NotResolvedError
 
     def _slopes(self, point: Array, fast: Fast, slow: Slow | None = None) -> Array:
-        """Return d/dpsi of points on a grid of nodes and angles psi, (4, nodes, angles)."""
+        """Return d/dpsi of points on a grid, (4, nodes, angles)."""
         nodes = (slow or self._slow).nodes[: point.shape[-2], None]
         time = self._start_time + (self._pace * self.length) * nodes + point[3]
         self.evaluations += point[0].size // point.shape[-1] * len(fast.angles)
@@ -196,7 +194,7 @@ class MacroStep:
         )
 
     def _residual(self, mean: Array, waves: Array, slow: Slow, fast: Fast) -> tuple[Array, Array]:
-        """Return the residual of the equation for V + <W>, and the next oscillation W."""
+        """Return the residual of the equation for V + <W>, and the next W."""
         slopes = self._slopes(mean[..., None] + waves, fast, slow)
         right = self._start + (slopes @ fast.mean) @ (self.length * slow.integral.T)
         waves = (slopes - (slow.slope / self.length) @ waves) @ fast.integral
@@ -204,7 +202,7 @@ class MacroStep:
         return right + (offset[:, :1] - offset) - mean, waves
 
     def _linearise(self, mean: Array, few: Fast) -> Array:
-        """Set the matrices of Newton's method, and return the mean slopes over psi, (4, nodes)."""
+        """Set Newton's matrices; return the mean slopes over psi, (4, nodes)."""
         n, count = self._n_unknowns, self._sizes[0]
         shift = _DIFFERENCE * self.scale[:n, None]
         shifted = np.repeat(mean[:, None], n + 1, axis=1)
@@ -229,7 +227,6 @@ class MacroStep:
         return found
 
     def _measured(self) -> Array:
-        """Return the measured error of the stroboscopic solution V at the nodes."""
         count, angles = self._sizes
         nodes, turns, back = _finer(count, angles)
         slow, fast = slow_nodes(count + _MORE_NODES), fast_nodes(angles + _MORE_ANGLES)
@@ -240,7 +237,7 @@ class MacroStep:
         return self._newton(residual @ back.T)
 
     def propagated(self, angle: float) -> tuple[Array, Array]:
-        """Return, at an angle (rad), the error of the solution V, (4,), and dV/dV(0), (4, 4)."""
+        """Return the error of V, (4,), and dV/dV(0), (4, 4), at an angle (rad)."""
         at = between_nodes(self._sizes[0], np.array([angle / self.length]))[0]
         found, n, count = np.eye(4), self._n_unknowns, self._sizes[0]
         responses = self._inverse.reshape(n, count, n, count).sum(axis=-1)
@@ -252,7 +249,7 @@ class MacroStep:
 
     @property
     def end(self) -> tuple[Array, tuple[float, float]]:
-        """Return the point at the step's end, with t = 0, and its time (s) as two summands."""
+        """Return the point at the end, with t = 0, and the time (s) as two summands."""
         found = self.stroboscopic[:, -1].copy()
         found[3] = 0.0
         return found, (self._pace * self.length, float(self.stroboscopic[3, -1]))
@@ -284,7 +281,7 @@ class MacroStep:
         return angle
 
     def at(self, angle: Array) -> tuple[Array, Array, Array]:
-        """Return the points at n angles psi (rad), (4, n), and the cosines and sines of psi."""
+        """Return the points at n angles psi (rad), (4, n), and the cosines and sines."""
         nodes = between_nodes(self._sizes[0], angle / self.length)
         turns = between_angles(self._sizes[1], np.mod(angle, 2.0 * np.pi))
         point = self.stroboscopic @ nodes.T + ((nodes @ self._waves) * turns).sum(axis=-1)
@@ -293,7 +290,6 @@ class MacroStep:
 
 @lru_cache(maxsize=16)
 def _finer(count: int, angles: int) -> tuple[Array, Array, Array]:
-    """Return interpolation matrices to more nodes, to more angles, and back to the nodes."""
     more = slow_nodes(count + _MORE_NODES).nodes
     return (
         between_nodes(count, more),

@@ -34,10 +34,7 @@ def period_of(scene: Scene) -> float:
 def _largest_estimate(
     scene: Scene, times: Sequence[float], noise: float
 ) -> tuple[float | None, float | None]:
-    """Return the estimated error and the error amplification at the last time.
-
-    If the amplification is at least 1000, return the maxima over 16 rows.
-    """
+    """Return the estimated error and error amplification at the end, or maxima over 16 rows."""
     error, growth = closed_form_estimate(scene, scene.omega, times[-1], noise)
     if error is None or growth is None or growth < _CALM:
         return error, growth
@@ -52,8 +49,7 @@ def known_solution(
 ) -> Trajectory:
     """Return the trajectory of a scene at `times` (s) from its closed form.
 
-    Raise InputError if there is no closed form, the work limit is exceeded, or the phase of omega
-    is above 1e15 rad.
+    Raise InputError without a closed form, at the work limit, or if the phase exceeds 1e15 rad.
     """
     work = np.array([effort, 0.0])
     attitudes = None

@@ -1,4 +1,4 @@
-"""Calls of prepared solvers from compiled code, and checks of arguments that C code refused."""
+"""Calls of prepared solvers from compiled code; checks of arguments that C code refused."""
 
 import math
 import reprlib
@@ -18,9 +18,8 @@ class CompiledCall(NamedTuple):
     """A prepared solver as a function for compiled code, such as numba's.
 
     ``function(data, start, t_end, state)`` reads doubles at the address `start`: omega (rad/s), and
-    for an attitude solver a unit quaternion. It writes the state at `t_end` (s) to the address
-    `state`, and returns a status, a constant of `pyharness.h`; 0 means complete. `data` is valid
-    while `solver` exists.
+    for an attitude solver a unit quaternion. It writes the state at `t_end` (s) to address `state`,
+    and returns a status of `pyharness.h`; 0 means complete. `data` is valid while `solver` exists.
     """
 
     function: Any
@@ -58,7 +57,7 @@ def get_include() -> str:
 def check_call(
     scene: Scene, with_attitude: bool, omega0: object, t_end: object, third: object
 ) -> tuple[tuple[float, ...], float]:
-    """Return the initial state and `t_end` (s) of a call whose arguments the C code refused.
+    """Return the initial state and `t_end` (s) of a call that the C code refused.
 
     `third` is the attitude or `out`. Raise InputError for an invalid argument.
     """
@@ -74,7 +73,7 @@ def check_call(
 
 
 def _no_buffer(out: object) -> str:
-    """Return a description of `out` if three floats can't be written into it, else ""."""
+    """Return "" if three floats can be written into `out`, else a description of it."""
     if not isinstance(out, np.ndarray):
         try:
             return reprlib.repr(out)

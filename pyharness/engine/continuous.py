@@ -24,7 +24,7 @@ def solution_of(
 ) -> DenseOutput:
     """Return the solution as a function of time, from time 0 to the last row of `found`.
 
-    ``rows(times, tolerance)`` computes states in this range by `method`.
+    ``rows(times, tolerance)`` computes states by `method`.
     """
     is_closed = not found.evaluations and method != "reference"
     return dense.dense_output(scene, found, rows, tolerance, METHODS[method].finest, is_closed)
@@ -42,7 +42,7 @@ def with_events(
 ) -> tuple[Trajectory, FoundEvents]:
     """Return a trajectory without rows beyond a terminal event, and the events.
 
-    `ends` are the first and last requested times (s); `rows` computes states by `method`.
+    `ends` are the first and last requested times (s).
     """
     events = no_events(len(functions), len(found.y))
     if sol.t_min < sol.t_max:
@@ -76,7 +76,7 @@ def with_events(
 def _first_periods(
     found: Trajectory, rows: dense.Rows, tolerance: float, period: float
 ) -> Trajectory:
-    """Return `found`, with three periods before or after time 0 where it has more than six."""
+    """Return `found`, with only three periods on each side of time 0 that has over six."""
     ends = found.time[[0, -1]]
     last = PERIODS * period
     # For little more than three periods, repetition would save nothing.

@@ -1,4 +1,4 @@
-"""Dense output by polynomials through a method's results at Chebyshev points (nodes).
+"""Dense output: polynomials through a method's results at Chebyshev points (nodes).
 
 Intervals are divided until the last Chebyshev coefficients are far below the tolerance.
 """
@@ -50,7 +50,7 @@ _SHORT = 0.25  # a change in a shorter part of an interval might be hidden betwe
 
 @dataclass(frozen=True, eq=False)
 class _Open:
-    """An interval (s) without a polynomial yet, perhaps part of a divided longer interval."""
+    """An interval (s) without a polynomial yet."""
 
     low: float
     high: float
@@ -87,11 +87,11 @@ class _Solved:
 def dense_output(
     scene: Scene, found: Trajectory, rows: Rows, tolerance: float, finest: float, is_closed: bool
 ) -> DenseOutput:
-    """Return the solution as a function of time from time 0 to the last row of `found`.
+    """Return the solution as a function of time, from time 0 to the last row of `found`.
 
-    ``rows(times, tolerance)`` computes states in this range; `finest` is the method's smallest
-    tolerance. The tolerance 1 means fixed steps. A closed form (`is_closed`) is evaluated directly.
-    Raise InputError if over 200 000 polynomials are needed.
+    ``rows(times, tolerance)`` computes states. `finest` is the method's smallest tolerance; a
+    `tolerance` of 1 means fixed steps. A closed form is evaluated directly. Raise InputError if
+    over 200 000 polynomials are needed.
     """
     ends = sorted({0.0, *found.time[[0, -1]].tolist()}) if len(found.time) else [0.0]
     states: Callable[[Array], Array]
@@ -119,7 +119,7 @@ def state_pieces(
 def _first_edges(
     scene: Scene, found: Trajectory, ends: list[float], tolerance: float
 ) -> list[float]:
-    """Return the edges of the first intervals (s), including the breaks of the torque's tables."""
+    """Return the edges (s) of the first intervals, with breaks of the torque's tables."""
     tape = scene.torque.tape if isinstance(scene.torque, StateTorque) else None
     inner = {time for time in (tape.breaks if tape else ()) if ends[0] < time < ends[-1]}
     bounds = sorted({*ends, *inner})
@@ -152,7 +152,6 @@ def _first_edges(
 def _fitted(
     edges: list[float], rows: Rows, tolerance: float, own: list[float], rough: float, n_own: int
 ) -> Pieces:
-    """Return polynomials through a method's results; divide intervals where they are inaccurate."""
     # `own` are the tolerances of the rows, and `rough` is their largest error that is not smooth.
     open_pieces = [_Open(low, high) for low, high in itertools.pairwise(edges)]
     done: list[tuple[Array, Array, Array]] = []
@@ -207,7 +206,7 @@ def _fitted(
 def _of_fixed_steps(
     scene: Scene, ends: list[float], rows: Rows, derivatives: Callable[[Array, Array], Array]
 ) -> Pieces:
-    """Return the Hermite cubics between the ends of steps."""
+    """Return Hermite cubics between the ends of steps."""
     step = scene.step_size
     steps = [math.ceil(abs(end) / step) for end in ends]
     if max(steps) > _MOST_PIECES:

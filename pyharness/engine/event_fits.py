@@ -1,7 +1,7 @@
 """Polynomials through the values of an event's function, and the errors (noise) of these values.
 
-In a zero interval, a function is 0 to within its error. The interval counts as a root if the
-function reaches 0 by a kink or a jump, not by decay.
+In a zero interval, a function is 0 to within its error. It is a root if the function reaches 0 by a
+kink or a jump, not by decay.
 """
 
 import math
@@ -44,10 +44,10 @@ _REFINED = Pieces(np.array([-1.0, 1.0]), np.eye(dense_output.NODES)[None])(POINT
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """The solution of a scene whose events are searched.
+    """The solution of a scene in which events are searched.
 
-    `pieces` are the polynomials of the dense output `sol`, or approximate a closed form that `sol`
-    evaluates directly. `tolerance` applies to omega; 0 means a fixed step.
+    `pieces` are the polynomials of `sol`, or approximate a closed form that `sol` evaluates.
+    `tolerance` applies to omega; 0 means a fixed step.
     """
 
     pieces: Pieces
@@ -55,18 +55,18 @@ class Solution:
     tolerance: float
 
     def states(self, times: Array) -> Array:
-        """Return omega, attitude and unknowns added by the user at n `times` (s), shape (n, m)."""
+        """Return omega, attitude and the user's own unknowns at n times (s), (n, m)."""
         return self.sol.normalized(self.pieces(times))
 
     @cached_property
     def at_nodes(self) -> tuple[Array, Array]:
-        """The times (s) of each polynomial's nodes, and the states there."""
+        """The times (s) and states at each polynomial's nodes."""
         times = nodes(self.pieces.edges[:-1], self.pieces.edges[1:], POINTS)
         return times, self.sol.normalized(_REFINED @ self.pieces.values)
 
     @cached_property
     def at_ends(self) -> tuple[Array, Array]:
-        """The first and last time and time 0 (s), and the states there."""
+        """The times (s) and states at both ends and time 0."""
         edges, (_, states) = self.pieces.edges, self.at_nodes
         times = np.array(sorted({edges[0], 0.0, edges[-1]}))
         # Time 0 is an edge.
@@ -80,11 +80,11 @@ class Solution:
         return g(times, states, rates)
 
     def exact_values(self, g: EventFunction, times: Array) -> Array:
-        """Return an event function's values for the states of `sol` instead of `pieces`."""
+        """Return an event function's values for states of `sol` instead of `pieces`."""
         return self.values(g, times, self.sol.normalized(self.sol.states(times)))
 
     def noise(self, g: EventFunction, times: Array) -> Array:
-        """Return the errors of a function's values due to errors of time, state and rates."""
+        """Return a function's errors due to errors of time, state and rates."""
         return self.values_and_noise(g, times)[1]
 
     def values_and_noise(
@@ -115,15 +115,12 @@ class Solution:
 
     @property
     def state_error(self) -> float:
-        """The error of the state, relative to its size.
-
-        It is at most 1e-10, because a larger error would hide pairs of close roots.
-        """
+        """The relative error of the state, at most 1e-10: a larger one would hide close roots."""
         return max(ROUNDING, min(self.tolerance, _COARSEST))
 
     @cached_property
     def _sizes(self) -> Array:
-        """The sizes of the unknowns, for relative errors, from time 0 to each polynomial's end."""
+        """The largest sizes of unknowns from time 0 to each polynomial."""
         # The nodes come first, because many short columns are slow.
         largest = np.abs(self.pieces.values.swapaxes(0, 1), order="C").max(axis=0)
         count = np.searchsorted(self.pieces.edges[:-1], 0.0)
@@ -133,7 +130,7 @@ class Solution:
 
 
 def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
-    """Return polynomials through a function's values; sign changes where they do not converge."""
+    """Return polynomials through a function's values, and sign changes where none converges."""
     edges = solution.pieces.edges
     low, high = edges[:-1], edges[1:]
     times, inner = solution.at_nodes
@@ -193,7 +190,7 @@ def _noise_of(g: EventFunction, solution: Solution, low: Array, high: Array) -> 
 def with_noise(
     g: EventFunction, solution: Solution, fits: Fits, needed: Index
 ) -> tuple[Fits, Roots]:
-    """Return `fits`, with the error where a value may be 0, and roots at ends of the solution."""
+    """Return `fits` with noise where needed, and roots at time 0 and both ends."""
     sizes, largest = fits.sizes, fits.sizes.max(initial=0.0)
     which = np.flatnonzero(needed | (sizes <= largest / _SUDDEN) | (sizes == largest))
     ends, states = solution.at_ends
@@ -228,8 +225,7 @@ class ZeroIntervals:
     """The ascending intervals, `low` to `high` (s), in which a function is 0 to within its error.
 
     Near an interval, values below `noise` can't be distinguished from 0. `before` and `after` are
-    the signs of the function on the two sides: 0 if it decays to 0 there, or at an end of the
-    solution.
+    the function's signs on both sides: 0 where it decays to 0, or at an end of the solution.
     """
 
     low: Array
@@ -239,9 +235,10 @@ class ZeroIntervals:
     after: Array
 
     def roots(self, counts_touches: bool) -> Roots:
-        """Return each interval's root, at the end that the integration from time 0 reaches first.
+        """Return each interval's root, at the end that integration from time 0 reaches first.
 
-        Without `counts_touches`, intervals with equal signs on both sides have no root.
+        Without `counts_touches`, only intervals that exclude time 0, and have opposite signs on
+        both sides, have a root.
         """
         is_before = self.high < 0.0
         is_first = (self.low <= 0.0) & ~is_before
@@ -317,7 +314,7 @@ def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroInte
 def _refined(
     g: EventFunction, solution: Solution, ends: Array, others: Array, level: Array
 ) -> Array:
-    """Return the times, from `ends` toward `others`, up to which a function is below `level`."""
+    """Return times, from `ends` toward `others`, up to which a function is below `level`."""
     # A polynomial may extend beyond a kink of the function; kinks of the solution are at edges.
     inner, outer = ends.copy(), others.copy()
     k = np.flatnonzero(~np.isin(inner, solution.pieces.edges))

@@ -1,4 +1,4 @@
-"""Checks and evaluation of the functions whose roots are events."""
+"""Checks and evaluation of functions whose roots are events."""
 
 import inspect
 import math
@@ -54,8 +54,8 @@ class Event:
 class EventFunction:
     """A checked event.
 
-    The event number `limit`, counted from 1, ends the integration; infinity means that none does.
-    `is_vectorized` is true if the function accepts arrays, None if that is not yet known.
+    The event with number `limit`, from 1, ends the integration; infinity means none.
+    `is_vectorized` says whether the function accepts arrays; None means unknown.
     """
 
     name: str
@@ -65,7 +65,7 @@ class EventFunction:
     _tapes: list[Tape | None] = field(default_factory=list, repr=False)  # at most one
 
     def __call__(self, times: Array, states: Array, rates: Array | None = None) -> Array:
-        """Return the values at n times (s), shape (n,); raise InputError if one is not finite."""
+        """Return the values at n times (s), (n,); raise InputError if one is not finite."""
         given = times, states, None if rates is None else rates[:, :3]
         found = self._of_arrays(*given) if self.is_vectorized is not False else None
         if found is None:
@@ -82,7 +82,6 @@ class EventFunction:
         return found
 
     def _of_arrays(self, times: Array, states: Array, rates: Array | None) -> Array | None:
-        """Return the values by one call with arrays, or None if the function accepts no arrays."""
         omega, attitude = states[:, :3].T.copy(), states[:, 3:].T.copy()
         rate = None if rates is None else rates.T
         try:
@@ -103,7 +102,6 @@ class EventFunction:
         return found
 
     def _is_confirmed(self, found: Array, times: Array, states: Array, rates: Array | None) -> bool:
-        """Return whether `found` agrees with calls for at most nine single times."""
         some = sorted({k * (len(times) - 1) // (_CHECKED - 1) for k in range(_CHECKED)})
         each = self._of_each(times[some], states[some], None if rates is None else rates[some])
         scale = _AGREEMENT * max(map(abs, each))
@@ -113,7 +111,7 @@ class EventFunction:
         )
 
     def _of_tape(self, times: Array, states: Array, rates: Array | None) -> Array | None:
-        """Return the values by a tape (recorded operations) of the function; None without one."""
+        """Return the values from recorded operations, or None if recording fails."""
         is_new = not self._tapes
         if is_new:
             self._tapes.append(self._recorded(states.shape[1]))
@@ -164,7 +162,7 @@ class EventFunction:
 def event_functions(
     events: object, attitude: bool, states: Sequence[OwnState] = ()
 ) -> list[EventFunction]:
-    """Return one event or a list of events as checked functions, or raise InputError."""
+    """Return one event or a list as checked functions, or raise InputError."""
     if callable(events) or isinstance(events, Event):
         events = [events]
     if not isinstance(events, (list, tuple)):
@@ -220,7 +218,7 @@ def _with_own(
 
 
 def _arguments(given: Callable[..., Any], name: str, with_own: bool = False) -> int:
-    """Return the number of a function's arguments, 2 or 3, not counting the user's own states."""
+    """Return a function's number of arguments, 2 or 3, without the user's own states."""
     if type(given) is FunctionType and not (given.__defaults__ or vars(given).keys() & _SIGNED):
         code = given.__code__
         count = code.co_argcount - with_own

@@ -1,9 +1,9 @@
 """Isolation of all real roots of polynomials on intervals, for many intervals at once.
 
-A polynomial with the Chebyshev coefficients c has no root on the interval if |c[0]| > |c[1]| +
-|c[2]| + ... If this bound holds for the derivative, there is at most one root; for the second
-derivative, at most two, with one extremum between them. Other intervals are halved, so that no root
-is missed (Trefethen 2013, Approximation Theory and Approximation Practice, chapters 3 and 18).
+A polynomial with Chebyshev coefficients c has no root on the interval if |c[0]| > |c[1]| + |c[2]| +
+... If this bound holds for the derivative, there is at most one root; for the second derivative, at
+most two, with one extremum between. Other intervals are halved, so that no root is missed
+(Trefethen 2013, Approximation Theory and Approximation Practice, chapters 3 and 18).
 """
 
 from dataclasses import dataclass
@@ -32,7 +32,6 @@ FIT_ERROR = 4e-13
 
 
 def _transforms() -> tuple[Array, Array, Array]:
-    """Return matrices from Chebyshev coefficients to those of derivative and half intervals."""
     slope = np.zeros((NODES, NODES))
     slope[:-1] = chebyshev.chebder(np.eye(NODES))
     left = TO_COEFFICIENTS @ chebyshev.chebvander(0.5 * (POINTS - 1.0), NODES - 1)
@@ -53,10 +52,10 @@ def transformed(rows: Array, matrix: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Columns:
-    """A table whose columns are the attributes."""
+    """A table; each attribute is a column."""
 
     def only(self, kept: Index) -> Self:
-        """Return the rows that an index or a mask selects."""
+        """Return the rows that an index or mask selects."""
         return type(self)(*(getattr(self, name)[kept] for name in self.__dataclass_fields__))
 
 
@@ -64,7 +63,7 @@ C = TypeVar("C", bound=_Columns)
 
 
 def together(parts: list[C], order: str) -> C:
-    """Return the rows of all tables, in ascending order of the column `order`."""
+    """Return all tables' rows in ascending order of column `order`."""
     names = parts[0].__dataclass_fields__
     found = type(parts[0])(*(np.concatenate([getattr(x, name) for x in parts]) for name in names))
     return found.only(np.argsort(getattr(found, order), kind="stable"))
@@ -74,8 +73,8 @@ def together(parts: list[C], order: str) -> C:
 class Fits(_Columns):
     """Chebyshev `coefficients`, (p, NODES), of a function on p intervals from `low` to `high` (s).
 
-    `first` and `last` are the function's values at `low` and `high`; adjacent intervals have the
-    same value at their common end. Values below `noise` can't be distinguished from 0.
+    `first` and `last` are the function's values at `low` and `high`, equal at common ends. Values
+    below `noise` can't be distinguished from 0.
     """
 
     low: Array
@@ -87,7 +86,7 @@ class Fits(_Columns):
 
     @cached_property
     def sizes(self) -> Array:
-        """The upper bounds of the magnitudes of the polynomials, shape (p,)."""
+        """Upper bounds of the polynomials' magnitudes, (p,)."""
         found: Array = np.abs(self.coefficients).sum(axis=1)
         return found
 
@@ -96,10 +95,10 @@ class Fits(_Columns):
 class Roots(_Columns):
     """Candidates for roots at n times (s).
 
-    With increasing time, `change` is 1 for a sign change to positive, -1 to negative, 0 for none.
-    `slope` and `curvature` are the first and second time derivatives of the polynomial. Values of
-    the function below `noise`, and of the polynomial below `near`, can't be distinguished from 0.
-    The function remains 0 for the time `lasting` (s), which is negative before time 0.
+    `change` is the sign (1 or -1) after a sign change, else 0. `slope` and `curvature` are the
+    first two time derivatives of the polynomial. Function values below `noise`, and polynomial
+    values below `near`, can't be distinguished from 0. The function remains 0 for the time
+    `lasting` (s), negative before time 0.
     """
 
     time: Array
@@ -112,7 +111,7 @@ class Roots(_Columns):
 
     @classmethod
     def bare(cls, time: Array, change: Index, noise: Any = 0.0, lasting: Any = 0.0) -> "Roots":
-        """Return roots whose derivatives are unknown (0)."""
+        """Return roots with 0 for the unknown `slope`, `curvature` and `near`."""
         zeros = np.zeros(len(time))
         return cls(
             time, zeros.astype(int) + change, zeros, zeros, zeros + noise, zeros, zeros + lasting
@@ -132,7 +131,7 @@ def _basis(x: Array) -> Array:
 
 
 def values_at(coefficients: Array, x: Array) -> Array:
-    """Return the value of polynomial k at x[k], for all k."""
+    """Return the value of each polynomial k at x[k]."""
     return np.asarray(np.vecdot(coefficients, _basis(x)))
 
 
@@ -144,7 +143,7 @@ def may_vanish(fits: Fits) -> Index:
 
 
 def isolated(fits: Fits) -> Roots:
-    """Return all roots of polynomials, and their extrema that may be 0, ascending in time."""
+    """Return all polynomials' roots, and extrema that may be roots, ascending in time."""
     near = np.maximum(fits.noise, FIT_ERROR * fits.sizes)
     smallest = np.maximum(fits.noise / 16.0, 1e-15 * fits.sizes)
     # Points from -1 to 1, sign changes and indices of polynomials.
@@ -204,7 +203,6 @@ def _has_no_root(coefficients: Array) -> Array:
 
 
 def _describe_roots(fits: Fits, x: Array, change: Index, number: Index, near: Array) -> Roots:
-    """Return the roots at the points x, from -1 to 1, of the polynomials of index `number`."""
     half = 0.5 * fits.high[number] - 0.5 * fits.low[number]
     time = 0.5 * fits.low[number] + 0.5 * fits.high[number] + half * x
     time = np.clip(time, fits.low[number], fits.high[number])
@@ -237,7 +235,7 @@ def _bracketed(c: Array, low: Array, high: Array, sign: Array) -> Array:
 def _bent(
     rows: Index, *given: Array
 ) -> tuple[Array, Index, list[tuple[Array, Array, Index, Index]]]:
-    """Return extrema that are roots, their row numbers, and parts of intervals with one root."""
+    """Return extrema that may be roots, their row numbers, and parts with one root."""
     c, first, last, slopes, near = (each[rows] for each in given)
     count = len(c)
     low, high = np.full(count, -1.0), np.ones(count)

@@ -1,8 +1,8 @@
 """Events: the times at which functions of time, omega and attitude are 0.
 
-A function is approximated by polynomials on intervals, which are divided until the polynomials
-converge. All roots of the polynomials are isolated, including close and double roots. Where the
-function is not smooth, intervals become tiny, and only its sign changes between nodes are found.
+A function is approximated by polynomials, on intervals divided until the polynomials converge. All
+their roots are isolated, including close and double roots. Where the function is not smooth, only
+sign changes between nodes of tiny intervals are found.
 """
 
 import math
@@ -45,7 +45,7 @@ def event_roots(g: EventFunction, solution: Solution) -> Roots:
 
 
 def _distinct(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
-    """Return the roots, each with the error (noise) at its time, without extrema that are not 0."""
+    """Return the roots with their `noise`, without extrema that are not 0."""
     if not roots.time.size:
         return roots
     value, noise, _ = solution.values_and_noise(g, roots.time)
@@ -75,7 +75,7 @@ def _polished(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
 
 
 def _bisected(g: EventFunction, solution: Solution, times: Array, changes: Index) -> Array:
-    """Return the times (s) of roots; bisection refines the inexact times of sign changes."""
+    """Return the times (s) of roots; bisection refines inexact sign changes."""
     # Near a root of odd multiplicity above 1, polynomials are inexact, but signs are not.
     edges = solution.pieces.edges
     bounds = np.concatenate([edges[:1], 0.5 * times[:-1] + 0.5 * times[1:], edges[-1:]])
@@ -149,7 +149,7 @@ def _grouped(roots: Roots, is_same: Index, ends: tuple[float, ...]) -> Roots:
 
 
 def _have_one_extremum(g: EventFunction, solution: Solution, roots: Roots, noise: Array) -> Index:
-    """Return which pairs of adjacent roots enclose an extremum that is 0 to within noise."""
+    """Return which adjacent roots enclose an extremum that is 0 to within noise."""
     found: Index = np.zeros(len(noise), dtype=bool)
     widest = np.sqrt(8.0 * roots.near / np.abs(roots.curvature))
     # A distant root belongs to another extremum, however flat the function is here.
@@ -166,7 +166,7 @@ def _have_one_extremum(g: EventFunction, solution: Solution, roots: Roots, noise
 def _with_extrema(
     g: EventFunction, solution: Solution, roots: Roots, ends: tuple[float, ...]
 ) -> Roots:
-    """Return the roots, with each double root at the extremum of the polynomial."""
+    """Return the roots, with each double root at the polynomial's extremum."""
     if roots.change.all():
         return roots
     is_double = (roots.change == 0) & ~np.isin(roots.time, ends)
@@ -181,7 +181,7 @@ def _with_extrema(
 
 
 def _chosen(roots: Roots, group: Index, change: int, ends: tuple[float, ...]) -> int:
-    """Return the index of the root that replaces a group: one in `ends`, else in the middle."""
+    """Return the index of a group's root at a time in `ends`, else of its middle root."""
     at_end = group[np.isin(roots.time[group], ends)]
     if at_end.size:
         return int(at_end[0])
@@ -191,10 +191,9 @@ def _chosen(roots: Roots, group: Index, change: int, ends: tuple[float, ...]) ->
 
 
 def side_events(g: EventFunction, solution: Solution, roots: Roots, side: int) -> Array:
-    """Return the times of events after (`side` 1) or before (-1) time 0, in order away from 0.
+    """Return event times (s) after (`side` 1) or before (-1) time 0, in order away from 0.
 
-    As in SciPy, a root at time 0 counts as a sign change from 0, and a root at the end as a sign
-    change to 0.
+    As in SciPy, a root at time 0 is a sign change from 0, and one at the end a sign change to 0.
     """
     end = solution.pieces.edges[-1 if side > 0 else 0]
     if side * end <= 0.0 or not roots.time.size:
@@ -217,7 +216,7 @@ def side_events(g: EventFunction, solution: Solution, roots: Roots, side: int) -
 def _repeated(
     g: EventFunction, solution: Solution, times: Array, side: int, period: float
 ) -> Array:
-    """Return the times (s) of all events on one side of 0, by repetition beyond the polynomials."""
+    """Return event times (s) on one side of 0, repeated periodically beyond the polynomials."""
     last, end = solution.pieces.edges[-1], solution.sol.t_max
     if side < 0:
         last, end = solution.pieces.edges[0], solution.sol.t_min
@@ -231,9 +230,9 @@ def _repeated(
 
 @dataclass(frozen=True, eq=False)
 class FoundEvents:
-    """The `times` (s) and `states` of the events of each function, ascending.
+    """The ascending `times` (s) and the `states` of each function's events.
 
-    `first` and `last` are the times (s) of the terminal events before and after 0, or infinite.
+    `first` and `last` are the times (s) of terminal events before and after 0, or infinite.
     """
 
     times: list[Array]
@@ -243,7 +242,7 @@ class FoundEvents:
 
 
 def no_events(count: int, columns: int) -> FoundEvents:
-    """Return no events for `count` functions, with states of `columns` columns."""
+    """Return an empty result for `count` functions, and states of `columns` numbers."""
     states = [np.zeros((0, columns)) for _ in range(count)]
     return FoundEvents([np.zeros(0) for _ in range(count)], states, -math.inf, math.inf)
 
@@ -253,7 +252,7 @@ def found_events(
 ) -> FoundEvents:
     """Return the events of several functions, without those beyond a terminal event.
 
-    With a `period` (s) of the motion, the events beyond the polynomials repeat those within.
+    With a `period` (s), events beyond the polynomials repeat earlier ones.
     """
     roots = [event_roots(g, solution) for g in functions]
     sides: dict[int, list[Array]] = {}

@@ -16,11 +16,11 @@ _MORE, _LESS = 0.25 + math.sqrt(3.0) / 6.0, 0.25 - math.sqrt(3.0) / 6.0
 
 @np.errstate(over="ignore", invalid="ignore")
 def attitude_from_rows(scene: Scene, time: Array, omega: Array) -> Array:
-    """Return the attitudes, shape (n, 4), at the times (s) of a table of omega (rad/s).
+    """Return the attitudes, (n, 4), at the times (s) of a table of omega (rad/s).
 
-    A commutator-free step of order 4 (Celledoni, Marthinsen and Owren 2003) leads from each row to
-    the next. Cubic Hermite interpolation supplies omega at its Gauss points. After a rotation that
-    overflows, all attitudes are NaN.
+    A commutator-free step of order 4 (Celledoni, Marthinsen and Owren 2003) leads from row to row.
+    Cubic Hermite interpolation supplies omega at its Gauss points. After a rotation that overflows,
+    attitudes are NaN.
     """
     times = np.concatenate([[0.0], time])
     rows = np.vstack([scene.omega, omega])
@@ -44,7 +44,7 @@ def attitude_from_rows(scene: Scene, time: Array, omega: Array) -> Array:
 
 
 def _between(rows: Array, slopes: Array, span: Array, part: float) -> Array:
-    """Return omega (rad/s), (n, 3), at the fraction `part` of n steps, by Hermite's cubic."""
+    """Return omega, (n, 3), at the fraction `part` of n steps, by Hermite's cubic."""
     rest = 1.0 - part
     ends = (
         rest * rest * (1.0 + 2.0 * part) * rows[:-1] + part * part * (1.0 + 2.0 * rest) * rows[1:]

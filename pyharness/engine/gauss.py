@@ -40,11 +40,10 @@ def gauss(
     """Return the trajectory by Gauss collocation with 1 to 8 `stages`.
 
     The step is halved until the estimated relative error of omega meets the tolerance, or the last
-    two solutions differ only by rounding errors. The estimate is 2 d / (r**p - 1), with the safety
-    factor 2. Here d is the largest difference of the two solutions over the largest component of
-    omega. The ratio r, at most 2, is the smallest ratio of their numbers of steps between requested
-    times. The exponent p is the order, 2 `stages`, but at most 8, because long steps show no higher
-    order.
+    two solutions differ only by rounding. The estimate is 2 d / (r**p - 1), with a safety factor 2.
+    Here d is the largest difference of the solutions, relative to omega. The ratio r, at most 2, is
+    the smallest ratio of their numbers of steps between requested times. The exponent p = min(2
+    `stages`, 8) is limited because long steps show no higher order.
     """
     given, most = normalized(scene), effort * _MOST_EVALUATIONS / (1.0 + 0.5 * waves(scene))
     if times[-1] == 0.0:
@@ -128,10 +127,8 @@ def gauss(
 def _blows_up(finer: _Solution, coarser: _Solution, start: float) -> bool:
     """Return whether two solutions end because omega grows without bound.
 
-    Both then end before the last time, nearly together. Let m and n (rad/s) be the largest
-    components of omega at the end of the finer and the coarser solution. Let s be the larger
-    of `start` and all components at requested times. Either m and n both exceed 1e300 rad/s, or m >
-    1.5 n > 1000 s.
+    Both must end early and nearly together. Either both exceed 1e300 rad/s, or omega is far above
+    all earlier values and still larger in the finer solution.
     """
     if COMPLETE in (finer.status, coarser.status):
         return False
@@ -144,7 +141,6 @@ def _blows_up(finer: _Solution, coarser: _Solution, start: float) -> bool:
 
 
 def _step_counts(lengths: Array, step: float) -> Array:
-    """Return the steps per interval; a step exceeds `step` by a fraction of 1e-6 at most."""
     with np.errstate(over="ignore", divide="ignore"):
         return np.maximum(1.0, np.floor(np.minimum(lengths / step, 1e18) + (1.0 - 1e-6)))
 

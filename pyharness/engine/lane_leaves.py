@@ -100,7 +100,7 @@ static SHORT reg late_sum(const reg *x, const reg *y, int k, int late, const reg
 
 @lru_cache(maxsize=64)
 def whole_source(tape: Structure) -> str:
-    """Return the C source of all functions of a tape, and `leaves`, their table (see tape.h)."""
+    """Return C source of a tape's functions and their table `leaves` (see tape.h)."""
     functions, lines = ["0"] * 4, [HEADER]
     if not _has_parameters(tape):
         functions, lines = names(tape), [source(tape)]
@@ -117,7 +117,7 @@ def whole_source(tape: Structure) -> str:
 
 
 def _in_lanes(text: str) -> str:
-    """Return C statements for numbers as statements for vector registers."""
+    """Return C statements for numbers, rewritten for vector registers."""
     for old, new in {
         "const double t": "const reg t",
         "halved(": "half_in_lanes(",
@@ -138,18 +138,16 @@ def _first_result(tape: Structure) -> int:
 
 
 def _has_parameters(tape: Structure) -> bool:
-    """Return whether bodies differ in parameters of the tape, as this module alone allows."""
     return tape.n_unknowns in _UNKNOWNS and _first_result(tape) > _N_INPUTS + 1
 
 
 def _inputs(tape: Structure, texts: list[str], letter: str) -> list[int]:
-    """Return the slots of inputs (time, unknowns, parameters) read in texts, such as 5 for t5."""
+    """Return the slots of inputs that texts read, such as 5 for t5."""
     read = {int(each) for each in re.findall(rf"\b{letter}(\d+)", " ".join(texts))}
     return sorted(slot for slot in read if slot < _first_result(tape))
 
 
 def _expand(tape: Structure) -> Iterator[str]:
-    """Yield the C function that computes the Taylor terms of all slots, order by order."""
     terms, pairs = recurrences(tape)
     terms = [_in_lanes(each) for each in terms]
     first, later = rates_of_term(tape)
@@ -214,5 +212,5 @@ def _set_noise(tape: Structure) -> Iterator[str]:
 
 
 def _of_registers(text: str) -> str:
-    """Return a C definition for registers; the added `zero` converts a plain number."""
+    """Return a C definition for registers; `zero` converts a plain number."""
     return _in_lanes(text).replace("= ", "= zero + ", 1)

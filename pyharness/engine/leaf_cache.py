@@ -1,4 +1,4 @@
-"""Compilation of leaves (C code for the Taylor series of a recorded torque), and their folder.
+"""Compilation and folder of leaves: C code for the Taylor series of a recorded torque.
 
 A file is loaded only if it and the folder belong to the user, nobody else may write them, and its
 name ends in its content's hash.
@@ -32,7 +32,7 @@ _NATIVE = "-march=native"
 
 
 class LeavesError(Exception):
-    """The reason why C code (leaves) can't be compiled or loaded, in one line."""
+    """The reason, in one line, why C code (leaves) can't be compiled or loaded."""
 
 
 # RuntimeError: no home folder is known.
@@ -40,18 +40,18 @@ _FAILURES = (LeavesError, RuntimeError)
 
 
 def folder() -> Path:
-    """Return the folder of compiled code (leaves), which may be missing."""
+    """Return the folder of compiled code, which may be missing."""
     home = Path(os.environ.get("XDG_CACHE_HOME", ""))
     return (home if home.is_absolute() else Path("~/.cache").expanduser()) / "pyharness" / "leaves"
 
 
 def size() -> int:
-    """Return the size (bytes) of all files of compiled code."""
+    """Return the size (bytes) of all compiled code."""
     return sum(info.st_size for _, info in _files())
 
 
 def about_leaves() -> dict[str, str | int]:
-    """Return the folder of compiled code, its size in bytes, and the compiler or an error."""
+    """Return the folder of compiled code, its size (bytes), and the compiler or an error."""
     try:
         return {"folder": str(folder()), "bytes": size(), "compiler": " ".join(compiler())}
     except _FAILURES as error:
@@ -59,7 +59,7 @@ def about_leaves() -> dict[str, str | int]:
 
 
 def leaves_for(scene: Scene, compiled: bool) -> tuple[int, str]:
-    """Return the address of compiled code, 0 without any, and the text of `Solver.leaves`."""
+    """Return the address of compiled code, or 0, and the text of `Solver.leaves`."""
     tape = system_of(with_constant_body(scene))
     address, found = leaves_of(tape) if compiled else (0, "interpreter")
     if not address and has_ready_leaves(tape):
@@ -70,7 +70,7 @@ def leaves_for(scene: Scene, compiled: bool) -> tuple[int, str]:
 def leaves_of(tape: Tape) -> tuple[int, str]:
     """Return the address of a tape's compiled code and ``compiled``, or 0 and the reason.
 
-    The code is compiled unless the folder has it.
+    Code that the folder lacks is compiled.
     """
     shape = structure(listing(tape))
     if shape is None:
@@ -82,7 +82,7 @@ def leaves_of(tape: Tape) -> tuple[int, str]:
 
 
 def leaves_of_many(packed: Array, leaves: str) -> str:
-    """Return the text of `Ensemble.leaves` from a packed scene and the text of `Solver.leaves`."""
+    """Return the text of `Ensemble.leaves` for a packed scene, from that of `Solver.leaves`."""
     if leaves == "compiled" and not extension().compiled_lanes(number_of_leaves(packed)):
         return "interpreter: the compiler does not use the registers of this processor"
     # Code built with the package is for single bodies.
@@ -103,7 +103,7 @@ def loaded(tape: Structure, place: str) -> int:
 
 @cache
 def compiler() -> tuple[str, ...]:
-    """Return the command of the C compiler: CC, cc, gcc or clang; raise LeavesError without one."""
+    """Return the command of the C compiler (CC, cc, gcc or clang), or raise LeavesError."""
     import shlex
     from shutil import which
 
@@ -119,7 +119,7 @@ def compiler() -> tuple[str, ...]:
 
 @cache
 def machine() -> str:
-    """Return a text that differs for different compilers, flags and processors."""
+    """Return a text that identifies compiler, flags and processor."""
     import platform
 
     file = os.stat(os.path.realpath(compiler()[0]))
@@ -146,7 +146,6 @@ def _files() -> Iterator[tuple[Path, os.stat_result]]:
 
 
 def _found(place: Path, key: str) -> Path | None:
-    """Return the compiled file with this key; None if none may be loaded."""
     try:
         info = place.lstat()
     except OSError:
@@ -164,7 +163,7 @@ def _found(place: Path, key: str) -> Path | None:
 
 
 def compiled_file(place: Path, text: str) -> Path:
-    """Compile C code, and return the file, which enters the folder only when complete."""
+    """Return the compiled file of C code, which enters the folder only when complete."""
     from tempfile import TemporaryDirectory
 
     place.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -185,7 +184,7 @@ def compiled_file(place: Path, text: str) -> Path:
 
 
 def _run(command: list[str]) -> str:
-    """Run a compiler, and return the first line of its error message; empty if it succeeded."""
+    """Run a compiler; return the first line of its error message, or ""."""
     import subprocess
 
     try:
@@ -201,7 +200,6 @@ def _run(command: list[str]) -> str:
 
 
 def _clean(place: Path) -> None:
-    """Delete the oldest files beyond the size limit, and folders of killed compilations."""
     import time
     from shutil import rmtree
 

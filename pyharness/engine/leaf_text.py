@@ -1,4 +1,4 @@
-"""Names, in C code, of the slots (inputs, results) of a tape (recorded operations)."""
+"""Names, in C code, of slots (inputs, results) of a tape (recorded operations)."""
 
 import re
 from collections.abc import Iterator
@@ -26,7 +26,7 @@ class Structure(NamedTuple):
 
 
 def structure(tape: "Listing") -> Structure | None:
-    """Return the structure of a tape, or None if it can't be compiled."""
+    """Return the structure of a tape; None if it can't be compiled."""
     kinds = {operation[0] for operation in tape.operations}
     if not kinds <= {*OPERATIONS, Operations.LINEAR} or len(tape.operations) > _MOST_OPERATIONS:
         return None
@@ -40,7 +40,7 @@ def key(tape: Structure) -> int:
 
 
 def rule_of(operation: Listed) -> Operation:
-    """Return the recurrence of an operation."""
+    """Return an operation's recurrence."""
     is_wave = operation[0] == Operations.SINE_COSINE and operation[2] > 0
     return OPERATIONS[WAVE if is_wave else operation[0]]
 
@@ -69,7 +69,7 @@ def with_slots(text: str, operation: Listed) -> str:
 
 
 def combined(tape: Structure, number: int, name: str, *, is_value: bool) -> str:
-    """Return a linear combination of C variables, such as "t4" for slot 4 and `name` "t"."""
+    """Return C code for a linear combination of variables, `name` followed by a slot."""
     parts = [f"d[{number - 1}]"] * is_value
     parts += [f"c[{i}]*{name}{slot}" for i, slot in numbered_terms(tape, number)]
     return " + ".join(parts) or "0.0"
@@ -82,7 +82,7 @@ def numbered_terms(tape: Structure, number: int) -> Iterator[tuple[int, int]]:
 
 
 def rates_of(tape: Structure) -> range:
-    """Return the numbers of the combinations that are rates of unknowns."""
+    """Return the numbers of the combinations that are unknowns' rates."""
     return range(len(tape.combinations) - tape.n_unknowns + 1, len(tape.combinations) + 1)
 
 
@@ -92,5 +92,5 @@ def unknowns_of(tape: Structure) -> range:
 
 
 def slots_read(lines: list[str]) -> list[int]:
-    """Return the slots whose term 0 is read in lines of C code."""
+    """Return the slots whose term 0 the C code reads."""
     return sorted({int(each) for each in re.findall(r"\bz(\d+)", " ".join(lines))})

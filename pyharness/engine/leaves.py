@@ -1,7 +1,7 @@
 """Compiled leaves: C code for values, series, Jacobian and rounding errors of recorded operations.
 
-They replace the interpreter, fortran/modern/tape_terms.c. Coefficients are read from memory, so
-that tapes that differ only in them share leaves.
+They replace the interpreter, fortran/modern/tape_terms.c. They read coefficients from memory, so
+that tapes that differ only in coefficients share leaves.
 """
 
 import re
@@ -60,7 +60,7 @@ static void put(double *to, int nodes, double h, abreast a, abreast b, abreast c
 
 @lru_cache(maxsize=64)
 def source(tape: Structure, suffix: str = "") -> str:
-    """Return the C source of the functions of tape.h for a single body.
+    """Return the C source of the functions of tape.h for one body.
 
     With a suffix, added to their names, the functions are static.
     """
@@ -72,13 +72,13 @@ def source(tape: Structure, suffix: str = "") -> str:
 
 
 def names(tape: Structure, suffix: str = "") -> list[str]:
-    """Return the names of the functions of `source` as ordered in tape.h; 0 for a missing one."""
+    """Return the names of `source`'s functions in the order of tape.h; 0 for a missing one."""
     values = f"set_values{suffix}" if first_values(tape) else "0"
     return [f"expand{suffix}", f"set_jacobian{suffix}", values, f"set_noise{suffix}"]
 
 
 def recurrences(tape: Structure) -> tuple[list[str], list[tuple[int, int]]]:
-    """Return C statements for term k of all results, and the slots of the products they sum."""
+    """Return C statements for term k of all results, and slots of the products they sum."""
     pairs: dict[tuple[int, int], int] = {}
     terms = []
     for operation in tape.operations:
@@ -99,13 +99,12 @@ def recurrences(tape: Structure) -> tuple[list[str], list[tuple[int, int]]]:
 
 
 def rates_of_term(tape: Structure) -> tuple[list[str], list[str]]:
-    """Return C code for the unknowns' rates: term 0, and term k."""
+    """Return C code for terms 0 and k of the unknowns' rates."""
     first = [combined(tape, number, "z", is_value=True) for number in rates_of(tape)]
     return first, [combined(tape, number, "t", is_value=False) for number in rates_of(tape)]
 
 
 def _expand(tape: Structure) -> Iterator[str]:
-    """Yield the C function that computes the Taylor terms of all slots, order by order."""
     terms, pairs = recurrences(tape)
     groups = [pairs[i : i + _ABREAST] for i in range(0, len(pairs), _ABREAST)]
     for g, group in enumerate(groups):
@@ -150,7 +149,7 @@ def _vector(names: list[str]) -> str:
 
 
 def _kept(unknowns: range, k: str) -> Iterator[str]:
-    """Yield C statements that store term k of the unknowns, one by one and in groups."""
+    """Yield C statements that store term k of the unknowns, singly and in groups."""
     yield from (f"  {place(slot, k)} = t{slot};" for slot in unknowns)
     for begin in unknowns[::_ABREAST]:
         at = (begin - FIRST_UNKNOWN) * Storage.PERTURBATION_LENGTH
@@ -199,7 +198,7 @@ def _set_values(tape: Structure) -> Iterator[str]:
 
 
 def kept_values(lines: list[str], rates: list[str], number: str) -> Iterator[str]:
-    """Yield C statements that store term 0 of results, and define the values that `rates` read."""
+    """Yield C statements that store term 0 of results, and define what `rates` read."""
     results = [int(each[1 : each.index(" ")]) for each in lines]
     for slot in slots_read([each.partition("=")[2] for each in lines] + rates):
         if slot not in results:
@@ -210,7 +209,7 @@ def kept_values(lines: list[str], rates: list[str], number: str) -> Iterator[str
 
 
 def _roundings(tape: Structure) -> tuple[list[str], list[str]]:
-    """Return C definitions of errors of results, and of rates, in rounding errors of 1.
+    """Return C definitions of the errors of results and of rates, in units of roundoff.
 
     This is the running error analysis of fortran/modern/tape_noise.h.
     """
@@ -260,7 +259,7 @@ def _set_noise(tape: Structure) -> Iterator[str]:
 
 
 def noises(tape: Structure, number: str, written: Callable[[str], str]) -> Iterator[str]:
-    """Yield C statements that bound the rounding errors of the rates, for the C type `number`.
+    """Yield C statements that bound the rates' rounding errors, for the C type `number`.
 
     `written` translates a definition, such as "e9 = 2.0", to this type.
     """
@@ -272,9 +271,9 @@ def noises(tape: Structure, number: str, written: Callable[[str], str]) -> Itera
 
 
 def derivatives(tape: Structure, count: int) -> tuple[list[str], list[dict[int, str]]]:
-    """Return C definitions of values and slopes, and the derivatives of each rate by unknown.
+    """Return C definitions of values and slopes, and each rate's derivatives by unknown.
 
-    The values are at the fraction u of a step, from `count` terms of the series.
+    The values are at the fraction u of a step, from `count` terms.
     """
     # By slot: the names of its derivatives, by unknown.
     by = {slot: {slot: "one"} for slot in unknowns_of(tape)}
@@ -300,7 +299,7 @@ def derivatives(tape: Structure, count: int) -> tuple[list[str], list[dict[int, 
 
 
 def _summed(slot: int, count: int) -> str:
-    """Return the C definition of a slot's value; even and odd terms are summed side by side."""
+    """Return a C definition of a slot's value; even and odd terms have separate sums."""
     sums = ["", ""]
     for k in reversed(range(count)):
         later = sums[k % 2]

@@ -16,7 +16,7 @@ def propagators(scene: Scene, times: Array, omega: Array) -> Array:
 def transitions(times: Array, slopes: Array) -> Array:
     """Return the state-transition matrices from each of n times (s) to the last, (n, m, m).
 
-    `slopes` are the Jacobian matrices (1/s) in the intervals, shape (n - 1, m, m).
+    `slopes` are the intervals' Jacobian matrices (1/s), (n - 1, m, m).
     """
     # The Jacobian hardly changes in an interval, so that exp(interval * Jacobian) is the
     # state-transition matrix.
@@ -30,14 +30,14 @@ def transitions(times: Array, slopes: Array) -> Array:
 
 
 def growth(propagators: Array) -> float:
-    """Return the error amplification: the largest row-sum norm of the matrices, at least 1."""
+    """Return the error amplification: the matrices' largest row-sum norm, at least 1."""
     return float(max(1.0, np.abs(propagators).sum(axis=2).max()))
 
 
 def exponentials(small: Array) -> Array:
     """Return the exponentials of matrices of norm below 1, by Taylor's polynomial of degree 8.
 
-    The norm of the truncation error is below 3.1e-6.
+    The truncation error is below 3.1e-6.
     """
     one = np.eye(small.shape[-1])
     total = np.broadcast_to(one, small.shape)
@@ -47,7 +47,7 @@ def exponentials(small: Array) -> Array:
 
 
 def jacobians(scene: Scene, omega: Array) -> Array:
-    """Return the Jacobian matrices (1/s) at n omegas (rad/s), shape (n, 3, 3)."""
+    """Return the Jacobian matrices (1/s) at n omegas (rad/s), (n, 3, 3)."""
     a, b, c = scene.euler_coefficients
     x, y, z = omega.T
     zero = np.zeros(len(omega))

@@ -1,6 +1,6 @@
 """Solution of many bodies in one call, side by side in the kernel and in threads.
 
-Each result is bit-for-bit independent of the other bodies, their order and the number of threads.
+Each result is bit for bit independent of other bodies, their order and the number of threads.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -300,7 +300,7 @@ def _solve(
 
 
 def _kind_of(scene: Scene, row: int) -> int:
-    """Return a number that is equal for all scenes of one kernel call."""
+    """Return a number that is equal for scenes of one kernel call."""
     checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True)
     return row if is_solved_alone(scene, {}) else _PLAIN if scene.inertia is None else _TILTED
 
@@ -309,7 +309,7 @@ def _solve_groups(
     scenes: Sequence[Scene], kinds: Sequence[int], t_end: Any, step: Number | None,
     out: "Ensemble | Array | None", **settings: Any,
 ) -> Ensemble:  # fmt: skip
-    """Return the final states of scenes that one kernel call can't solve."""
+    """Return the final states of scenes that need several kernel calls."""
     check_alike(scenes)
     if scenes[0].attitude is None and any(each.torque.needs_attitude for each in scenes):
         raise InputError(NO_ATTITUDE)

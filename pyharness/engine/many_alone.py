@@ -1,6 +1,6 @@
 """Solution of bodies one by one: events, sensitivities, and scenes that the vector kernel refuses.
 
-It refuses torques that depend on the state or are about the axes of space, and a changing inertia.
+It refuses a changing inertia, and torques that depend on the state or are about axes of space.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -58,7 +58,7 @@ NO_ATTITUDE = "the torque needs the initial attitude; give attitude, or scenes w
 def is_solved_alone(scene: Scene, arrays: Mapping[str, object]) -> bool:
     """Return whether the kernel for bodies side by side refuses the scene.
 
-    Raise InputError if its torque depends on the state, and `arrays` has torques too.
+    Raise InputError if its torque depends on the state, and `arrays` has torques.
     """
     named = [name for name, each in arrays.items() if each is not None]
     if isinstance(scene.torque, StateTorque):
@@ -79,8 +79,8 @@ def solve_one_by_one(
 ) -> Ensemble:  # fmt: skip
     """Return the final states of bodies by prepared solvers; invalid bodies are REFUSED.
 
-    Raise InputError if the torque needs an attitude and there is none, the method can't solve the
-    scene, or a torque in space acts on bodies given by coefficients.
+    Raise InputError if a needed attitude is missing, the method can't solve the scene, or a torque
+    in space acts on bodies given by coefficients.
     """
     by_coefficients = arrays["coefficients"] is not None or scene.coefficients is not None
     if by_coefficients and not isinstance(scene.torque, StateTorque):
@@ -154,9 +154,8 @@ def _lanes(
 ) -> tuple[tuple[Array, Array] | None, str | None]:  # fmt: skip
     """Return packed equations and parameters of bodies, and the text `Ensemble.leaves`.
 
-    `settings` are the tolerance and the factor on the work limit. Both results are None if one
-    kernel call can't solve all bodies. The parameters of an invalid body are NaN, so that the
-    kernel refuses it.
+    Both are None if one kernel call can't solve all bodies. `settings` are the tolerance and the
+    effort. Parameters of an invalid body are NaN, which the kernel refuses.
     """
     names = [name for name in rows if name.startswith(PARAMETER)]
     kind = next((name for name in ("moments", "coefficients") if name in rows), None)
@@ -197,7 +196,7 @@ def prepare_details(
 ) -> Callable[[Ensemble], Ensemble]:  # fmt: skip
     """Check the request; return a function that adds events and sensitivities to a result.
 
-    If `has_rows`, `t_end` are the common times (s) of all bodies. The arrays are copied.
+    If `has_rows`, `t_end` has all bodies' common times (s). The arrays are copied.
     """
     if method not in _METHODS:
         where = "sensitivities" if events is None else "events"
@@ -275,7 +274,7 @@ def solve_with_states(
     scene: Scene, t_end: Any, times: Array | None, arrays: dict[str, Any], states: object, *,
     refused: Mapping[str, object], estimates: bool, threads: int, **settings: Any,
 ) -> Ensemble:  # fmt: skip
-    """Return the states of bodies with unknowns of the user's own, at `t_end` or `times` (s).
+    """Return the states of bodies with the user's own unknowns, at `t_end` or `times` (s).
 
     Each body has one integration for all `times`. `refused` are arguments that must be None.
     """

@@ -63,7 +63,7 @@ def many_starts(
 
 
 def times_within(scene: Scene, times: Array) -> Array:
-    """Return times (s), with NaN, which kernels refuse, beyond a zero of a changing moment."""
+    """Return times (s); beyond a zero of a changing moment they are NaN, which kernels refuse."""
     if scene.changing is None:
         return times
     first, last = scene.changing.span
@@ -74,7 +74,7 @@ def many_states(
     solver: "Solver[Any]", omega: Any, t_end: Any, attitude: Any = None, *, threads: int = 1,
     out: "Ensemble | Array | None" = None,
 ) -> tuple[Array, Array, NDArray[np.int8]]:  # fmt: skip
-    """Return omegas, (n, 3), attitudes, (n, 4), and statuses, as `Solver.many` describes."""
+    """Return omegas, (n, 3), attitudes, (n, 4), and statuses, as in `Solver.many`."""
     usual = solver.scene.attitude or IDENTITY
     given = usual if attitude is None else scalar_first(attitude)
     starts, times = rows_of("omega", omega, 3), rows_of("t_end", t_end)
@@ -104,7 +104,7 @@ def solve_each(
     """Solve the bodies in `piece` side by side or by single calls.
 
     Single calls solve bodies whose error can't be measured side by side. They solve all bodies if
-    the torque is neither recorded nor about the axes of space, or if the inertia matrix is full.
+    the inertia matrix is full, or the torque is neither recorded nor about the axes of space.
     """
     left = list(range(piece.start, piece.stop))
     if solver.packed[Places.METHOD] == Methods.TAPE and solver.scene.inertia is None:
@@ -142,10 +142,10 @@ def solve_lanes(
     packed: Array, parameters: Array, starts: Array, times: Array, turns: Array | None,
     found: Ensemble, piece: slice, given_up: NDArray[np.int32],
 ) -> list[int]:  # fmt: skip
-    """Solve bodies side by side, and return the indices of those that remain unsolved.
+    """Solve bodies side by side into `found`, and return the indices of unsolved ones.
 
-    `packed` has their equations as a tape (recorded operations) with `parameters`, (n, k) or (1,
-    k). `turns` are the initial quaternions, if any. `found` gets the results.
+    `packed` has their equations as recorded operations with `parameters`, (n, k) or (1, k). `turns`
+    are the initial quaternions, if any.
     """
     n = piece.stop - piece.start
     sets = parameters if len(parameters) < 2 else parameters[piece]

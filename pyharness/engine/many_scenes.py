@@ -51,9 +51,9 @@ _SHAPES: dict[str, tuple[int, ...]] = {
 def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Array, Array | None]:
     """Return the arrays of bodies with inertia matrices about principal axes, and these axes.
 
-    The arrays have Euler's coefficients A, B, C, because rounded moments would be less accurate;
-    they are NaN for a matrix that is not symmetric and positive definite. The axes are columns of
-    matrices, (n, 3, 3), and, if there are attitudes, also quaternions, (n, 4).
+    The arrays have coefficients A, B, C, because rounded moments are less accurate; they are NaN
+    for a matrix that is not symmetric and positive definite. The axes are columns of matrices, (n,
+    3, 3), and, with attitudes, also quaternions, (n, 4).
     """
     rows = checked_rows({name: given[name] for name in given if name not in BODIES})
     own = {"inertia": rows_of("inertia", given["inertia"], 3, 3)}
@@ -143,9 +143,9 @@ def keep_with(scene: Scene, key: tuple[Any, ...], make: Callable[[], Any]) -> An
 
 
 def rows_of_scene(scene: Scene) -> dict[str, Any]:
-    """Return the cached arrays of a scene, and its torque with `merged` waves, to be read only.
+    """Return the read-only arrays of a scene, and its torque with `merged` waves.
 
-    Converting again for few bodies would take longer than solving them.
+    Both are cached, because conversion takes longer than solving few bodies.
     """
 
     def convert() -> dict[str, Any]:
@@ -170,7 +170,7 @@ def checked_rows(given: Mapping[str, Any]) -> dict[str, Array]:
 
 
 def check_alike(scenes: Sequence[Scene]) -> None:
-    """Raise InputError if only some scenes have attitudes, or their step sizes differ."""
+    """Raise InputError if only some scenes have attitudes, or step sizes differ."""
     if len({each.step_size for each in scenes}) > 1:
         raise InputError("the scenes have different step sizes; allowed: one step size for all")
     if len({each.attitude is None for each in scenes}) > 1:
@@ -180,7 +180,7 @@ def check_alike(scenes: Sequence[Scene]) -> None:
 
 
 def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
-    """Return the arrays of scenes, or raise InputError if one kernel call can't solve all."""
+    """Return the arrays of scenes; raise InputError if one kernel call can't solve all."""
     if not scenes:
         raise InputError("the sequence of scenes is empty; give at least one scene")
     check_alike(scenes)
@@ -204,7 +204,7 @@ def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
 
 
 def checked_copies(arrays: dict[str, Any], *, as_given: bool = False) -> dict[str, Array]:
-    """Return copies of the arrays, with one row for each body or for all.
+    """Return copies of the arrays, one row per body or for all.
 
     Quaternions are normalised unless `as_given`.
     """
@@ -217,7 +217,7 @@ def checked_copies(arrays: dict[str, Any], *, as_given: bool = False) -> dict[st
 
 
 def scene_of_row(scene: Scene, rows: Mapping[str, Array], i: int) -> Scene:
-    """Return `scene` with the values of row `i` of `rows`; raise InputError if one is invalid."""
+    """Return `scene` with the values of row `i`; raise InputError if one is invalid."""
     own = {name: row_of(each, i) for name, each in rows.items()}
     values = {name: own.pop(name) for name in rows if name.startswith(PARAMETER)}
     torque: dict[str, Any] = {
@@ -245,9 +245,9 @@ def solve_bodies(
     method: str = "auto", is_rounded: bool = False, threads: int, out: "Ensemble | Array | None",
     with_estimates: bool = False,
 ) -> tuple[Ensemble, Array, Array]:  # fmt: skip
-    """Return the final states, and the initial omegas and times, by one call of the kernel.
+    """Return the final states, initial omegas and times, by one kernel call.
 
-    The arrays in `own` replace those of a scene in `ready`; `settings` are the method's code,
+    Arrays in `own` replace those of a scene in `ready`. `settings` are the method's code,
     tolerance, step and effort.
     """
     code, tolerance, step, effort = settings

@@ -24,7 +24,7 @@ _GROUPS = {
         "cards": "show program lines (cards) with their scan, our Fortran and Python, and notes",
         "defects": "list defects and doubtful lines of the programs, and their effects",
         "deck": "write a program of the thesis as a deck of FORTRAN cards",
-        "limits": "show the limits of the original programs as the step size goes to 0",
+        "limits": "show what the original programs converge to as the step size goes to 0",
         "family": "derive and measure convergence orders of weighted residual methods",
         "words": "run the programs in CDC arithmetic and in other word lengths",
     },

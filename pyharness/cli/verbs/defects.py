@@ -14,8 +14,8 @@ OPTIONS = {
     "--all": "List also the entries that change no number (JSON always has all); not with NAME.",
     "--kind K": "List only entries of this kind: defect (fault of the author of the programs), "
     "reading (line that can be read in two ways), conjecture (assumption about a missing line), "
-    "dialect, misreading, missing text, normalization, redundant, unreachable, unread. Not with "
-    "NAME.",
+    "misreading (of the scan), missing text, normalization (of a name), dialect (of the machine's "
+    "FORTRAN), redundant, unread or unreachable (code without effect). Not with NAME.",
     **shared.outputs(FORMATS, plot=""),
 }
 EXAMPLE = "defects stage-base"

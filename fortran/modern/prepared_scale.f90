@@ -12,9 +12,8 @@ module prepared_scale
   ! solution is in range.
   real(dp), parameter :: LARGE = 2.0_dp**300
   integer, parameter :: MOST_POWER = 1000
-  ! Change of omega in the new units that a rate must not cause by underflow. Other torques
-  ! underflow only if the time overflows.
-  real(dp), parameter :: FELT = 1e-12_dp
+  ! Change of omega in the new units that a torque may cause whose numbers underflow.
+  real(dp), parameter :: NEGLIGIBLE = 2.0_dp**(-60)
 
   public :: bring_near_one, is_result, LARGE, scale_back
 
@@ -30,8 +29,7 @@ contains
     real(dp), intent(out) :: copy(0:n_packed - 1), start(3), time !! in the new units
     integer, intent(out) :: power      !! omega is 2**power times its value in the new units
     real(dp) :: reach      ! bound of omega0 and of what the torque adds, rad/s
-    real(dp) :: share      ! part of its amplitude that a wave reaches
-    real(dp) :: lost       ! change of omega by rates that underflow
+    real(dp) :: lost       ! bound of what torques add whose numbers underflow, rad/s
     integer :: code, i
 
     reach = max(abs(omega0(1)), abs(omega0(2)), abs(omega0(3)))
@@ -39,10 +37,7 @@ contains
       reach = max(reach, abs(packed(CONSTANT + i)*t_end), abs(packed(RATE + i)*t_end*t_end))
     end do
     do i = WAVES, WAVES + 4*int(packed(N_SINES) + packed(N_COSINES)) - 4, 4
-      share = 1.0_dp
-      ! A slow sine does not reach its amplitude.
-      if (i < WAVES + 4*int(packed(N_SINES))) share = min(1.0_dp, abs(packed(i + 3)*t_end))
-      reach = max(reach, maxval(abs(packed(i:i + 2)*t_end*share)))
+      reach = max(reach, by_wave(i))
     end do
     power = 0
     if (reach > 0.0_dp .and. reach <= huge(reach)) then
@@ -65,16 +60,48 @@ contains
       if (mod(i - WAVES, 4) /= 3) copy(i) = scale(copy(i), -power)
     end do
     lost = 0.0_dp
-    do i = RATE, RATE + 2
-      lost = lost + abs(scale(packed(i)*t_end*t_end, -power) - copy(i)*time*time)
+    do i = 0, 2
+      if (is_rounded(CONSTANT + i, 2)) lost = max(lost, abs(packed(CONSTANT + i)*t_end))
+      if (is_rounded(RATE + i, 3)) lost = max(lost, abs(packed(RATE + i)*t_end*t_end))
+    end do
+    do i = WAVES, WAVES + 4*int(packed(N_SINES) + packed(N_COSINES)) - 4, 4
+      if (is_rounded(i, 2) .or. is_rounded(i + 1, 2) .or. is_rounded(i + 2, 2) &
+          .or. is_rounded(i + 3, 1)) lost = max(lost, by_wave(i))
     end do
     ! If the time or a torque is out of range then, the time is so short that products do not
     ! matter, or so long that there is no result.
-    if (.not. (lost <= FELT .and. all(abs(copy) <= huge(time)) .and. abs(time) <= huge(time) &
+    if (.not. (scale(lost, -power) <= NEGLIGIBLE &
+               .and. all(abs(copy) <= huge(time)) .and. abs(time) <= huge(time) &
                .and. (abs(time) >= tiny(time) .or. .not. abs(t_end) > 0.0_dp))) power = 0
     do i = 1, 3
       start(i) = scale(omega0(i), -power)
     end do
+
+  contains
+
+    pure real(dp) function by_wave(i)
+      !! Return a bound of the omega (rad/s) that a wave adds.
+      integer, intent(in) :: i
+
+      by_wave = maxval(abs(packed(i:i + 2)*t_end))
+      ! A slow sine does not reach its amplitude.
+      if (i < WAVES + 4*int(packed(N_SINES))) then
+        by_wave = maxval(abs(packed(i:i + 2)*t_end*min(1.0_dp, abs(packed(i + 3)*t_end))))
+      end if
+    end function by_wave
+
+    pure logical function is_rounded(i, n)
+      !! Return whether a number, scaled n times, has lost digits.
+      integer, intent(in) :: i, n
+      real(dp) :: x
+      integer :: k
+
+      x = copy(i)
+      do k = 1, n
+        x = scale(x, power)
+      end do
+      is_rounded = abs(x - packed(i)) > 0.0_dp
+    end function is_rounded
   end subroutine bring_near_one
 
   pure subroutine scale_back(power, omega, status)

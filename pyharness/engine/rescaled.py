@@ -7,7 +7,7 @@ two, so that no number is rounded.
 
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -20,7 +20,9 @@ from pyharness.model.errors import TimedError
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.tape import N_INPUTS, OMEGA, TIME, Linear, Operation, Table, Tape
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Trajectory
+from pyharness.model.values import triple
 
 if TYPE_CHECKING:
     from pyharness.engine.registry import Method
@@ -31,7 +33,8 @@ _MULTIPLE = 16
 _SAMPLES = 9  # times at which a torque that depends on the state is evaluated
 # Omega (rad/s) up to which, and above whose inverse, products of components keep their digits.
 _LARGE = 2.0**300
-_FELT = 1e-12  # change of omega, relative to its size, that a torque must not cause by underflow
+# Relative change of omega that a torque may cause whose numbers underflow in rescaled time.
+_NEGLIGIBLE = 2.0**-60
 
 
 def scaled(scene: Scene, factor: float) -> Scene:
@@ -102,8 +105,8 @@ def rescaling_factor(scene: Scene, time: float) -> float:
     if is_ordinary(scene.omega):
         return 1.0
     torque = scene.torque if isinstance(scene.torque, StateTorque) else None
-    by_torque = (omega_by_torque if torque is None else _omega_by_state_torque)(scene, time)
-    largest = max(max(map(abs, scene.omega)), by_torque)
+    by_torque = omega_by_torque if torque is None else _omega_by_state_torque
+    largest = max(max(map(abs, scene.omega)), by_torque(scene, time))
     if not (0.0 < largest < math.inf) or 1.0 / _LARGE <= largest <= _LARGE:
         return 1.0
     # With a larger exponent the factor would overflow or underflow.
@@ -123,10 +126,32 @@ def rescaling_factor(scene: Scene, time: float) -> float:
     is_short = shortest < sys.float_info.min or 0.0 < sizes[0] < sys.float_info.min
     fits = all(map(math.isfinite, sizes)) and not is_short
     if fits and torque is None:
-        # A torque that underflows must not be felt.
-        kept = omega_by_torque(scaled(scene, factor), time / factor)
-        fits = abs(kept - by_torque * factor) <= _FELT
+        lost = replace(scene, torque=_underflowing(scene.law, factor))
+        fits = omega_by_torque(lost, time) * factor <= _NEGLIGIBLE
     return factor if fits and (torque is None or _tape(torque, factor) is not None) else 1.0
+
+
+def _underflowing(law: TorqueLaw, factor: float) -> TorqueLaw:
+    """Return the terms of a law whose numbers are rounded in rescaled time."""
+
+    def is_rounded(x: float, power: int) -> bool:
+        found = x
+        for _ in range(power):
+            found *= factor
+        for _ in range(power):
+            found /= factor
+        return found != x
+
+    def rounded(vector: Triple, power: int) -> Triple:
+        return triple(x if is_rounded(x, power) else 0.0 for x in vector)
+
+    def waves(given: Iterable[tuple[Triple, float]]) -> tuple[tuple[Triple, float], ...]:
+        return tuple((a if is_rounded(f, 1) else rounded(a, 2), f) for a, f in given)
+
+    return replace(
+        law, constant=rounded(law.constant, 2), rate=rounded(law.rate, 3),
+        sines=waves(law.sines), cosines=waves(law.cosines),
+    )  # fmt: skip
 
 
 def omega_by_torque(scene: Scene, time: float) -> float:

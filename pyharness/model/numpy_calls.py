@@ -62,14 +62,15 @@ class _Replaced:
         update_wrapper(self, original)
 
     def __call__(self, *given: Any, **named: Any) -> Any:
-        if getattr(_here, "targets", None) is None or not any(map(_has_symbol, given)):
+        every = (*given, *named.values())
+        if getattr(_here, "targets", None) is None or not any(map(_has_symbol, every)):
             return self._original(*given, **named)
-        _refuse_out(given, named)
+        _refuse_out(every, named)
         try:
             return self._function(*given, **named)
         except TypeError as error:
             what = f"{getattr(self._original, '__name__', 'a function')} with these arguments"
-            raise _symbol_in(given).recorder.refusal(what) from error
+            raise _symbol_in(every).recorder.refusal(what) from error
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._original, name)
@@ -176,11 +177,20 @@ def _clip(x: Any, a_min: Any = None, a_max: Any = None, **named: Any) -> Any:
     return _by_element(_limited, 3)(x, low, high)
 
 
-def _selected(conditions: Any, choices: Any, default: Any = 0) -> Any:
+def _selected(condlist: Any, choicelist: Any, default: Any = 0) -> Any:
     found = default
-    for condition, choice in zip(reversed(conditions), reversed(choices), strict=True):
+    for condition, choice in zip(reversed(condlist), reversed(choicelist), strict=True):
         found = _CHOICES["where"](condition, choice, found)
     return found
+
+
+def _with_sign(x: Any, y: Any) -> Any:
+    return select(y < 0.0, -abs(x), abs(x)) if isinstance(y, Symbol) else abs(x) * np.copysign(1, y)
+
+
+def _remainder(x: Any, y: Any) -> Any:
+    is_number = not (isinstance(x, Symbol) or isinstance(y, Symbol))
+    return math.fmod(x, y) if is_number else x - y * (x / y).trunc()
 
 
 def _arctan2(y: Any, x: Any) -> Any:
@@ -236,12 +246,12 @@ def _norm(x: Any, ord: Any = None, axis: Any = None, keepdims: bool = False) -> 
     return np.sum(array * array, axis=axis, keepdims=keepdims) ** 0.5
 
 
-def _solve(matrix: Any, right: Any) -> Any:
-    return _inverse(matrix) @ np.asarray(right, dtype=object)
+def _solve(a: Any, b: Any) -> Any:
+    return _inverse(a) @ np.asarray(b, dtype=object)
 
 
-def _inverse(matrix: Any) -> Any:
-    array = np.asarray(matrix)
+def _inverse(a: Any) -> Any:
+    array = np.asarray(a)
     if not _has_symbol(array):
         return np.linalg.inv(array.astype(float))
     _check_small(array, "inverse")
@@ -252,8 +262,8 @@ def _inverse(matrix: Any) -> Any:
     return cofactors.T / (array[0] @ cofactors[0])
 
 
-def _determinant_of(matrix: Any) -> Any:
-    array = np.asarray(matrix)
+def _determinant_of(a: Any) -> Any:
+    array = np.asarray(a)
     _check_small(array, "determinant")
     if len(array) == 3:
         return array[0] @ np.cross(array[1], array[2])
@@ -343,8 +353,7 @@ _CHOICES: dict[str, Callable[..., Any]] = {
     "amin": _extreme(_smallest), "interp": _interp, "arctan2": _by_element(_arctan2, 2),
     "hypot": _by_element(lambda x, y: (x * x + y * y) ** 0.5, 2),
     "sign": _of_symbol("sign", np.sign), "fabs": _by_element(abs, 1),
-    "copysign": _by_element(lambda x, y: select(y < 0.0, -abs(x), abs(x)), 2),
-    "fmod": _by_element(lambda x, y: x - y * (x / y).trunc(), 2),
+    "copysign": _by_element(_with_sign, 2), "fmod": _by_element(_remainder, 2),
     "logical_and": _by_element(operator.and_, 2), "logical_or": _by_element(operator.or_, 2),
     "logical_not": _by_element(negated, 1),
 }  # fmt: skip

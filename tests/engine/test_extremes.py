@@ -117,16 +117,41 @@ def test_scipy_gives_up_by_what_it_costs(monkeypatch: pytest.MonkeyPatch) -> Non
             solve(scene, [0.7], method, 1e-9)
 
 
-@pytest.mark.parametrize("constant", [REST, (5e163, 2e163, 0.0)])
-def test_a_torque_that_underflows_in_other_units_is_not_ignored(constant: Any) -> None:
-    """Regression test: the body stayed at rest, as the rate times a factor cubed became 0."""
-    law = TorqueLaw(constant, rate=(1e244, -2e244, 0.0))
+RATE = (1e244, -2e244, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("law", "time"),
+    [
+        (TorqueLaw(rate=RATE), 7.0), (TorqueLaw((5e163, 2e163, 0.0), RATE), 7.0),
+        (TorqueLaw(sines=[((1e150, 0.0, 0.0), 1e-220)]), 1e90),
+    ],
+)  # fmt: skip
+def test_a_torque_that_underflows_in_other_units_is_not_ignored(
+    law: TorqueLaw, time: float
+) -> None:
+    """Regression test: the body stayed at rest, as a number of the torque became 0."""
     scene = Scene("", REST, (4.0, 3.0, 2.0), torque=law)
     with pytest.raises(InputError, match="work limit"):
-        solve(scene, [7.0])
+        solve(scene, [time])
     solver = prepare(scene)
-    assert np.isnan(solver(REST, 7.0)).all()
+    assert np.isnan(solver(REST, time)).all()
     assert solver.status != "complete"
-    found = solve_many([scene], 7.0)
+    found = solve_many([scene], time)
     assert np.isnan(found.omega).all()
     assert not found.has_result.any()
+
+
+@pytest.mark.parametrize("method", ["auto", "dop853"])
+def test_a_rate_about_one_axis_does_not_underflow_beside_another_torque(method: str) -> None:
+    law = TorqueLaw((1e200, 0.0, 0.0), rate=(0.0, 1e200, 0.0))
+    scene = Scene("", REST, (2.0, 2.0, 2.0), torque=law)
+    found = solve(scene, [1.0], method)
+    assert found.omega[0] == pytest.approx([5e199, 2.5e199, 0.0], rel=1e-9)
+
+
+def test_subnormal_rates_are_scaled_exactly() -> None:
+    omega = (1e-160, 2e-160, 3e-160)
+    scene = Scene("", omega, (2.0, 3.0, 4.0), torque=TorqueLaw(rate=(1.1e-315, 0.0, 0.0)))
+    wanted = 1e-160 + 0.25 * 1.1e-315 * 3e77 * 3e77
+    assert solve(scene, [3e77]).omega[0, 0] == pytest.approx(wanted, rel=1e-9)

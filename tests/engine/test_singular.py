@@ -26,7 +26,7 @@ UNDEFINED = {
     "arccosine": (lambda t, w: [0.1 * np.arccos(np.cos(t)), 0.0, 0.0], "t = 0 s: the arcsine", 0),
     "logarithm of a root": (
         lambda t, w: [np.log(np.sqrt(0.5 - t)), 0.0, 0.0],
-        "t = 0.5 s: the ",
+        "t = 0.5 s: the square root",
         1,
     ),
     "sign": (lambda t, w: [-w[0] / np.sqrt(w[0] ** 2), 0.0, 0.0], "s: the square root", 0),

@@ -298,6 +298,8 @@ CASES: list[Torque] = [
     lambda t, w: [np.deg2rad(w[0]), np.degrees(w[1]), np.fmod(-w[2], 0.07)],
     lambda t, w: [math.radians(w[0]), math.copysign(w[1], -w[2]), np.copysign(0.3, w[0])],
     lambda t, w: np.select([w > 0.5, w > 0.2], [w, t * w], -1.0),
+    lambda t, w: np.select(condlist=[w > 0.4], choicelist=[w]) + np.fmod([w[0], 1.0, -2.0], 0.3),
+    lambda t, w: np.copysign(w, [-0.0, 2.0, w[0]]) + np.linalg.det(a=np.diag(w)),
     lambda t, w: np.linalg.det(np.array([[w[0], t], [w[1], w[2]]])) * np.rad2deg(w),
 ]  # fmt: skip
 

@@ -341,11 +341,12 @@ class Symbol:
 
     def arctan2(self, x: Any) -> "Symbol":
         """Return the angle (rad) of the point (x, self), -pi to pi; undefined at the origin."""
-        is_right = x > 0.0
+        # Integrations begin with conditions that do not hold.
+        is_left = x < 0.0
         # Half the angle to the x axis, because a quotient by x would not be defined where x is 0.
-        half = self / ((self * self + x * x).sqrt() + select(is_right, x, -x))
+        half = self / ((self * self + x * x).sqrt() + select(is_left, -x, x))
         angle = 2.0 * half.arctan()
-        found: Symbol = select(is_right, angle, select(self < 0.0, -math.pi, math.pi) - angle)
+        found: Symbol = select(is_left, select(self < 0.0, -math.pi, math.pi) - angle, angle)
         return found
 
     def switch(self) -> "Condition | bool":

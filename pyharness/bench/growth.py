@@ -25,7 +25,7 @@ class Growth:
 
     time: float  # s
     # Relative to the largest omega: `error` is the largest difference from the closed form, for
-    # `_STARTS` initial states of the same motion; `conditioning` is the change of omega in a
+    # `_STARTS` initial states on one trajectory; `conditioning` is the change of omega in a
     # rounding error of the time.
     error: float
     conditioning: float

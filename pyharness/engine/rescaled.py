@@ -7,7 +7,7 @@ two, so that no number is rounded.
 
 import math
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -20,7 +20,7 @@ from pyharness.model.errors import TimedError
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.tape import N_INPUTS, OMEGA, TIME, Linear, Operation, Table, Tape
-from pyharness.model.torque_law import TorqueLaw
+from pyharness.model.torque_law import TorqueLaw, Wave
 from pyharness.model.trajectory import Trajectory
 from pyharness.model.values import triple
 
@@ -42,29 +42,30 @@ def scaled(scene: Scene, factor: float) -> Scene:
 
     Raise InputError if the torque can't be rescaled, or the inertia changes with time.
     """
-
-    def times(values: Triple, power: int) -> Triple:
-        # The square of the factor may overflow.
-        for _ in range(power):
-            first, second, third = values
-            values = first * factor, second * factor, third * factor
-        return values
-
     torque = scene.torque
     tape = _tape(torque, factor) if isinstance(torque, StateTorque) else None
     if tape is not None and scene.changing is None:
         torque = StateTorque(tape, None, torque.needs_attitude)
     else:
-        law = scene.law
-        torque = replace(
-            law,
-            constant=times(law.constant, 2),
-            rate=times(law.rate, 3),
-            sines=tuple((times(a, 2), f * factor) for a, f in law.sines),
-            cosines=tuple((times(a, 2), f * factor) for a, f in law.cosines),
-        )
+        torque = _scaled_law(scene.law, factor)
     step_size = scene.step_size / factor
-    return replace(scene, omega=times(scene.omega, 1), torque=torque, step_size=step_size)
+    return replace(scene, omega=_times(scene.omega, factor, 1), torque=torque, step_size=step_size)
+
+
+def _scaled_law(law: TorqueLaw, factor: float) -> TorqueLaw:
+    return replace(
+        law, constant=_times(law.constant, factor, 2), rate=_times(law.rate, factor, 3),
+        sines=tuple((_times(a, factor, 2), f * factor) for a, f in law.sines),
+        cosines=tuple((_times(a, factor, 2), f * factor) for a, f in law.cosines),
+    )  # fmt: skip
+
+
+def _times(values: Triple, factor: float, power: int) -> Triple:
+    # The square of the factor may overflow.
+    for _ in range(power):
+        first, second, third = values
+        values = first * factor, second * factor, third * factor
+    return values
 
 
 def is_ordinary(omega: Triple) -> bool:
@@ -133,24 +134,18 @@ def rescaling_factor(scene: Scene, time: float) -> float:
 
 def _underflowing(law: TorqueLaw, factor: float) -> TorqueLaw:
     """Return the terms of a law whose numbers are rounded in rescaled time."""
+    back = _scaled_law(_scaled_law(law, factor), 1.0 / factor)
 
-    def is_rounded(x: float, power: int) -> bool:
-        found = x
-        for _ in range(power):
-            found *= factor
-        for _ in range(power):
-            found /= factor
-        return found != x
+    def rounded(given: Triple, found: Triple) -> Triple:
+        return triple(x if x != y else 0.0 for x, y in zip(given, found, strict=True))
 
-    def rounded(vector: Triple, power: int) -> Triple:
-        return triple(x if is_rounded(x, power) else 0.0 for x in vector)
-
-    def waves(given: Iterable[tuple[Triple, float]]) -> tuple[tuple[Triple, float], ...]:
-        return tuple((a if is_rounded(f, 1) else rounded(a, 2), f) for a, f in given)
+    def waves(given: tuple[Wave, ...], found: tuple[Wave, ...]) -> tuple[Wave, ...]:
+        pairs = zip(given, found, strict=True)
+        return tuple((a if f != g else rounded(a, b), f) for (a, f), (b, g) in pairs)
 
     return replace(
-        law, constant=rounded(law.constant, 2), rate=rounded(law.rate, 3),
-        sines=waves(law.sines), cosines=waves(law.cosines),
+        law, constant=rounded(law.constant, back.constant), rate=rounded(law.rate, back.rate),
+        sines=waves(law.sines, back.sines), cosines=waves(law.cosines, back.cosines),
     )  # fmt: skip
 
 

@@ -265,8 +265,6 @@ def _inverse(a: Any) -> Any:
 def _determinant_of(a: Any) -> Any:
     array = np.asarray(a)
     _check_small(array, "determinant")
-    if len(array) == 3:
-        return array[0] @ np.cross(array[1], array[2])
     return _determinant(array)
 
 
@@ -282,6 +280,8 @@ def _determinant(matrix: Any) -> Any:
         return 1.0
     if len(matrix) == 1:
         return matrix[0, 0]
+    if len(matrix) == 3:
+        return matrix[0] @ np.cross(matrix[1], matrix[2])
     return matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0]
 
 

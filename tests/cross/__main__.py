@@ -79,6 +79,8 @@ CHECKED = (
     "-fcheck=all,no-recursion,no-array-temps", "-finit-real=snan", "-fsignaling-nans",
     "-finit-integer=-2147483647", "-finit-logical=true", "-finit-derived",
 )  # fmt: skip
+# The tests outside the cross-check use the best instruction set of the machine.
+TRAPS = {"PYHARNESS_TRAPS": "1", "PYHARNESS_INSTRUCTIONS": "avx2"}
 ORIGINAL = "fortran/original/"
 # Faults that need not change bits: program, (file, passage, faulty passage), expected message.
 FAULTS = {
@@ -244,7 +246,7 @@ def _suite(build: Build, tree: Path) -> Check:
     done = _run(tree, ["-m", *arguments], traps=build.checked)
     log = FOLDER / f"{name}.log"
     log.write_text(done.stdout)
-    traps = "PYHARNESS_TRAPS=1 PYHARNESS_INSTRUCTIONS=avx2 " if build.checked else ""
+    traps = "".join(f"{key}={x} " for key, x in TRAPS.items()) if build.checked else ""
     replay = inside(name, shlex.join(arguments), traps)
     note = ""
     if done.returncode:
@@ -272,10 +274,7 @@ def _faults(tree: Path) -> Iterator[Check]:
 
 def _run(tree: Path, arguments: list[str], traps: bool = False) -> subprocess.CompletedProcess[str]:
     # Tests start processes in other folders, and these must find the tree of the build.
-    variables = {"PYTHONPATH": str(tree)}
-    if traps:
-        # The tests outside the cross-check use the best instruction set of the machine.
-        variables |= {"PYHARNESS_TRAPS": "1", "PYHARNESS_INSTRUCTIONS": "avx2"}
+    variables = {"PYTHONPATH": str(tree)} | (TRAPS if traps else {})
     return subprocess.run(
         [str(FOLDER / "environment" / "bin" / "python"), *arguments], cwd=tree, check=False,
         env=os.environ | variables, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,

@@ -309,3 +309,21 @@ subroutine solve_packed_attitude(packed, n_packed, start, t_end, state, status, 
 
   call solve_prepared_attitude(packed, n_packed, start, t_end, state, status, steps, found)
 end subroutine solve_packed_attitude
+
+subroutine states_at(n_pieces, edges, n_points, points, m, values, n, times, states)
+  ! Evaluate polynomials through Chebyshev points, one between each two edges.
+  !f2py threadsafe
+  use levels, only: read_pieces
+  implicit none
+  integer(4), intent(in) :: n_pieces
+  real(8), intent(in) :: edges(n_pieces + 1)  ! ascending, s
+  integer(4), intent(in) :: n_points          ! AT_ONCE + 1
+  real(8), intent(in) :: points(n_points)     ! ascending, from -1 to 1
+  integer(4), intent(in) :: m                 ! components
+  real(8), intent(in) :: values(m, n_points, n_pieces)
+  integer(4), intent(in) :: n
+  real(8), intent(in) :: times(n)             ! s
+  real(8), intent(out) :: states(m, n)
+
+  call read_pieces(n_pieces, edges, points, m, values, n, times, states)
+end subroutine states_at

@@ -14,6 +14,8 @@ typedef void series_solver(const void *bodies, int n, double *omega, int8_t *sta
 typedef void fixed_solver(const void *bodies, int method, int n, double *omega, int8_t *status,
                           int *interrupted);
 typedef void runner(void *ensemble);
+typedef void reader(int pieces, const double *edges, const double *points, int m, const double *values,
+                    int n, const double *times, double *states);
 
 #define DECLARED(level)                                                                        \
   solver taylor_solve_##level;                                                                 \
@@ -25,12 +27,13 @@ typedef void runner(void *ensemble);
   runner solve_tape_bodies_##level;                                                            \
   solver solve_tape_##level;                                                                   \
   solver step_tape_##level;                                                                    \
-  solver vary_solution_##level;
+  solver vary_solution_##level;                                                                \
+  reader read_pieces_##level;
 #define TAKEN(level, width)                                                                    \
   {taylor_solve_##level,       quick_solve_##level,      solve_many_free_##level,              \
    solve_many_taylor_##level,  solve_many_fixed_##level, run_lanes_##level,                    \
    solve_tape_##level,         step_tape_##level,        vary_solution_##level,                \
-   solve_tape_bodies_##level,  ready_leaves_##level,      width}
+   solve_tape_bodies_##level,  read_pieces_##level,      ready_leaves_##level,  width}
 
 DECLARED(plain)
 #ifdef WITH_LEVELS
@@ -54,6 +57,7 @@ static struct {
   solver *step;
   solver *vary;
   runner *bodies;
+  reader *pieces;
   const struct leaves *leaves; /* of ready torques, in the order of ready_keys */
   int width;                   /* numbers in a register */
 } chosen, known[] = {
@@ -132,6 +136,12 @@ void tape_variation(const void *tape, const void *request, void *variation)
 }
 
 void tape_bodies(void *bodies) { chosen.bodies(bodies); }
+
+void read_pieces(int pieces, const double *edges, const double *points, int m, const double *values,
+                 int n, const double *times, double *states)
+{
+  chosen.pieces(pieces, edges, points, m, values, n, times, states);
+}
 
 enum { LEAST_ADDRESS = 4096 };
 

@@ -3,11 +3,12 @@ module levels
   !! the address of an argument of a derived type, such as problem_t, and does not read it.
   use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t, c_ptr
   use bodies, only: i1
+  use storage, only: AT_ONCE
   implicit none(type, external)
   private
 
   public :: choose_level, fits_lanes, many_fixed, many_free, many_taylor, quick_solve, &
-            ready_leaves, run_lanes, tape_bodies, tape_solve, tape_step, tape_variation, &
+            read_pieces, ready_leaves, run_lanes, tape_bodies, tape_solve, tape_step, tape_variation, &
             taylor_solve
 
   interface
@@ -103,6 +104,16 @@ module levels
       implicit none(type, external)
       type(*), intent(in) :: ensemble
     end subroutine run_lanes
+
+    subroutine read_pieces(pieces, edges, points, m, values, n, times, states) &
+      bind(c, name="read_pieces")
+      import :: AT_ONCE, c_double, c_int
+      implicit none(type, external)
+      integer(c_int), intent(in), value :: pieces, m, n
+      real(c_double), intent(in) :: edges(pieces + 1), points(AT_ONCE + 1), times(n)
+      real(c_double), intent(in) :: values(m, AT_ONCE + 1, pieces)
+      real(c_double), intent(out) :: states(m, n)
+    end subroutine read_pieces
   end interface
 
 end module levels

@@ -6,7 +6,7 @@ kink or a jump, not by decay.
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -38,8 +38,12 @@ ROUNDING = 2.0**-50  # relative rounding error of the arguments of a function
 # Largest relative error of the state in noise; see `Solution.state_error`.
 _COARSEST = 1e-10
 _SOME = slice(5, None, 11)  # three nodes at which noise is computed
-# Matrix from values at the nodes of the solution's polynomials to values at POINTS.
-_REFINED = Pieces(np.array([-1.0, 1.0]), np.eye(dense_output.NODES)[None])(POINTS)
+
+
+@cache
+def _refining() -> Array:
+    """Return the matrix from values at the nodes of the solution's polynomials to those at POINTS."""
+    return Pieces(np.array([-1.0, 1.0]), np.eye(dense_output.NODES)[None])(POINTS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +66,7 @@ class Solution:
     def at_nodes(self) -> tuple[Array, Array]:
         """The times (s) and states at each polynomial's nodes."""
         times = nodes(self.pieces.edges[:-1], self.pieces.edges[1:], POINTS)
-        return times, self.sol.normalized(_REFINED @ self.pieces.values)
+        return times, self.sol.normalized(_refining() @ self.pieces.values)
 
     @cached_property
     def at_ends(self) -> tuple[Array, Array]:

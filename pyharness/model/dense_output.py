@@ -15,6 +15,7 @@ from pyharness.model.array_type import Array
 from pyharness.model.arrays import numbers_of
 from pyharness.model.codes import Storage
 from pyharness.model.errors import InputError
+from pyharness.model.extension import extension
 
 
 def points(count: int) -> Array:
@@ -46,11 +47,7 @@ def nodes(low: Array, high: Array, at: Array) -> Array:
 NODES = Storage.AT_ONCE + 1  # of a polynomial
 POINTS = points(NODES)
 TO_COEFFICIENTS = to_coefficients(NODES)
-_BLOCK = 4_000  # times that are evaluated together; limits the memory
 _ROUNDED = 4.0  # units in the last place by which a time such as n*dt may exceed an end
-# Weights of the barycentric formula.
-_WEIGHTS: Array = np.where(np.arange(NODES) % 2, -1.0, 1.0)[:, None]
-_WEIGHTS[[0, -1]] /= 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,32 +62,8 @@ class Pieces:
 
     def __call__(self, times: Array) -> Array:
         """Return the values at `times` (s), shape (n, m)."""
-        begins = range(0, len(times) or 1, _BLOCK)
-        return np.concatenate([self._evaluate(times[k : k + _BLOCK]) for k in begins])
-
-    @cached_property
-    def _by_node(self) -> Array:
-        """The values, (m, NODES, p), which are faster to sum."""
-        return np.ascontiguousarray(self.values.transpose(2, 1, 0))
-
-    def _evaluate(self, times: Array) -> Array:
-        if len(times) == 1:
-            # NumPy adds the terms of a single sum in another order than those of several.
-            return self._evaluate(np.repeat(times, 2))[:1]
-        piece = self.numbers(times)
-        low, high = self.edges[piece], self.edges[piece + 1]
-        apart = ((times - low) - (high - times)) / (high - low) - POINTS[:, None]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            weights = _WEIGHTS / apart
-            total = weights.sum(axis=0)
-            found: Array = np.einsum("jn,mjn->mn", weights, self._by_node[:, :, piece])
-            found /= total
-        # The formula fails at the nodes, where the values are known.
-        at_node = np.isinf(total)
-        if at_node.any():
-            node = np.isinf(weights[:, at_node]).argmax(axis=0)
-            found[:, at_node] = self._by_node[:, node, piece[at_node]]
-        return found.T
+        found: Array = extension().states_at(self.edges, POINTS, self.values.T, times).T
+        return found
 
     def numbers(self, times: Array) -> NDArray[np.intp]:
         """Return the index of each time's interval."""

@@ -225,7 +225,15 @@ contains
       do level = LOWER, UPPER
         if (switches%on_level(i) /= 0 .or. .not. has_level(i, level)) cycle
         terms = terms_from(i, level, switches, s)
-        if (terms(0) == 0.0_dp .or. ((terms(0) > 0.0_dp) .eqv. (level == LOWER))) cycle
+        if (terms(0) == 0.0_dp) then
+          ! The change of another switch moved the operand to the level.
+          before = s%a(0, switches%slots(i))
+          call begin_switches(i, 0.0_dp, switches, s)
+          if (s%a(0, switches%slots(i)) == before) exit
+          verdict = IS_CHANGED
+          return
+        end if
+        if ((terms(0) > 0.0_dp) .eqv. (level == LOWER)) cycle
         if (is_far(i, terms)) then
           ! The operand depends on another switch.
           call begin_switches(i, nearness(i, factor, switches, s), switches, s)

@@ -34,6 +34,8 @@ _MOST_DIVISIONS = 44  # halvings of an interval after which a function counts as
 _SUDDEN, _BEFORE = 1e3, 0.01
 _MOST_PIECES = 100_000  # intervals that are divided at the same time
 _SHIFT = 2.0**-26  # relative change of an argument for a numerical derivative
+# The same near a jump, whose part of the derivative is then smaller.
+_LONG_SHIFT = 2.0**-13
 ROUNDING = 2.0**-50  # relative rounding error of the arguments of a function
 # Largest relative error of the state in noise; see `Solution.state_error`.
 _COARSEST = 1e-10
@@ -87,12 +89,12 @@ class Solution:
         """Return an event function's values for states of `sol` instead of `pieces`."""
         return self.values(g, times, self.sol.normalized(self.sol.states(times)))
 
-    def noise(self, g: EventFunction, times: Array) -> Array:
+    def noise(self, g: EventFunction, times: Array, shift: float = _SHIFT) -> Array:
         """Return a function's errors due to errors of time, state and rates."""
-        return self.values_and_noise(g, times)[1]
+        return self.values_and_noise(g, times, None, shift)[1]
 
     def values_and_noise(
-        self, g: EventFunction, times: Array, states: Array | None = None
+        self, g: EventFunction, times: Array, states: Array | None = None, shift: float = _SHIFT
     ) -> tuple[Array, Array, Array]:
         """Return a function's values, their errors (noise), and the part due to rounding."""
         states = self.states(times) if states is None else states
@@ -101,20 +103,20 @@ class Solution:
         # with each component or rate changed.
         count = width + (5 if g.event.needs_rates else 2)
         every = np.full((count, n), times)
-        every[0] += _SHIFT * np.abs(times)
+        every[0] += shift * np.abs(times)
         sizes = self._sizes[self.pieces.numbers(times)]
-        moved = states + np.eye(count, width, -2)[:, None] * (_SHIFT * sizes)
+        moved = states + np.eye(count, width, -2)[:, None] * (shift * sizes)
         rates = None
         if g.event.needs_rates:
             moved[width + 2 :] = states
             rates = self.sol.rates(np.tile(times, count), moved.reshape(-1, width))
             rates = rates[:, :3].reshape(count, n, 3)
             largest = np.abs(rates[1]).max(axis=1, keepdims=True)
-            rates[-3:] += np.eye(3)[:, None] * (_SHIFT * largest)
+            rates[-3:] += np.eye(3)[:, None] * (shift * largest)
             rates = rates.reshape(-1, 3)
         found = g(every.ravel(), moved.reshape(-1, width), rates).reshape(-1, n)
-        errors = np.full((2, count), ROUNDING / _SHIFT)
-        errors[0, 2 : width + 2] = self.state_error / _SHIFT
+        errors = np.full((2, count), ROUNDING / shift)
+        errors[0, 2 : width + 2] = self.state_error / shift
         return found[1], *(errors @ np.abs(found - found[1]))
 
     @property
@@ -185,10 +187,20 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
     return done[0] if len(done) == 1 else together(done, "low"), together(rough, "time")
 
 
-def _noise_of(g: EventFunction, solution: Solution, low: Array, high: Array) -> Array:
+def _noise_of(
+    g: EventFunction, solution: Solution, low: Array, high: Array, shift: float = _SHIFT
+) -> Array:
     times = nodes(low, high, POINTS)[:, _SOME]
-    noise = solution.noise(g, times.ravel()).reshape(times.shape)
+    noise = solution.noise(g, times.ravel(), shift).reshape(times.shape)
     return np.asarray(noise.max(axis=1))
+
+
+def _without_jumps(g: EventFunction, solution: Solution, fits: Fits, which: Index) -> None:
+    """Reduce noise that exceeds a polynomial because of a jump beside it."""
+    near = which[fits.sizes[which] <= 4.0 * fits.noise[which]]
+    if near.size:
+        noise = _noise_of(g, solution, fits.low[near], fits.high[near], _LONG_SHIFT)
+        fits.noise[near] = np.minimum(fits.noise[near], noise)
 
 
 def with_noise(
@@ -210,6 +222,7 @@ def with_noise(
         g, np.concatenate([times.ravel(), ends]), np.concatenate([inner, states])
     )
     fits.noise[which] = noise[:n].reshape(times.shape).max(axis=1)
+    _without_jumps(g, solution, fits, which)
     # At an end, a value that exceeds its rounding error is no root.
     is_root = np.abs(values[n:]) <= 4.0 * rounding[n:]
     return fits, Roots.bare(ends[is_root], 0, 4.0 * rounding[n:][is_root])
@@ -291,6 +304,7 @@ def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroInte
     unknown = near[fits.noise[near] == 0.0]
     if unknown.size:
         fits.noise[unknown] = _noise_of(g, solution, fits.low[unknown], fits.high[unknown])
+        _without_jumps(g, solution, fits, unknown)
     noise = 2.0 * fits.noise
     zero = near[sizes[near] <= noise[near]]
     if not zero.size:

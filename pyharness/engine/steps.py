@@ -10,7 +10,7 @@ from pyharness.engine.recorded import outputs_at, slopes_of, system_of
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import product, quaternion_of_axes, quaternion_rates
 from pyharness.model.constant_body import with_constant_body
-from pyharness.model.dense_output import POINTS, DenseOutput, Pieces
+from pyharness.model.dense_output import POINTS, DenseOutput, Pieces, nodes
 from pyharness.model.principal import principal
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import of_law
@@ -57,6 +57,17 @@ def steps_output(scene: Scene, pieces: Pieces) -> DenseOutput:
     """Return the dense output of a scene from polynomials."""
     low, high = pieces.edges[[0, -1]].tolist()
     return DenseOutput(low, high, pieces, partial(rates, scene), len(scene.states))
+
+
+def up_to(pieces: Pieces, last: float) -> Pieces:
+    """Return the polynomials between time 0 and `last` (s), which is not 0."""
+    low, high = sorted((0.0, last))
+    kept = (pieces.edges[1:] > low) & (pieces.edges[:-1] < high)
+    edges = np.clip(pieces.edges[np.append(kept, False) | np.append(False, kept)], low, high)
+    values = pieces.values[kept]
+    cut = 0 if last < 0.0 else len(values) - 1
+    values[cut] = pieces(nodes(edges[cut : cut + 1], edges[cut + 1 : cut + 2], POINTS)[0])
+    return Pieces(edges, values)
 
 
 def transformed_steps(

@@ -7,7 +7,7 @@ import numpy as np
 
 from pyharness.engine.problem import normalized, trajectory_of
 from pyharness.engine.recorded import kernel_tape, system_of
-from pyharness.engine.steps import MOST_STEPS, STEP_NODES, steps_output
+from pyharness.engine.steps import MOST_STEPS, STEP_NODES, steps_output, up_to
 from pyharness.engine.switch_text import reason_of
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.constant_body import with_constant_body
@@ -30,7 +30,7 @@ def taylor(
     """Return the trajectory of a scene at `times` (s) by Taylor series.
 
     The integration is repeated if inaccurate; `evaluations` counts all series. With `with_steps`,
-    `sol` has the steps, unless rows are missing or there are over 20 000 steps. Raise InputError
+    `sol` has the steps up to the last row, unless there are over 20 000 steps. Raise InputError
     for an opaque torque, and if the work limit is exceeded.
     """
     # The kernel reads the initial attitude in the first column, and writes a column for each time.
@@ -73,13 +73,18 @@ def taylor(
         more["own"] = own[:n_own, 1 : 1 + n_rows].T
     if is_tape and ended in ("sliding", "sensitive"):
         more["reason"] = reason_of(ended, work[1], int(work[5]))
-    if 0 < kept <= most and ended in WITH_ALL_ROWS:
+    if 0 < kept <= most and n_rows and abs(ends[kept]) >= abs(times[n_rows - 1]):
         edges, values = ends[: kept + 1].copy(), at_nodes[:, :, :kept].T
         # A few steps must not hold the memory of many.
         values = values.copy() if kept < most // 16 else values
         if times[-1] < 0.0:
             edges, values = edges[::-1], values[::-1, ::-1]
-        more["sol"] = steps_output(scene, Pieces(edges, values))
+        pieces = Pieces(edges, values)
+        if ended not in WITH_ALL_ROWS:
+            pieces = up_to(pieces, times[n_rows - 1])
+        # The step in which a motion overflows has no polynomial.
+        if ended in WITH_ALL_ROWS or np.isfinite(pieces.values).all():
+            more["sol"] = steps_output(scene, pieces)
     return trajectory_of(
         times, rows, n_rows, status, steps, int(work[4]), work[2], work[3], attitudes, **more
     )

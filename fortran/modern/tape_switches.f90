@@ -242,6 +242,10 @@ contains
         end if
         switches%on_level(i) = level
       end do
+    end do
+    ! All results fit the others now, so that the derivatives of operands are known.
+    do i = 1, switches%n
+      if (.not. switches%is_live(i)) cycle
       if (switches%on_level(i) /= 0) then
         if (.not. leaves(i)) then
           call turn_back(i, switches, s, verdict)

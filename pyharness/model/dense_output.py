@@ -5,7 +5,6 @@ Source: Trefethen 2013, Approximation Theory and Approximation Practice, chapter
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np

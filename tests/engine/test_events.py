@@ -547,3 +547,19 @@ def test_noise_is_the_error_of_omega_and_of_the_time(sign: float) -> None:
         noise = Solution(sol.states, sol, tolerance).noise(g, times)
         due = own * 3.0 * 2.0 + 2.0**-50 * 2.0 * abs(times)
         assert noise == pytest.approx(due, rel=0.01, abs=0.0)
+
+
+def test_small_values_beside_a_jump_are_no_roots() -> None:
+    def remainder(t: Any, w: Any) -> Any:
+        return w[0] % (0.5 + w[1]) + 1e-3
+
+    def late(t: Any, w: Any) -> Any:
+        u = w[0] % (0.5 + w[1])
+        return np.where(u > 0.4, -1.0, 0.01 * u - 1e-3)
+
+    ball = Scene("ball", (0.05, 0.02, 0.1), moments=(1.0,) * 3, torque=TorqueLaw((1.0, 0.3, 0.0)))
+    found = solve(ball, 4.0, events=[remainder, late])
+    assert not found.t_events[0].size
+    # With w1 = 0.05 + t and w2 = 0.02 + 0.3 t.
+    roots = [0.05, 0.35, 0.57 / 0.7, 0.87 / 0.7, 1.09 / 0.4, 1.39 / 0.4]
+    assert found.t_events[1] == pytest.approx(roots, abs=1e-9)

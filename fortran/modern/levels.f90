@@ -8,8 +8,8 @@ module levels
   private
 
   public :: choose_level, fits_lanes, many_fixed, many_free, many_taylor, quick_solve, &
-            read_pieces, ready_leaves, run_lanes, tape_bodies, tape_solve, tape_step, tape_variation, &
-            taylor_solve
+            read_pieces, ready_leaves, run_lanes, tape_bodies, tape_solve, tape_step, &
+            tape_variation, taylor_solve
 
   interface
     integer(c_int) function choose_level(highest) bind(c, name="choose_level")

@@ -44,7 +44,7 @@ _SOME = slice(5, None, 11)  # three nodes at which noise is computed
 
 @cache
 def _refining() -> Array:
-    """Return the matrix from values at the nodes of the solution's polynomials to those at POINTS."""
+    """Return the matrix from values at the nodes of the polynomials to values at POINTS."""
     return Pieces(np.array([-1.0, 1.0]), np.eye(dense_output.NODES)[None])(POINTS)
 
 

@@ -559,6 +559,7 @@ def test_small_values_beside_a_jump_are_no_roots() -> None:
 
     ball = Scene("ball", (0.05, 0.02, 0.1), moments=(1.0,) * 3, torque=TorqueLaw((1.0, 0.3, 0.0)))
     found = solve(ball, 4.0, events=[remainder, late])
+    assert found.t_events is not None
     assert not found.t_events[0].size
     # With w1 = 0.05 + t and w2 = 0.02 + 0.3 t.
     roots = [0.05, 0.35, 0.57 / 0.7, 0.87 / 0.7, 1.09 / 0.4, 1.39 / 0.4]

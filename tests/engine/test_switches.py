@@ -710,7 +710,11 @@ def test_switch_moved_to_its_level_by_another_has_numpys_result() -> None:
     """The product is 0 from t = 1.3 to 3.3 s, where the first factor jumps from -1 to 1."""
     found = solve(
         _ball(
-            lambda t, w: [np.where(np.sign(t - 2.3) * np.floor(abs(t - 2.3)) < 0.0, -1.0, 1.0), 0, 0],
+            lambda t, w: [
+                np.where(np.sign(t - 2.3) * np.floor(abs(t - 2.3)) < 0.0, -1.0, 1.0),
+                0,
+                0,
+            ],
             (0.0, 0.0, 0.0),
         ),
         [1.0, 2.0, 3.0, 5.0],
@@ -733,6 +737,8 @@ def test_results_that_depend_on_a_crossing_switch_are_no_sliding() -> None:
 def test_dense_output_ends_with_the_last_row_before_sliding() -> None:
     scene = _ball(lambda t, w: [-2.0 * np.sign(w[0]), 0.0, 1.0], (1.0, 0.0, 0.0))
     found = solve(scene, [0.2, 0.4, 2.0], dense_output=True, events=lambda t, w: w[2] - 0.3)
+    assert found.sol is not None
+    assert found.t_events is not None
     assert (found.ended, found.sol.t_max) == ("sliding", 0.4)
     assert found.sol(0.3) == pytest.approx([0.4, 0.0, 0.3], abs=1e-12)
     assert found.t_events[0] == pytest.approx([0.3])

@@ -1,5 +1,4 @@
 /* Polynomials at the nodes of a step, and between them, side by side in registers. */
-#include <math.h>
 #include <stddef.h>
 #include <string.h>
 
@@ -68,7 +67,9 @@ void OF_LEVEL(read_pieces, LEVEL)(int pieces, const double *edges, const double 
   for (int begin = 0; begin < n; begin += IN_REGISTER) {
     const double *own[IN_REGISTER];
     const int count = n - begin < IN_REGISTER ? n - begin : IN_REGISTER;
+    const reg one = (reg){0.0} + 1.0;
     reg x = {0.0}, total = {0.0}, weights[AT_ONCE + 1];
+    reg_bits at = {0};
     for (int lane = 0; lane < IN_REGISTER; lane++) {
       const double time = times[begin + (lane < count ? lane : 0)];
       piece = piece_of(edges, pieces, time, piece);
@@ -78,7 +79,11 @@ void OF_LEVEL(read_pieces, LEVEL)(int pieces, const double *edges, const double 
     }
     for (int j = 0; j <= AT_ONCE; j++) {
       const double half = j == 0 || j == AT_ONCE ? 0.5 : 1.0;
-      total += weights[j] = (j % 2 ? -half : half) / (x - points[j]);
+      const reg apart = x - points[j];
+      const reg_bits is_at_point = apart == (reg){0.0};
+      /* The formula fails at the points. */
+      total += weights[j] = (j % 2 ? -half : half) / (apart - (reg)(is_at_point & (reg_bits)one));
+      at |= is_at_point;
     }
     for (int i = 0; i < m; i++) {
       reg sum = {0.0};
@@ -90,9 +95,8 @@ void OF_LEVEL(read_pieces, LEVEL)(int pieces, const double *edges, const double 
       sum /= total;
       for (int lane = 0; lane < count; lane++) states[(begin + lane) * (ptrdiff_t)m + i] = sum[lane];
     }
-    /* The formula fails at the points, where the values are known. */
     for (int lane = 0; lane < count; lane++)
-      for (int j = 0; isinf(total[lane]) && j <= AT_ONCE; j++)
+      for (int j = 0; at[lane] && j <= AT_ONCE; j++)
         if (x[lane] == points[j])
           memcpy(states + (begin + lane) * (ptrdiff_t)m, own[lane] + j * m, m * sizeof *states);
   }

@@ -81,7 +81,7 @@ void OF_LEVEL(read_pieces, LEVEL)(int pieces, const double *edges, const double 
       const double half = j == 0 || j == AT_ONCE ? 0.5 : 1.0;
       const reg apart = x - points[j];
       const reg_bits is_at_point = apart == (reg){0.0};
-      /* The formula fails at the points. */
+      /* The formula fails at the points, where the values are known. */
       total += weights[j] = (j % 2 ? -half : half) / (apart - (reg)(is_at_point & (reg_bits)one));
       at |= is_at_point;
     }

@@ -33,9 +33,8 @@ _MOST_DIVISIONS = 44  # halvings of an interval after which a function counts as
 # a distance of _BEFORE times the length of the solution's polynomial.
 _SUDDEN, _BEFORE = 1e3, 0.01
 _MOST_PIECES = 100_000  # intervals that are divided at the same time
-_SHIFT = 2.0**-26  # relative change of an argument for a numerical derivative
-# The same near a jump, whose part of the derivative is then smaller.
-_LONG_SHIFT = 2.0**-13
+# Relative changes of an argument for a numerical derivative.
+_SHIFT, _LONG_SHIFT = 2.0**-26, 2.0**-13
 ROUNDING = 2.0**-50  # relative rounding error of the arguments of a function
 # Largest relative error of the state in noise; see `Solution.state_error`.
 _COARSEST = 1e-10
@@ -195,14 +194,6 @@ def _noise_of(
     return np.asarray(noise.max(axis=1))
 
 
-def _without_jumps(g: EventFunction, solution: Solution, fits: Fits, which: Index) -> None:
-    """Reduce noise that exceeds a polynomial because of a jump beside it."""
-    near = which[fits.sizes[which] <= 4.0 * fits.noise[which]]
-    if near.size:
-        noise = _noise_of(g, solution, fits.low[near], fits.high[near], _LONG_SHIFT)
-        fits.noise[near] = np.minimum(fits.noise[near], noise)
-
-
 def with_noise(
     g: EventFunction, solution: Solution, fits: Fits, needed: Index
 ) -> tuple[Fits, Roots]:
@@ -222,7 +213,6 @@ def with_noise(
         g, np.concatenate([times.ravel(), ends]), np.concatenate([inner, states])
     )
     fits.noise[which] = noise[:n].reshape(times.shape).max(axis=1)
-    _without_jumps(g, solution, fits, which)
     # At an end, a value that exceeds its rounding error is no root.
     is_root = np.abs(values[n:]) <= 4.0 * rounding[n:]
     return fits, Roots.bare(ends[is_root], 0, 4.0 * rounding[n:][is_root])
@@ -304,9 +294,13 @@ def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroInte
     unknown = near[fits.noise[near] == 0.0]
     if unknown.size:
         fits.noise[unknown] = _noise_of(g, solution, fits.low[unknown], fits.high[unknown])
-        _without_jumps(g, solution, fits, unknown)
+    zero = near[sizes[near] <= 2.0 * fits.noise[near]]
+    if zero.size:
+        # A jump beside an interval is a smaller part of a derivative over a longer distance.
+        again = _noise_of(g, solution, fits.low[zero], fits.high[zero], _LONG_SHIFT)
+        fits.noise[zero] = np.minimum(fits.noise[zero], again)
     noise = 2.0 * fits.noise
-    zero = near[sizes[near] <= noise[near]]
+    zero = zero[sizes[zero] <= noise[zero]]
     if not zero.size:
         return None
     is_begin = np.append(True, fits.low[zero[1:]] != fits.high[zero[:-1]])[: len(zero)]

@@ -73,7 +73,8 @@ def taylor(
         more["own"] = own[:n_own, 1 : 1 + n_rows].T
     if is_tape and ended in ("sliding", "sensitive"):
         more["reason"] = reason_of(ended, work[1], int(work[5]))
-    if 0 < kept <= most and n_rows and abs(ends[kept]) >= abs(times[n_rows - 1]):
+    last = times[n_rows - 1] if n_rows else 0.0
+    if 0 < kept <= most and 0.0 < abs(last) <= abs(ends[kept]):
         edges, values = ends[: kept + 1].copy(), at_nodes[:, :, :kept].T
         # A few steps must not hold the memory of many.
         values = values.copy() if kept < most // 16 else values
@@ -81,7 +82,7 @@ def taylor(
             edges, values = edges[::-1], values[::-1, ::-1]
         pieces = Pieces(edges, values)
         if ended not in WITH_ALL_ROWS:
-            pieces = up_to(pieces, times[n_rows - 1])
+            pieces = up_to(pieces, last)
         # The step in which a motion overflows has no polynomial.
         if ended in WITH_ALL_ROWS or np.isfinite(pieces.values).all():
             more["sol"] = steps_output(scene, pieces)

@@ -5,6 +5,7 @@ Source: Trefethen 2013, Approximation Theory and Approximation Practice, chapter
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -61,8 +62,14 @@ class Pieces:
 
     def __call__(self, times: Array) -> Array:
         """Return the values at `times` (s), shape (n, m)."""
-        found: Array = extension().states_at(self.edges, POINTS, self.values.T, times).T
+        edges, columns = self._contiguous
+        found: Array = extension().states_at(edges, POINTS, columns, times).T
         return found
+
+    @cached_property
+    def _contiguous(self) -> tuple[Array, Array]:
+        """The edges and the values, (m, NODES, p), that compiled code reads without a copy."""
+        return np.ascontiguousarray(self.edges), np.asfortranarray(self.values.T)
 
     def numbers(self, times: Array) -> NDArray[np.intp]:
         """Return the index of each time's interval."""

@@ -742,3 +742,6 @@ def test_dense_output_ends_with_the_last_row_before_sliding() -> None:
     assert (found.ended, found.sol.t_max) == ("sliding", 0.4)
     assert found.sol(0.3) == pytest.approx([0.4, 0.0, 0.3], abs=1e-12)
     assert found.t_events[0] == pytest.approx([0.3])
+    begin = solve(scene, [0.0, 2.0], dense_output=True)
+    assert begin.sol is not None
+    assert (begin.time.tolist(), begin.sol.t_max) == ([0.0], 0.0)

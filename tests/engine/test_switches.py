@@ -734,7 +734,11 @@ def test_results_that_depend_on_a_crossing_switch_are_no_sliding() -> None:
     assert stepper.omega == pytest.approx(solve(scene, 3.0).omega[-1], abs=1e-8)
 
 
-def test_dense_output_ends_with_the_last_row_before_sliding() -> None:
+def test_dense_output_ends_with_the_last_row_before_sliding(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # Nothing is solved again.
+    monkeypatch.setattr("pyharness.engine.dense.state_pieces", None)
     scene = _ball(lambda t, w: [-2.0 * np.sign(w[0]), 0.0, 1.0], (1.0, 0.0, 0.0))
     found = solve(scene, [0.2, 0.4, 2.0], dense_output=True, events=lambda t, w: w[2] - 0.3)
     assert found.sol is not None
@@ -745,3 +749,12 @@ def test_dense_output_ends_with_the_last_row_before_sliding() -> None:
     begin = solve(scene, [0.0, 2.0], dense_output=True)
     assert begin.sol is not None
     assert (begin.time.tolist(), begin.sol.t_max) == ([0.0], 0.0)
+
+
+def test_dense_output_has_the_last_row_before_an_overflow() -> None:
+    times = np.arange(700.0, 713.0, 3.0)
+    found = solve(_ball(lambda t, w: [w[0], 0.0, 0.0], (1.0, 0.5, 0.0)), times, dense_output=True)
+    assert found.ended == "overflow"
+    assert found.sol is not None
+    assert found.sol.t_max == found.time[-1] == 709.0
+    assert found.sol(found.time)[0] == pytest.approx(np.exp(found.time), rel=1e-12)

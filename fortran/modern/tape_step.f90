@@ -162,7 +162,8 @@ contains
   contains
 
     logical function is_at_once()
-      !! Return whether the operands that cross a level change by rounding errors alone.
+      !! Return whether the operands that cross a level change by rounding errors alone. One that
+      !! also begins on the level has left it before: it would be turned back.
       real(dp) :: noise(tape%n_unknowns)
       integer :: i
 
@@ -170,6 +171,7 @@ contains
       is_at_once = .true.
       do i = 1, switches%n
         if (switches%crosses(i) == 0) cycle
+        if (switches%on_level(i) == switches%crosses(i)) is_at_once = .false.
         associate (terms => s%a(1:s%order - 1, switches%operands(i)))
           is_at_once = is_at_once .and. factor*size_of(terms, factor) &
                        <= epsilon(factor)*s%noise(switches%operands(i))

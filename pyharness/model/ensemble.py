@@ -27,9 +27,10 @@ class Ensemble(BatchResult):
     omega : ndarray, shape (n, 3)
         Angular velocities about the body axes, rad/s; NaN for a body without a result.
     status : ndarray of int8, shape (n,)
-        How each computation ended: 0 `complete`, 2 `overflow`, 3 `refused` (the method does not
-        apply), 4 `gave up` (work limit exceeded, or no correct digit of the phase left), 6
-        `sensitive` (amplified rounding errors exceed the tolerance).
+        How each computation ended: 0 `complete`, 2 `overflow` (omega or the torque becomes infinite
+        or undefined), 3 `refused` (the method does not apply), 4 `gave up` (work limit exceeded, or
+        no correct digit of the phase left), 6 `sensitive` (amplified rounding errors exceed the
+        tolerance), 9 `sliding` (a switch of the torque would change back and forth without end).
     attitude : ndarray, shape (n, 4), or None
         Unit quaternions from body to space, scalar first. This attribute and the following ones are
         None if they were not requested.

@@ -4,6 +4,7 @@ from dataclasses import asdict
 from typing import Any
 
 from pyharness.model.build import build
+from pyharness.model.changing import Changing
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import as_lists, body_of, law_table
@@ -56,7 +57,7 @@ def _torque(torque: TorqueLaw | StateTorque) -> dict[str, Any]:
         if isinstance(part, TorqueLaw):
             record |= _torque(part)
         else:
-            term = {key: as_lists(value) for key, value in part}
+            term = {k: "recorded" if isinstance(x, Changing) else as_lists(x) for k, x in part}
             record["terms"] = [*record.get("terms", []), term]
     return record
 

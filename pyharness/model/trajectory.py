@@ -117,7 +117,7 @@ class Trajectory(Conversions):
         component along the trajectory; the error of the attitude is an angle (rad).
     growth : float or None
         The error amplification: the largest norm of the state-transition matrix of omega from any
-        time to the end.
+        time to the end; with attitude multiplied by 1 + omega t / 2, with the largest omega.
     reason : str or None
         The time and the operation at which a recorded torque ended the integration early, or made
         the ending "sensitive".

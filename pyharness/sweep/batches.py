@@ -125,6 +125,9 @@ def _batch(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Batch:
     length = min(scene.attitude_length, sys.float_info.max)
     given = tuple(length * each for each in scene.attitude or IDENTITY)
     attitude = _components("attitude", given, own, n, first=0)
+    if attitude is not None:
+        # A quaternion 0 fails as above.
+        t_end = np.where(attitude.any(axis=1), t_end, np.nan)
     found = {"omega": omega, "attitude": attitude}
     found |= {name: own.get(name) for name in OF_PROGRAMS} | {body: values}
     if not isinstance(scene.torque, StateTorque):

@@ -76,6 +76,16 @@ def test_a_touch_on_either_side_of_a_level_ends_no_step_twice(tolerance: float) 
     assert found.steps < 100
 
 
+@pytest.mark.parametrize("start", [-1.0, -0.7, -2.0])
+def test_a_stepper_passes_a_touch_within_rounding_of_its_level(start: float) -> None:
+    torque: Torque = lambda t, w: [np.floor(np.cos(w[1])), 1.0, 0.0]  # noqa: E731
+    stepper = Stepper(_ball(torque, (0.0, start, 0.0)))
+    stepper.until(3.0)
+    # The floor is -1 where the cosine is negative.
+    wanted = -max(0.0, -start - math.pi / 2) - max(0.0, 3.0 + start - math.pi / 2)
+    assert stepper.omega == pytest.approx([wanted, 3.0 + start, 0.0], abs=1e-7)
+
+
 def test_a_switch_whose_operand_is_infinite_ends_the_motion() -> None:
     found = solve(_ball(lambda t, omega: [np.floor(1.0 / t), 0.0, 0.0]), [2.0])
     assert found.ended in ("singular", "overflow")

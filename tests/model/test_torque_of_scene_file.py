@@ -1,5 +1,6 @@
 """Expressions in scene files: read, written, and shown in records and headings."""
 
+import json
 import re
 import tomllib
 from collections.abc import Callable
@@ -8,12 +9,13 @@ from typing import Any
 
 import pytest
 
-from pyharness import Scene, StateTorque, TorqueLaw, case_scene, opaque, read_scene
+from pyharness import ChangingMoments, Scene, StateTorque, TorqueLaw, case_scene, opaque, read_scene
 from pyharness.engine.scene_reader import scene_of
 from pyharness.model.expressions import FUNCTIONS, INPUTS
 from pyharness.model.records import scene_record
 from pyharness.model.scene_file import scene_text
 from pyharness.model.scene_report import heading
+from pyharness.torques import gravity_gradient
 from tests.engine.test_term_file import is_documented, restored
 
 ROOT = Path(__file__).parent.parent.parent
@@ -82,6 +84,14 @@ def test_torque_that_is_a_function_is_shown(
     assert scene_record(scene)["torque"] == record
     assert is_documented(scene_record(scene))
     assert shown in heading(scene)[1]
+
+
+def test_record_has_no_function_where_a_term_has_a_changing_inertia() -> None:
+    moments = ChangingMoments([[8.0, 1.0], [9.0], [10.0]])
+    scene = Scene("", (1, 2, 3), moments=moments, torque=gravity_gradient(moments, rate=0.1))
+    term = {"kind": "gravity_gradient", "inertia": "recorded", "rate": 0.1}
+    assert json.loads(json.dumps(scene_record(scene)))["torque"] == {"terms": [term]}
+    assert is_documented(scene_record(scene))
 
 
 def test_record_and_heading_have_the_expressions() -> None:

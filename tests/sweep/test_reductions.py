@@ -119,6 +119,9 @@ def test_initial_attitudes_may_vary_where_a_quantity_needs_them(tmp_path: Path) 
         assert np.abs(found["attitude"][i] - rows.attitude[-1]).max() < 1e-11
         axis3 = rows.rotation().as_matrix()[-1, 2, 2]
         assert found["pointing-error"][i] == pytest.approx(np.arccos(axis3), abs=1e-7)
+    _, zero = _found(tmp_path, text(axis("attitude.0", [0.0, 1.0]), top=top))
+    assert np.isfinite(zero["attitude"]).all(axis=1).tolist() == [False, True]
+    assert (zero["status"] == Statuses.COMPLETE).tolist() == [False, True]
 
 
 def test_torque_in_space_may_be_that_of_an_axis_alone(tmp_path: Path) -> None:

@@ -99,7 +99,7 @@ def trajectory_report(
             },
             **({} if bound is None else {"reference_bound": bound.record()}),
             **records.ending_record(trajectory),
-            "reason": trajectory.reason,
+            **({} if trajectory.reason is None else {"reason": trajectory.reason}),
             "build": records.build_record(),
             "assumptions": assumption_records([(scene, [listing] if listing else [])]),
         }

@@ -78,6 +78,17 @@ def _record(printed: Printed, command: str) -> dict[str, Any]:
     return json.loads(text, parse_constant=pytest.fail)  # type: ignore[no-any-return]
 
 
+def test_run_json_says_where_a_torque_ends_the_run(printed: Printed, tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(
+        "body.moments = [1, 2, 3]\ninitial.omega = [0, 0.1, 1]\n"
+        "torque.expression = ['sqrt(0.5 - t)', '0', '0']\nrun = { step_size = 0.25, steps = 4 }\n"
+    )
+    record = _record(printed, f"run --scene {path} --method auto")
+    assert record["ended"] == "singular"
+    assert record["reason"].startswith("the torque is not defined at t = 0.5 s: the square root")
+
+
 def test_run_json_is_as_contracted(printed: Printed) -> None:
     record = _record(printed, "run --case 3 --program runge-kutta")
     assert list(record) == [

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.engine.parameters import torque_with_values
-from pyharness.engine.registry import check_attitude
+from pyharness.engine.registry import PREPARED_WITH_ATTITUDE, check_attitude
 from pyharness.model.arrays import (
     check_rows,
     count_bodies,
@@ -275,7 +275,7 @@ def solve_bodies(
                 "allowed: moments, or methods auto and taylor"
             )
     if attitude is not None:
-        check_attitude(method)
+        check_attitude(method, PREPARED_WITH_ATTITUDE)
     threads = threads_of(threads)
     found = place_for(out, n, attitude is not None, with_estimates)
     if found.estimates is not None:

@@ -1,7 +1,7 @@
 """The registry of all methods that solve a scene."""
 
 import importlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -200,6 +200,10 @@ GAUSS = tuple(name for name in REGISTRY if name.startswith("gauss-"))
 # Methods with a prepared solver for torques that depend on the state; they integrate own states.
 PREPARED_FOR_STATE = ("auto", "taylor")
 SCIPY_METHODS = {name: method.scipy for name, method in REGISTRY.items() if method.scipy}
+WITH_ATTITUDE = tuple(name for name, method in REGISTRY.items() if method.attitude)
+PREPARED_WITH_ATTITUDE = tuple(
+    name for name in WITH_ATTITUDE if name not in (*SCIPY_METHODS, "reference")
+)
 
 
 def requested_tolerance(method: str, tolerance: Number | None) -> float:
@@ -223,11 +227,11 @@ def computes_attitude(scene: Scene, method: str, requested: bool | None) -> bool
     return bool(requested)
 
 
-def check_attitude(method: str) -> None:
-    """Raise InputError if the method can't propagate the attitude."""
+def check_attitude(method: str, able: Iterable[str] = WITH_ATTITUDE) -> None:
+    """Raise InputError if the method can't propagate the attitude; some that can are `able`."""
     if not REGISTRY[method].attitude:
-        able = ", ".join(each.name for each in REGISTRY.values() if each.attitude)
-        raise InputError(f"method {method} does not compute attitudes; allowed: {able}")
+        allowed = ", ".join(able)
+        raise InputError(f"method {method} does not compute attitudes; allowed: {allowed}")
 
 
 def check_prepared(scene: Scene, method: str) -> None:

@@ -12,7 +12,7 @@ from pyharness.model.listing import Listing
 from pyharness.model.report import Column, Picture, Report, Table, digits, words
 from pyharness.model.scene import Scene
 from pyharness.model.scene_report import ending, estimates, heading
-from pyharness.model.trajectory import Array, Trajectory
+from pyharness.model.trajectory import Array, Trajectory, singular_steps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -84,6 +84,7 @@ def trajectory_report(
     def record() -> dict[str, Any]:
         from pyharness.model import records
 
+        reason = trajectory.reason or singular_steps(trajectory.ier)
         names = ("time", "recorded_time", "omega", "velocity", "attitude")
         arrays = {name: getattr(trajectory, name) for name in names}
         return {
@@ -99,7 +100,7 @@ def trajectory_report(
             },
             **({} if bound is None else {"reference_bound": bound.record()}),
             **records.ending_record(trajectory),
-            **({} if trajectory.reason is None else {"reason": trajectory.reason}),
+            **({"reason": reason} if reason else {}),
             "build": records.build_record(),
             "assumptions": assumption_records([(scene, [listing] if listing else [])]),
         }

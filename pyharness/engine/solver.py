@@ -14,6 +14,7 @@ from pyharness.engine.recorded import is_recorded, packed_scene
 from pyharness.engine.registry import (
     FIXED_STEP,
     GAUSS,
+    PREPARED_WITH_ATTITUDE,
     check_attitude,
     check_prepared,
     check_torque,
@@ -342,7 +343,7 @@ def prepare(
     own = scene.attitude or IDENTITY if attitude else None
     about_principal, _ = principal(replace(scene, attitude=own))
     if attitude:
-        check_attitude(method)
+        check_attitude(method, PREPARED_WITH_ATTITUDE)
     else:
         about_principal = replace(about_principal, attitude=None)
     chosen = plan(with_merged_waves(about_principal), method, tolerance, rows=attitude)

@@ -13,7 +13,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.tape import ATTITUDE, N_INPUTS, OMEGA, TIME
 from pyharness.model.torque_law import TorqueLaw
-from pyharness.model.trajectory import Trajectory
+from pyharness.model.trajectory import Trajectory, singular_steps
 
 # Most characters of an expression, or of its constants, in a heading.
 _LONGEST_TEXT = 60
@@ -143,7 +143,8 @@ def ending(trajectory: Trajectory) -> str:
         "event": "ended by a terminal event",
         "sensitive": sensitive(trajectory.growth, trajectory.digits),
     }
-    return f"{endings.get(trajectory.ended, 'complete')} ({counts})"
+    told = singular_steps(trajectory.ier)
+    return f"{endings.get(trajectory.ended, 'complete')} ({counts}){told and f'; {told}'}"
 
 
 def sensitive(growth: float | None, digits: float | None) -> str:

@@ -54,6 +54,12 @@ def _short(value: Any) -> str:
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
 
 
+def singular_steps(ier: Array | None) -> str:
+    """Return a phrase on the steps in which a program's matrix was singular, or nothing."""
+    count = 0 if ier is None else np.count_nonzero(ier)
+    return f"a singular matrix (IER = 129) in {counted(count, 'step')}" if count else ""
+
+
 @dataclass(frozen=True)
 class Stop:
     """The point at which the Lipschitz test of the Runge-Kutta program ended a run.
@@ -219,7 +225,8 @@ class Trajectory(Conversions):
                 "of the torque, whose series ends before."
             )
         if self.ended != "sensitive":
-            return "The integration reached all requested times."
+            told = singular_steps(self.ier)
+            return f"The integration reached all requested times{told and f', but with {told}'}."
         by = "" if self.growth is None else f", amplified by {short(self.growth)},"
         left = counted(math.floor(self.digits or 0.0), "correct digit")
         why = "" if self.reason is None else f" {self.reason[0].upper()}{self.reason[1:]}."

@@ -12,9 +12,8 @@ from typing import Any
 from numpy.typing import NDArray
 
 from pyharness.checks.compare.batch import Batch, Solver
-from pyharness.engine.registry import METHODS, REGISTRY, requested_tolerance
+from pyharness.engine.registry import METHODS, PREPARED_WITH_ATTITUDE, REGISTRY, requested_tolerance
 from pyharness.engine.scene_reader import scene_of, scene_of_file
-from pyharness.engine.solver import PREPARED
 from pyharness.model.errors import InputError, kind_of, unknown
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.scene import Scene, checked_scene
@@ -41,8 +40,6 @@ _MOST_IN_CHUNK = 1_000_000
 _MOST_AXES = 12
 _MOST_SAMPLES = 10_000
 _LONGEST_NAME = 240  # bytes; most file systems take 255
-# Methods that compute the attitudes of many bodies.
-_WITH_ATTITUDE = tuple(name for name in PREPARED if REGISTRY[name].attitude)
 
 
 def read_sweep(path: str | os.PathLike[str], claims: Mapping[str, Claim] | None = None) -> Sweep:
@@ -273,10 +270,10 @@ def _check_reductions(sweep: Sweep) -> None:
                 f"a {kind}: {', '.join(allowed)}"
             )
         for method in _choices(sweep, "method", sweep.solver.method):
-            if "attitude" in reduction.needs and method not in _WITH_ATTITUDE:
+            if "attitude" in reduction.needs and method not in PREPARED_WITH_ATTITUDE:
                 raise InputError(
                     f"reductions: {asked.reduction} can't be computed with {method}; allowed: "
-                    f"{', '.join(_WITH_ATTITUDE)}"
+                    f"{', '.join(PREPARED_WITH_ATTITUDE)}"
                 )
         if "moments" in reduction.needs and sweep.scene.moments is None:
             raise InputError(

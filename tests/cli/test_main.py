@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import case_scene, solve
+from pyharness import case_scene, read_scene, run_program, solve, subset
 from pyharness.cli.main import VERBS, main
 from pyharness.cli.parser import Parser
 from pyharness.model import build, extension
@@ -87,6 +87,21 @@ def test_run_json_says_where_a_torque_ends_the_run(printed: Printed, tmp_path: P
     record = _record(printed, f"run --scene {path} --method auto")
     assert record["ended"] == "singular"
     assert record["reason"].startswith("the torque is not defined at t = 0.5 s: the square root")
+
+
+def test_run_counts_the_steps_with_a_singular_matrix(printed: Printed, tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(
+        "body.moments = [1, 2, 3]\ninitial.omega = [0, 0.1, 1]\n"
+        "run = { step_size = 1e-30, steps = 3 }\n"
+    )
+    command = f"run --scene {path} --program four-term --listing corrected"
+    told = "a singular matrix (IER = 129) in 3 steps"
+    assert printed(command).splitlines()[-1].endswith(f"; {told}")
+    assert _record(printed, command)["reason"] == told
+    run = run_program(read_scene(path), subset("four-term", "corrected"))
+    assert run.message == f"The integration reached all requested times, but with {told}."
+    assert "reason" not in _record(printed, "run --case 3 --program four-term")
 
 
 def test_run_json_is_as_contracted(printed: Printed) -> None:

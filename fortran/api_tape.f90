@@ -57,7 +57,7 @@ subroutine tape_rows(n_numbers, numbers, omega0, n_times, times, tolerance, n_at
 end subroutine tape_rows
 
 subroutine tape_step(n_numbers, numbers, n, t, state, tolerances, relative, trial, longest, &
-                     n_terms, h, terms, ends, order, expansions, status)
+                     is_beyond, n_terms, h, terms, ends, order, expansions, status)
   ! Compute one step of a system of ordinary differential equations by Taylor series: the terms of
   ! the unknowns, whose sums are the state at its end. The unit of time is the user's.
   !f2py threadsafe
@@ -73,6 +73,7 @@ subroutine tape_step(n_numbers, numbers, n, t, state, tolerances, relative, tria
   real(8), intent(in), target :: tolerances(n)  ! allowed errors of the unknowns in the step
   real(8), intent(in) :: relative               ! tolerance that decides the order
   real(8), intent(in) :: trial, longest         ! step that is tried, and longest step
+  integer(4), intent(in) :: is_beyond           ! 1: steps end beyond switches, else 0
   integer(4), intent(in) :: n_terms             ! largest order plus 1
   real(8), intent(out) :: h                     ! step
   real(8), intent(out), target :: terms(n_terms, n)
@@ -86,7 +87,8 @@ subroutine tape_step(n_numbers, numbers, n, t, state, tolerances, relative, tria
   taken%order = 0
   taken%terms(0:n_terms - 1, 1:n) => terms
   taken%state => ends
-  call step(tape_of(numbers), step_request_t(t, trial, longest, relative, state, tolerances), taken)
+  call step(tape_of(numbers), step_request_t(t, trial, longest, relative, state, tolerances, &
+                                             is_beyond == 1), taken)
   h = taken%h
   order = taken%order
   expansions = taken%expansions

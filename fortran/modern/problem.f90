@@ -34,6 +34,8 @@ module problem
     real(dp) :: relative                        !! tolerance that decides the order
     real(dp), pointer, contiguous :: state(:)
     real(dp), pointer, contiguous :: tolerances(:) !! allowed errors of the unknowns in the step
+    !! whether a step ends so far beyond a switch that rounding errors do not hide the change
+    logical :: is_beyond = .false.
   end type step_request_t
 
   type, public :: step_t

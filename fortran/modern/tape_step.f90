@@ -10,7 +10,7 @@ module tape_step
   use tape_roots, only: size_of
   use tape_series, only: allocate_series, derivatives_at, expand, noise_of, series_t
   use tape_switches, only: change, CROSSES, find_switches, IS_CHANGED, next_crossing, &
-                           resolve_switches, SLIDES, STAYS, switches_t, update
+                           operand_error, resolve_switches, SLIDES, STAYS, switches_t, update
   implicit none(type, external)
   private
 
@@ -21,6 +21,9 @@ module tape_step
   real(dp), parameter :: MOST_DEFECT = 1.0_dp
   real(dp), parameter :: MOST_ROUNDING = 1e3_dp
   integer, parameter :: MOST_LONGER = 12 ! expansions of a step that is too short
+  ! Change of a switch's operand beyond its level, in rounding errors, and the longest time that it
+  ! takes, over the step, unless the tolerance allows more.
+  real(dp), parameter :: BEYOND = 16.0_dp, LONGEST_BEYOND = 1e-6_dp
   ! Tolerance whose reciprocal is a number.
   real(dp), parameter :: LEAST_TOLERANCE = 2.0_dp**(-1000)
 
@@ -144,6 +147,7 @@ contains
         end do
         cycle
       end if
+      if (verdict == CROSSES .and. request%is_beyond) step%h = step_beyond()
       factor = step%h/s%h
       do i = 1, tape%n_unknowns
         step%terms(:, i) = 0.0_dp
@@ -160,6 +164,29 @@ contains
     end do
 
   contains
+
+    real(dp) function step_beyond()
+      !! Return a step to beyond the switch that crosses, in spite of rounding errors.
+      real(dp) :: longer, noise(tape%n_unknowns)
+      integer :: i
+
+      call noise_of(s, noise, abs(request%state))
+      i = switches%first
+      associate (operand => switches%operands(i), &
+                 terms => s%a(0:s%order - 1, switches%operands(i)))
+        ! The next terms, which are left out, are smaller than the last ones.
+        longer = BEYOND*epsilon(s%h)*max(size_of(terms, factor), s%noise(operand)) &
+                 + factor**(s%order - 2)*size_of(terms(s%order - 1:), factor)
+        ! The operand returns to its value at the beginning, which is beside the level.
+        if (switches%on_level(i) == switches%crosses(i)) then
+          longer = longer + abs(operand_error(i, switches, s))
+        end if
+        longer = longer*abs(s%h/switches%slope)
+      end associate
+      longer = max(2.0_dp*spacing(request%t + step%h), min(longer, abs(s%h)*max(LONGEST_BEYOND, request%relative)))
+      step_beyond = (request%t + (step%h + sign(longer, s%h))) - request%t
+      if (abs(step_beyond) > abs(request%longest)) step_beyond = request%longest
+    end function step_beyond
 
     logical function is_at_once()
       !! Return whether the operands that cross a level change by rounding errors alone. One that

@@ -178,6 +178,7 @@ def _fitted(
             raise InputError("dense output: the method reached fewer times than in its first run")
         largest = np.maximum(largest, np.abs(states).max(axis=0))
         sizes = sizes_of(largest, n_own)
+        sizes = np.where(sizes > 0.0, sizes, 1.0)
         values = states[place.reshape(each.shape)]
         coefficients = np.einsum("kj,pjm->pkm", TO_COEFFICIENTS, values)
         tails = np.abs(coefficients[:, -_TAIL:]).max(axis=1)

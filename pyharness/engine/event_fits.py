@@ -1,10 +1,5 @@
-"""Polynomials through the values of an event's function, and the errors (noise) of these values.
+"""Polynomials through the values of an event's function, and the errors (noise) of these values."""
 
-In a zero interval, a function is 0 to within its error. It is a root if the function reaches 0 by a
-kink or a jump, not by decay.
-"""
-
-import math
 from dataclasses import dataclass
 from functools import cache, cached_property
 
@@ -27,14 +22,15 @@ from pyharness.model.errors import InputError
 
 # Largest of the last coefficients of a polynomial that has converged, relative to its values.
 _LAST = 2e-14
+_RUN = 3  # adjacent nodes at which a function is 0 that remains 0 between them
 _TAIL = 3  # last coefficients, whose magnitude estimates the omitted ones
 _MOST_DIVISIONS = 44  # halvings of an interval after which a function counts as not smooth
-# A function reaches 0 by a kink or a jump, not by decay, if it exceeds _SUDDEN times its error at
-# a distance of _BEFORE times the length of the solution's polynomial.
-_SUDDEN, _BEFORE = 1e3, 0.01
+MUCH = 1e3  # ratio of values that are not 0 to their error
+# Relative rounding error of the state's polynomials.
+STATE_ROUNDING = 2.0**-46
 _MOST_PIECES = 100_000  # intervals that are divided at the same time
 # Relative changes of an argument for a numerical derivative.
-_SHIFT, _LONG_SHIFT = 2.0**-26, 2.0**-13
+_SHIFT, LONG_SHIFT = 2.0**-26, 2.0**-13
 ROUNDING = 2.0**-50  # relative rounding error of the arguments of a function
 # Largest relative error of the state in noise; see `Solution.state_error`.
 _COARSEST = 1e-10
@@ -118,6 +114,16 @@ class Solution:
         errors[0, 2 : width + 2] = self.state_error / shift
         return found[1], *(errors @ np.abs(found - found[1]))
 
+    def changed_values(self, g: EventFunction, times: Array, part: float) -> Array:
+        """Return a function's values at n times (s), also with each unknown changed, (m, n)."""
+        states = self.states(times)
+        n, width = states.shape
+        count = 2 * width + 1
+        signs = np.eye(count, width, -1) - np.eye(count, width, -1 - width)
+        every = states + signs[:, None] * (part * sizes_of(np.abs(states), self.sol.n_own))
+        values = self.values(g, np.tile(times, count), every.reshape(-1, width))
+        return values.reshape(-1, n)
+
     @property
     def state_error(self) -> float:
         """The relative error of the state, at most 1e-10: a larger one would hide close roots."""
@@ -154,7 +160,11 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
         is_done = tail <= _LAST * largest
         if not is_done.all():
             near = np.flatnonzero(~is_done)
-            is_done[near] = tail[near] <= _noise_of(g, solution, low[near], high[near])
+            noise = noise_of(g, solution, low[near], high[near])
+            # The function remains 0 in a part alone, whose end errors of the state hardly move.
+            is_zero = np.lib.stride_tricks.sliding_window_view(values[near] == 0.0, _RUN, axis=1)
+            is_partly_zero = is_zero.all(axis=2).any(axis=1) & (largest[near] > 2.0 * noise)
+            is_done[near] = (tail[near] <= noise) & ~is_partly_zero
         fits = Fits(low, high, first, last, c, np.zeros(len(low)))
         done.append(fits if is_done.all() else fits.only(is_done))
         if is_done.all():
@@ -186,9 +196,10 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
     return done[0] if len(done) == 1 else together(done, "low"), together(rough, "time")
 
 
-def _noise_of(
+def noise_of(
     g: EventFunction, solution: Solution, low: Array, high: Array, shift: float = _SHIFT
 ) -> Array:
+    """Return the largest noise at some nodes of each interval from `low` to `high` (s)."""
     times = nodes(low, high, POINTS)[:, _SOME]
     noise = solution.noise(g, times.ravel(), shift).reshape(times.shape)
     return np.asarray(noise.max(axis=1))
@@ -199,7 +210,7 @@ def with_noise(
 ) -> tuple[Fits, Roots]:
     """Return `fits` with noise where needed, and roots at time 0 and both ends."""
     sizes, largest = fits.sizes, fits.sizes.max(initial=0.0)
-    which = np.flatnonzero(needed | (sizes <= largest / _SUDDEN) | (sizes == largest))
+    which = np.flatnonzero(needed | (sizes <= largest / MUCH) | (sizes == largest))
     ends, states = solution.at_ends
     # If no interval was divided, the states are known.
     if np.may_share_memory(fits.low, solution.pieces.edges):
@@ -225,125 +236,3 @@ def _sign_changes(times: Array, values: Array, first: Array) -> Roots:
     row, column = np.nonzero(is_negative[:, 1:] != is_negative[:, :-1])
     change = np.where(is_negative[row, column], 1, -1)
     return Roots.bare(0.5 * times[row, column] + 0.5 * times[row, column + 1], change)
-
-
-@dataclass(frozen=True, eq=False)
-class ZeroIntervals:
-    """The ascending intervals, `low` to `high` (s), in which a function is 0 to within its error.
-
-    Near an interval, values below `noise` can't be distinguished from 0. `before` and `after` are
-    the function's signs on both sides: 0 where it decays to 0, or at an end of the solution.
-    """
-
-    low: Array
-    high: Array
-    noise: Array
-    before: Array
-    after: Array
-
-    def roots(self, counts_touches: bool) -> Roots:
-        """Return each interval's root, at the end that integration from time 0 reaches first.
-
-        Without `counts_touches`, only intervals that exclude time 0, and have opposite signs on
-        both sides, have a root.
-        """
-        is_before = self.high < 0.0
-        is_first = (self.low <= 0.0) & ~is_before
-        time = np.where(is_before, self.high, np.maximum(self.low, 0.0))
-        lasting = np.where(self.high <= 0.0, self.low, self.high) - time
-        change = np.where(is_first, 0.0, np.where(is_before, self.after, -self.before))
-        is_root = is_first | (change != 0.0)
-        if not counts_touches:
-            is_root = ~is_first & (self.before * self.after < 0.0)
-        # An interval around time 0 is reached on both sides.
-        both = np.flatnonzero(is_root & is_first & (self.low < 0.0) & (self.high > 0.0))
-        time, change = (np.append(x[is_root], x[both]) for x in (time, change))
-        lasting = np.append(lasting[is_root], self.low[both])
-        return Roots.bare(time, change.astype(int), lasting=lasting)
-
-    def contain(self, g: EventFunction, solution: Solution, roots: Roots) -> Index:
-        """Return which roots are in an interval, or so near that the function is 0 in between."""
-        following = np.searchsorted(self.low, roots.time, side="right")
-        before = np.append(-math.inf, self.high)[following]
-        after = np.append(self.low, math.inf)[following]
-        found: Index = roots.time <= before
-        # Sign changes of a function that is not smooth have errors of up to 256 spacings of
-        # floats.
-        longest = np.diff(solution.pieces.edges).max()
-        apart = np.minimum(roots.time - before, after - roots.time)
-        found |= apart <= 256.0 * np.spacing(np.maximum(np.abs(roots.time), longest))
-        for edges, number in ((before, following - 1), (after, following)):
-            near = np.flatnonzero(np.isfinite(edges) & ~found)
-            middle = solution.values(g, 0.5 * roots.time[near] + 0.5 * edges[near])
-            noise = np.maximum(self.noise[number[near]], roots.noise[near])
-            found[near] = np.abs(middle) <= noise
-        return found
-
-
-def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroIntervals | None:
-    """Return the intervals in which a function is 0 to within its error, if any."""
-    sizes = fits.sizes
-    if not sizes.size:
-        return None
-    largest = sizes.argmax()
-    # If no value is far above its error, all polynomials may be 0.
-    is_near = sizes <= max(sizes[largest] / _SUDDEN, _SUDDEN * fits.noise[largest])
-    if not is_near.any():
-        return None
-    near = np.flatnonzero(is_near)
-    unknown = near[fits.noise[near] == 0.0]
-    if unknown.size:
-        fits.noise[unknown] = _noise_of(g, solution, fits.low[unknown], fits.high[unknown])
-    zero = near[sizes[near] <= 2.0 * fits.noise[near]]
-    if zero.size:
-        # A jump beside an interval is a smaller part of a derivative over a longer distance.
-        again = _noise_of(g, solution, fits.low[zero], fits.high[zero], _LONG_SHIFT)
-        fits.noise[zero] = np.minimum(fits.noise[zero], again)
-    noise = 2.0 * fits.noise
-    zero = zero[sizes[zero] <= noise[zero]]
-    if not zero.size:
-        return None
-    is_begin = np.append(True, fits.low[zero[1:]] != fits.high[zero[:-1]])[: len(zero)]
-    begins = np.flatnonzero(is_begin)
-    ends = np.append(begins[1:], len(zero))[: len(begins)] - 1
-    begins, ends = zero[begins], zero[ends]
-    low, high = fits.low[begins], fits.high[ends]
-    earlier = np.minimum(fits.low[begins - 1], low)
-    later = np.maximum(fits.high[(ends + 1) % len(sizes)], high)
-    level = np.maximum(2.0 * sizes, noise / _SUDDEN)
-    low = _refined(g, solution, low, earlier, level[begins])
-    high = _refined(g, solution, high, later, level[ends])
-    noise = noise[begins]
-    earlier, later = _beside(solution, low, -1), _beside(solution, high, 1)
-    both = np.concatenate([earlier, later])
-    values = solution.values(g, both).reshape(2, -1)
-    # The noise within the interval may come from a jump at its end.
-    beside = solution.noise(g, both).reshape(2, -1)
-    before, after = np.where(np.abs(values) > _SUDDEN * beside, np.sign(values), 0.0)
-    return ZeroIntervals(low, high, np.maximum(noise, beside.max(axis=0)), before, after)
-
-
-def _refined(
-    g: EventFunction, solution: Solution, ends: Array, others: Array, level: Array
-) -> Array:
-    """Return times, from `ends` toward `others`, up to which a function is below `level`."""
-    # A polynomial may extend beyond a kink of the function; kinks of the solution are at edges.
-    inner, outer = ends.copy(), others.copy()
-    k = np.flatnonzero(~np.isin(inner, solution.pieces.edges))
-    k = k[np.abs(solution.values(g, outer[k])) > level[k]]
-    while k.size:
-        middle = 0.5 * inner[k] + 0.5 * outer[k]
-        is_between = (middle != inner[k]) & (middle != outer[k])
-        k, middle = k[is_between], middle[is_between]
-        is_zero = np.abs(solution.values(g, middle)) <= level[k]
-        inner[k] = np.where(is_zero, middle, inner[k])
-        outer[k] = np.where(is_zero, outer[k], middle)
-    return inner
-
-
-def _beside(solution: Solution, times: Array, side: int) -> Array:
-    edges = solution.pieces.edges
-    piece = np.searchsorted(edges, times, side="left" if side < 0 else "right") - 1
-    piece = np.clip(piece, 0, len(edges) - 2)
-    beside = times + side * _BEFORE * (edges[piece + 1] - edges[piece])
-    return np.asarray(np.clip(beside, edges[0], edges[-1]))

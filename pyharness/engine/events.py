@@ -10,15 +10,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pyharness.engine.event_fits import ROUNDING, Solution, fitted, with_noise, zero_intervals
+from pyharness.engine.event_fits import ROUNDING, STATE_ROUNDING, Solution, fitted, with_noise
 from pyharness.engine.event_functions import EventFunction
 from pyharness.engine.event_roots import FIT_ERROR, Index, Roots, isolated, joined, may_vanish
+from pyharness.engine.event_zeros import zero_intervals
 from pyharness.engine.periodic_events import improved, repeated
 from pyharness.model.array_type import Array
-from pyharness.model.dense_output import sizes_of
 
 _BLOCK = 4_000  # polynomials whose roots are isolated together
-_STATE_ROUNDING = 2.0**-46  # error of the state's polynomials, relative to their largest values
 _POLISHES = 3
 # A time counts as exact if the sign changes within so many of its rounding errors.
 _EXACT = 8.0
@@ -118,16 +117,9 @@ def _are_same(g: EventFunction, solution: Solution, roots: Roots) -> Index:
     noise = np.maximum(roots.noise[:-1], roots.noise[1:])
     gap = np.diff(time)
     middle = time[:-1] + 0.5 * gap
-    states = solution.states(middle)
-    n, width = states.shape
-    count = 2 * width + 1
-    changes = max(_STATE_ROUNDING, solution.state_error) * sizes_of(
-        np.abs(states), solution.sol.n_own
-    )
     # The error of the state may decide the sign.
-    signs = np.eye(count, width, -1) - np.eye(count, width, -1 - width)
-    every = (states + signs[:, None] * changes).reshape(-1, width)
-    values = solution.values(g, np.full((count, n), middle).ravel(), every).reshape(-1, n)
+    part = max(STATE_ROUNDING, solution.state_error)
+    values = solution.changed_values(g, middle, part)
     found: Index = (
         (np.abs(values[0]) <= noise)
         | ((values < 0.0) != (values[0] < 0.0)).any(axis=0)

@@ -318,15 +318,17 @@ def taylor_step(
     relative: float,
     trial: float,
     longest: float,
+    is_beyond: bool = False,
 ) -> Step:
     """Return a step of y' = tape(t, y) from the time `t` and the state, shape (n,).
 
     `tolerances`, shape (n,), are the components' largest errors; `relative`, a relative tolerance,
-    determines the order. `trial` is a guess of the step, with the sign of `longest`. Raise
-    InputError where a switch would change back and forth without end.
+    determines the order. `trial` is a guess of the step, with the sign of `longest`. With
+    `is_beyond`, a step ends so far beyond a switch that rounding errors do not hide the change.
+    Raise InputError where a switch would change back and forth without end.
     """
     h, terms, end, order, expansions, status = extension().tape_step(
-        tape, t, state, tolerances, relative, trial, longest, Storage.PERTURBATION_LENGTH
+        tape, t, state, tolerances, relative, trial, longest, is_beyond, Storage.PERTURBATION_LENGTH
     )
     if status == Statuses.SLIDING:
         raise TimedError(SLIDING, t)

@@ -152,7 +152,7 @@ class Taylor(OdeSolver):  # type: ignore[misc]
     def _step_of(self, scale: Array, trial: float, longest: float) -> Step:
         step = taylor_step(
             self._tape, self.t, self.y, scale, self._relative,
-            self.direction * trial, self.direction * longest,
+            self.direction * trial, self.direction * longest, is_beyond=True,
         )  # fmt: skip
         self.nfev += step.expansions
         return step

@@ -80,13 +80,13 @@ def sizes_of(largest: Array, n_own: int) -> Array:
     """Return the sizes, (..., m), to which errors are relative, from the unknowns' largest values.
 
     The size is the largest component for omega, 1 for the quaternion, and the value itself for the
-    last `n_own` unknowns, the user's. A size of 0 becomes 1.
+    last `n_own` unknowns, the user's.
     """
     sizes = np.ones_like(largest)
     sizes[..., :3] = largest[..., :3].max(axis=-1, keepdims=True)
     own = largest.shape[-1] - n_own
     sizes[..., own:] = largest[..., own:]
-    return np.where(sizes > 0.0, sizes, 1.0)
+    return sizes
 
 
 @dataclass(frozen=True, eq=False)

@@ -220,6 +220,61 @@ def test_an_interval_of_zeros_is_one_event_wherever_the_integration_ends(directi
             assert times.tolist() == pytest.approx(expected, abs=1e-12), end
 
 
+def test_a_body_at_rest_has_no_error_that_hides_a_small_value() -> None:
+    rest = Scene("", (0.0, 0.0, 0.0), moments=(1.0, 2.0, 3.0))
+    assert times_of(rest, [1.0, 1e3], lambda t, w: w[1] - 3e-11) == []
+    pushed = replace(rest, torque=pulses([5.0], [1.0], [(0.0, 1e-10, 0.0)]))
+    assert times_of(pushed, [1.0, 1e3], lambda t, w: w[1] - 3e-11) == pytest.approx([5.6])
+
+
+def test_periodic_roots_after_an_interval_of_zeros_are_found() -> None:
+    ball = Scene("", (0.0, 0.0, 1.0), moments=(1.0, 1.0, 1.0))
+    found = times_of(ball, 6.5, lambda t, w: np.where(t < 1.0, 0.0, np.sin(np.pi * t)))
+    assert found == pytest.approx([0.0, 2.0, 3.0, 4.0, 5.0, 6.0], abs=1e-12)
+    nutation = Scene("", (0.3, 2.0, 0.1), moments=(1.0, 2.0, 3.0))
+    flips = times_of(nutation, 40.0, flip(2))
+    jumps = times_of(nutation, 40.0, lambda t, w: np.where(t < flips[0], -1.0, w[1]))
+    assert jumps == pytest.approx(flips, abs=1e-9)
+    assert len(flips) == 7
+
+
+@pytest.mark.parametrize(
+    ("rate", "tolerance"), [(0.03, 1e-9), (0.03, 1e-12), (3e-3, 1e-12), (3e-4, 1e-9), (3e-5, 1e-9)]
+)
+@pytest.mark.parametrize("part", [0.2, 0.47])
+def test_a_slow_state_has_one_event_in_a_dead_zone(
+    rate: float, tolerance: float, part: float
+) -> None:
+    """Omega is 5 + rate (t - 1) exactly; its rounding errors are many spacings of time."""
+    torque = TorqueLaw((rate, 0.0, 0.0))
+    ball = Scene("", (5.0 - rate, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=torque)
+    dead = part * rate
+
+    def relay(t: Any, omega: Any) -> Any:
+        return np.sign(omega[0] - 5.0) * (np.abs(omega[0] - 5.0) > dead)
+
+    def spring(t: Any, omega: Any) -> Any:
+        return np.maximum(omega[0] - 5.0 - dead, 0.0) - np.maximum(5.0 - dead - omega[0], 0.0)
+
+    for event in (relay, spring):
+        found = times_of(ball, 3.0, event, tolerance=tolerance)
+        assert found == pytest.approx([1.0 - part], abs=20.0 * tolerance / rate)
+
+
+def test_an_interval_of_zeros_is_shorter_than_a_polynomial() -> None:
+    omega = (-0.0038222917854609335, -5.41380616570781, -0.00823360074077185)
+    moments = (2.4789830764403558, 1.8552293637606434, 2.991871515393006)
+    high, low = -5.413800119471218, -5.4138030326532895
+
+    def spring(t: Any, w: Any) -> Any:
+        return np.maximum(w[1] - high, 0.0) - np.maximum(low - w[1], 0.0)
+
+    scene = Scene("", omega, moments=moments)
+    found = times_of(scene, 5.0, spring, tolerance=1e-6)
+    # From a run at the tolerance 1e-13.
+    assert found == pytest.approx([0.2478, 1.0683, 2.1247, 2.9452, 4.0016, 4.822], abs=1e-3)
+
+
 @pytest.mark.parametrize("end", [20.0, 33.0, 40.0, 60.0, 100.0, 300.0])
 def test_a_body_that_comes_to_rest_slowly_has_no_events(end: float) -> None:
     ball = Scene("", (1.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=damping(1.0))

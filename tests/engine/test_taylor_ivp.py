@@ -287,6 +287,36 @@ def test_a_state_beyond_binary64_fails() -> None:
     assert np.isfinite(found.y).all()
 
 
+def _relay(level: float, down: float, up: float) -> dict[str, Callable[..., Any]]:
+    """Return an equation whose acceleration changes at a level, and the event there."""
+    return {
+        "fun": lambda t, y: [y[1], np.where(y[0] > level, -down, up)],
+        "events": lambda t, y: 1.7 * (y[0] - level),
+    }
+
+
+@pytest.mark.parametrize("options", [{}, {"max_step": 0.1}])
+def test_events_at_a_switch_are_found_once(options: dict[str, Any]) -> None:
+    source = np.random.default_rng(20261129)
+    for number in range(30):
+        level = source.uniform(-5.0, 5.0) * (number % 2)
+        down, up, start = *source.uniform(0.3, 3.0, 2), source.uniform(0.2, 2.0)
+        rtol = float(10.0 ** source.uniform(-12.0, -6.0))
+        found = solve_ivp(
+            t_span=(0.0, 20.0), y0=[level + start, 0.0], method=Taylor, rtol=rtol, atol=rtol,
+            **_relay(level, down, up), **options,
+        )  # fmt: skip
+        fall = math.sqrt(2.0 * start / down)
+        halves = np.resize([2.0 * fall * down / up, 2.0 * fall], 200)
+        wanted = fall + np.append(0.0, np.cumsum(halves))
+        assert found.t_events[0] == pytest.approx(wanted[wanted < 20.0], abs=1e2 * rtol)
+    found = solve_ivp(
+        lambda t, y: [np.where(t > 1.0, 1.0, 0.0)], (0.0, 3.0), [0.0], method=Taylor,
+        events=lambda t, y: t - 1.0,
+    )  # fmt: skip
+    assert found.t_events[0] == pytest.approx([1.0], abs=1e-15)
+
+
 def test_warnings() -> None:
     with pytest.warns(UserWarning, match="the method Taylor ignores `jac`, `lband`"):
         solve_ivp(pendulum, (0.0, 1.0), [1.0, 2.0], method=Taylor, jac=None, lband=1)

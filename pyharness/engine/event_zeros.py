@@ -1,0 +1,188 @@
+"""Zero intervals, in which an event's function is 0 to within its error.
+
+One is a root if the function reaches 0 by a kink or a jump, not by decay.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pyharness.engine.event_fits import LONG_SHIFT, MUCH, STATE_ROUNDING, Solution, noise_of
+from pyharness.engine.event_functions import EventFunction
+from pyharness.engine.event_roots import Fits, Index, Roots
+from pyharness.model.array_type import Array
+from pyharness.model.dense_output import sizes_of
+
+# A function reaches 0 by a kink or a jump, not by decay, if it exceeds _SUDDEN times its error at
+# a distance of _BEFORE times the length of the solution's polynomial.
+_SUDDEN, _BEFORE = 32.0, 0.01
+_PARTS = np.array([0.1459, 0.382, 0.618, 0.8541, 1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class ZeroIntervals:
+    """The ascending intervals, `low` to `high` (s), in which a function is 0 to within its error.
+
+    Near an interval, values below `noise` can't be distinguished from 0. `before` and `after` are
+    the function's signs on both sides: 0 where it decays to 0, or at an end of the solution.
+    """
+
+    low: Array
+    high: Array
+    noise: Array
+    before: Array
+    after: Array
+
+    def roots(self, counts_touches: bool) -> Roots:
+        """Return each interval's root, at the end that integration from time 0 reaches first.
+
+        Without `counts_touches`, only intervals that exclude time 0, and have opposite signs on
+        both sides, have a root.
+        """
+        is_before = self.high < 0.0
+        is_first = (self.low <= 0.0) & ~is_before
+        time = np.where(is_before, self.high, np.maximum(self.low, 0.0))
+        lasting = np.where(self.high <= 0.0, self.low, self.high) - time
+        change = np.where(is_first, 0.0, np.where(is_before, self.after, -self.before))
+        is_root = is_first | (change != 0.0)
+        if not counts_touches:
+            is_root = ~is_first & (self.before * self.after < 0.0)
+        # An interval around time 0 is reached on both sides.
+        both = np.flatnonzero(is_root & is_first & (self.low < 0.0) & (self.high > 0.0))
+        time, change = (np.append(x[is_root], x[both]) for x in (time, change))
+        lasting = np.append(lasting[is_root], self.low[both])
+        return Roots.bare(time, change.astype(int), lasting=lasting)
+
+    def contain(self, g: EventFunction, solution: Solution, roots: Roots) -> Index:
+        """Return which roots are in an interval, or so near that the function is 0 in between."""
+        following = np.searchsorted(self.low, roots.time, side="right")
+        before = np.append(-math.inf, self.high)[following]
+        after = np.append(self.low, math.inf)[following]
+        found: Index = roots.time <= before
+        # Sign changes of a function that is not smooth have errors of up to 256 spacings of
+        # floats.
+        longest = np.diff(solution.pieces.edges).max()
+        apart = np.minimum(roots.time - before, after - roots.time)
+        found |= apart <= 256.0 * np.spacing(np.maximum(np.abs(roots.time), longest))
+        for edges, number in ((before, following - 1), (after, following)):
+            near = np.flatnonzero(np.isfinite(edges) & ~found)
+            noise = np.maximum(self.noise[number[near]], roots.noise[near])
+            # Roots of odd multiplicity above 1 are inexact.
+            middle = 0.5 * roots.time[near] + 0.5 * edges[near]
+            found[near] = _is_zero_between(g, solution, edges[near], middle, noise)
+        return found
+
+    def merged(self, g: EventFunction, solution: Solution) -> "ZeroIntervals":
+        """Return the intervals, with those as one between which the function is 0."""
+        noise = np.maximum(self.noise[1:], self.noise[:-1])
+        is_one = _is_zero_between(g, solution, self.high[:-1], self.low[1:], noise)
+        first = np.flatnonzero(np.append(True, ~is_one))
+        last = np.append(first[1:], len(self.low)) - 1
+        noise = np.maximum.reduceat(self.noise, first)
+        return ZeroIntervals(
+            self.low[first], self.high[last], noise, self.before[first], self.after[last]
+        )
+
+
+def _is_zero_between(
+    g: EventFunction, solution: Solution, ends: Array, times: Array, noise: Array
+) -> Index:
+    """Return where a function is 0 to within `noise` between two times each, but for rounding."""
+    n = len(ends)
+    if not n:
+        return np.zeros(0, dtype=bool)
+    # A periodic function may be 0 at one of them.
+    between = (ends + np.multiply.outer(_PARTS, times - ends)).ravel()
+    states = solution.states(between)
+    values = np.abs(solution.values(g, between, states)).reshape(-1, n)
+    found: Index = (values <= noise).all(axis=0)
+    k = np.flatnonzero(~found)
+    if k.size:
+        # Rounding errors of the state change the value of a function with jumps at random.
+        states = states.reshape(-1, n, states.shape[1])[:, k]
+        apart = np.abs(states - solution.states(ends[k])).max(axis=0)
+        sizes = sizes_of(np.abs(states[-1]), solution.sol.n_own)
+        is_zero = np.abs(solution.changed_values(g, times[k], STATE_ROUNDING)) <= noise[k]
+        found[k] = (apart <= STATE_ROUNDING * sizes).all(axis=1)
+        found[k] &= is_zero.any(axis=0) & ~is_zero.all(axis=0)
+    return found
+
+
+def _begins(fits: Fits, numbers: Index) -> Index:
+    """Return where each group of adjacent polynomials begins in ascending `numbers`."""
+    return np.flatnonzero(np.append(True, fits.low[numbers[1:]] != fits.high[numbers[:-1]]))
+
+
+def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroIntervals | None:
+    """Return the intervals in which a function is 0 to within its error, if any."""
+    sizes = fits.sizes
+    if not sizes.size:
+        return None
+    largest = sizes.argmax()
+    # If no value is far above its error, all polynomials may be 0.
+    is_near = sizes <= max(sizes[largest] / MUCH, MUCH * fits.noise[largest])
+    if not is_near.any():
+        return None
+    near = np.flatnonzero(is_near)
+    unknown = near[fits.noise[near] == 0.0]
+    if unknown.size:
+        fits.noise[unknown] = noise_of(g, solution, fits.low[unknown], fits.high[unknown])
+    zero = near[sizes[near] <= 2.0 * fits.noise[near]]
+    if zero.size:
+        # A jump beside an interval is a smaller part of a derivative over a longer distance.
+        again = noise_of(g, solution, fits.low[zero], fits.high[zero], LONG_SHIFT)
+        fits.noise[zero] = np.minimum(fits.noise[zero], again)
+    noise = 2.0 * fits.noise
+    zero = zero[sizes[zero] <= noise[zero]]
+    if not zero.size:
+        return None
+    level = np.maximum(2.0 * sizes, noise / MUCH)
+    # The first and last polynomials of an interval may extend beyond its ends.
+    begins = _begins(fits, zero)
+    least = np.minimum.reduceat(level[zero], begins)
+    level[zero] = np.repeat(least, np.diff(begins, append=len(zero)))
+    zero = zero[sizes[zero] <= level[zero]]
+    begins = _begins(fits, zero)
+    ends = zero[np.append(begins[1:], len(zero)) - 1]
+    begins = zero[begins]
+    low, high = fits.low[begins], fits.high[ends]
+    earlier = np.minimum(fits.low[begins - 1], low)
+    later = np.maximum(fits.high[(ends + 1) % len(sizes)], high)
+    low = _refined(g, solution, low, earlier, level[begins])
+    high = _refined(g, solution, high, later, level[ends])
+    noise = noise[begins]
+    earlier, later = _beside(solution, low, -1), _beside(solution, high, 1)
+    both = np.concatenate([earlier, later])
+    values = solution.values(g, both).reshape(2, -1)
+    # The noise within the interval may come from a jump at its end.
+    beside = solution.noise(g, both).reshape(2, -1)
+    before, after = np.where(np.abs(values) > _SUDDEN * beside, np.sign(values), 0.0)
+    noise = np.maximum(noise, beside.max(axis=0))
+    return ZeroIntervals(low, high, noise, before, after).merged(g, solution)
+
+
+def _refined(
+    g: EventFunction, solution: Solution, ends: Array, others: Array, level: Array
+) -> Array:
+    """Return times, from `ends` toward `others`, up to which a function is below `level`."""
+    # A polynomial may extend beyond a kink of the function; kinks of the solution are at edges.
+    inner, outer = ends.copy(), others.copy()
+    k = np.flatnonzero(~np.isin(inner, solution.pieces.edges))
+    k = k[np.abs(solution.values(g, outer[k])) > level[k]]
+    while k.size:
+        middle = 0.5 * inner[k] + 0.5 * outer[k]
+        is_between = (middle != inner[k]) & (middle != outer[k])
+        k, middle = k[is_between], middle[is_between]
+        is_zero = np.abs(solution.values(g, middle)) <= level[k]
+        inner[k] = np.where(is_zero, middle, inner[k])
+        outer[k] = np.where(is_zero, outer[k], middle)
+    return inner
+
+
+def _beside(solution: Solution, times: Array, side: int) -> Array:
+    edges = solution.pieces.edges
+    piece = np.searchsorted(edges, times, side="left" if side < 0 else "right") - 1
+    piece = np.clip(piece, 0, len(edges) - 2)
+    beside = times + side * _BEFORE * (edges[piece + 1] - edges[piece])
+    return np.asarray(np.clip(beside, edges[0], edges[-1]))

@@ -4,10 +4,11 @@ import argparse
 import re
 import shlex
 from collections.abc import Callable, Iterable, Sequence
+from difflib import get_close_matches
 from functools import partial
 from typing import Any
 
-from pyharness.checks.check import Selection
+from pyharness.checks.check import Selection, selected
 from pyharness.checks.integrators.judging import judge_integrator, replay_command
 from pyharness.checks.integrators.problem import DRAWS, Problem, problems
 from pyharness.checks.integrators.protocol import refuse_integrator
@@ -16,6 +17,8 @@ from pyharness.checks.port import Cell, port, port_cells, port_report, random_ce
 from pyharness.checks.scenes.random_scenes import MODERATE as KINDS
 from pyharness.cli import options as shared
 from pyharness.model.errors import InputError
+from pyharness.model.listing import PROGRAMS
+from pyharness.model.scene_file import case_numbers
 
 _OF_THE_CHECKS = ("only", "external", "update", "record")
 _SCENES = shared.Cost("random scenes of each kind", 1.0, 1e5, 1000)
@@ -32,10 +35,11 @@ def check_port(options: argparse.Namespace, programs: Sequence[str], cases: Sequ
     if seed is not None and not drawn:
         raise InputError("--seed has no meaning without random scenes; give --draws N")
     cells = [*port_cells(programs, cases, names), *drawn]
-    if not cells:
-        raise InputError(
-            f"--cell {','.join(names)}: there is no such cell; give one as in two-term/case-3"
-        )
+    for name in names:
+        if not any(selected(cell.name, [name]) for cell in cells):
+            raise _no_such_cell(name)
+    if options.draws is not None and not drawn and count:
+        raise InputError("--draws has no meaning with these cells; add random to --cell")
     shared.check_outputs(options)
     if options.self_test:
         return _port_self_test(options, cells)
@@ -47,6 +51,19 @@ def check_port(options: argparse.Namespace, programs: Sequence[str], cases: Sequ
         refuse_integrator(options.port)
     report = port_report(options.port, checks, len(cells), used if drawn else "")
     return shared.show(report, options, failed=not all(check.passed for check in checks))
+
+
+def _no_such_cell(name: str) -> InputError:
+    if name == "random":
+        return InputError(f"--cell {name}: there are no random scenes; give --draws N")
+    cells = [cell.name for cell in port_cells(PROGRAMS, case_numbers(), [])]
+    if any(selected(cell, [name]) for cell in cells):
+        return InputError(f"--cell {name}: excluded by --program or --case; leave them out")
+    near = get_close_matches(name, cells, n=1, cutoff=0.7)
+    hint = f"did you mean '{near[0]}'? " if near else ""
+    return InputError(
+        f"--cell {name}: there is no such cell; {hint}allowed: cells as in two-term/case-3"
+    )
 
 
 def _port_self_test(options: argparse.Namespace, cells: Sequence[Cell]) -> int:

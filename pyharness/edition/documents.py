@@ -40,8 +40,13 @@ _LINK = re.compile(r"(?<!!)\[((?:[^][]|\[[^]]*\])*)\]\([^):]*\)")
 
 
 def documents_folder(given: str | None = None) -> Path:
-    """Return `given` or the checkout's `docs`; raise InputError if a document is missing."""
-    folder = shipped("docs") if given is None else Path(given)
+    """Return `given`, or `docs` of the checkout or the current folder; check its documents.
+
+    Raise InputError if a document is missing.
+    """
+    folder = Path(given or "docs")
+    if given is None and shipped("docs").is_dir():
+        folder = shipped("docs")
     missing = [name for name in _LINKED if not (folder / name).is_file()]
     if not missing:
         return folder

@@ -11,7 +11,7 @@ from pyharness.model.attitude import IDENTITY
 from pyharness.model.listing import Listing
 from pyharness.model.report import Column, Picture, Report, Table, digits, words
 from pyharness.model.scene import Scene
-from pyharness.model.scene_report import ending, estimates, heading
+from pyharness.model.scene_report import ending, estimates, heading, scene_title
 from pyharness.model.trajectory import Array, Trajectory, singular_steps
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ def trajectory_report(
         ],
         record=record,
         data=numbers,
-        pictures={"omega": lambda: _picture(f"{scene.name}: {title}", trajectory, numbers)},
+        pictures={"omega": lambda: _picture(f"{scene_title(scene)}: {title}", trajectory, numbers)},
     )
 
 

@@ -7,6 +7,7 @@ amplification and phase of a preliminary integration with few digits.
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -141,11 +142,19 @@ def scipy_method(name: str) -> Integrator:
         finite = np.isfinite(rows).all(axis=1)
         count = len(rows) if finite.all() else int(np.argmin(finite))
         ended = "complete" if count == len(times) else "overflow"
-        if ended == "complete" and is_blurred:
+        grows = ahead.growth > _SENSITIVE
+        if ended == "complete" and (is_blurred or grows):
             ended = "sensitive"
         # SciPy does not report the number of steps. The evaluations include the preliminary
         # integration.
-        return rows_of(times[:count], rows[:count], run.evaluations, len(times), ended)
+        found = rows_of(times[:count], rows[:count], run.evaluations, len(times), ended)
+        if ended == "sensitive" and grows:
+            reason = (
+                f"perturbations grow {ahead.growth:.2g} times; {run.label} meets a tolerance if "
+                f"they grow at most {_SENSITIVE:g} times"
+            )
+            found = replace(found, reason=reason)
+        return found
 
     return solve
 

@@ -239,4 +239,6 @@ def _has_jumps(table: Table) -> bool:
     lengths = np.diff(table.breaks)
     c0, c1, c2, c3 = table.pieces[:-1].T
     ends = c0 + lengths * (c1 + lengths * (c2 + lengths * c3))
-    return bool((np.abs(ends - table.pieces[1:, 0]) > _CONTINUOUS * np.abs(ends)).any())
+    # An end may be 0, but for rounding of the terms.
+    sizes = abs(c0) + lengths * (abs(c1) + lengths * (abs(c2) + lengths * abs(c3)))
+    return bool((np.abs(ends - table.pieces[1:, 0]) > _CONTINUOUS * sizes).any())

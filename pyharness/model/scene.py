@@ -60,7 +60,7 @@ CHANGING = (
 )
 OWN_STATES = (
     "the scene has states of its own; allowed for it: Stepper, and, with the methods auto and "
-    "taylor, solve, solve_many with one scene, and the verb run"
+    "taylor, solve, solve_many with one scene, and the verbs run and plan"
 )
 SPACE_TORQUE = (
     "the torque is about the axes of space; allowed: a torque about the axes of the body, or the "

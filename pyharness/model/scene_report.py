@@ -19,6 +19,11 @@ from pyharness.model.trajectory import Trajectory, singular_steps
 _LONGEST_TEXT = 60
 
 
+def scene_title(scene: Scene) -> str:
+    """Return the name of a scene, after the number of its case if it has one."""
+    return f"Case {scene.case}: {scene.name}" if scene.case else scene.name
+
+
 def heading(scene: Scene, listings: Iterable[Listing] = ()) -> list[str]:
     """Return lines on a scene, with marks on values that runs of `listings` assume."""
     if scene.inertia is not None:
@@ -45,7 +50,7 @@ def heading(scene: Scene, listings: Iterable[Listing] = ()) -> list[str]:
     )
     number, noun = counted(scene.steps, "step").split()
     lines = [
-        f"Case {scene.case}: {scene.name}" if scene.case else scene.name,
+        scene_title(scene),
         f"{body}; {torque}; omega(0) = {_tuple(scene.omega)}{on_omega} rad/s; "
         f"{number}{on_steps} {noun} of {scene.step_size:g} s",
         *legend([(scene, among)]),
@@ -141,7 +146,11 @@ def ending(trajectory: Trajectory) -> str:
         "sliding": f"sliding: {trajectory.reason}",
         "unchecked": "unchecked: a short change of the torque may have been passed",
         "event": "ended by a terminal event",
-        "sensitive": sensitive(trajectory.growth, trajectory.digits),
+        "sensitive": (
+            f"sensitive: {trajectory.reason}"
+            if trajectory.growth is None and trajectory.reason
+            else sensitive(trajectory.growth, trajectory.digits)
+        ),
     }
     told = singular_steps(trajectory.ier)
     return f"{endings.get(trajectory.ended, 'complete')} ({counts}){told and f'; {told}'}"

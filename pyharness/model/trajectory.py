@@ -227,9 +227,11 @@ class Trajectory(Conversions):
         if self.ended != "sensitive":
             told = singular_steps(self.ier)
             return f"The integration reached all requested times{told and f', but with {told}'}."
-        by = "" if self.growth is None else f", amplified by {short(self.growth)},"
-        left = counted(math.floor(self.digits or 0.0), "correct digit")
         why = "" if self.reason is None else f" {self.reason[0].upper()}{self.reason[1:]}."
+        if self.digits is None:
+            return f"The integration reached all requested times, but may miss the tolerance.{why}"
+        by = "" if self.growth is None else f", amplified by {short(self.growth)},"
+        left = counted(math.floor(self.digits), "correct digit")
         return (
             f"The integration reached all requested times, but rounding errors{by} exceed the "
             f"tolerance; omega has {left}.{why}"

@@ -177,6 +177,13 @@ def test_files_keep_functions_expressions_and_tables(
     assert record["scene"]["body"] == {"moments": ["20 + 3*exp(-t)", 23, "26 + 0.1*t"]}
 
 
+@pytest.mark.parametrize("interpolation", ["linear", "cubic"])
+def test_a_product_of_inertia_may_become_zero(interpolation: Any) -> None:
+    for k in range(1, 40):
+        matrices = [[[2.0, p, 0.0], [p, 2.0, 0.0], [0.0, 0.0, 3.0]] for p in (0.1 + k / 200, 0, 0)]
+        inertia_table([0.0, k / 10, 30.0], matrices, interpolation)
+
+
 @pytest.mark.parametrize("jump", [
     lambda t: np.where(t > 1.0, 4.0, 5.0), lambda t: 5.0 + np.sign(t - 1.0),
     lambda t: 5.0 + np.floor(t), lambda t: 4.0 + (t > 1.0), lambda t: 5.0 + t % 2.0,

@@ -22,7 +22,7 @@ from pyharness.model.records import build_record, scene_record
 from pyharness.model.report import Column, Picture, Report, Section, Table, digits, numbers, words
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.scene_file import case_numbers, case_scene
-from pyharness.model.scene_report import heading
+from pyharness.model.scene_report import heading, scene_title
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
 
@@ -140,7 +140,7 @@ def rotations_picture(scene: Scene) -> Picture:
     figure = Figure(figsize=(11.0, 5.9), dpi=100, layout="constrained")
     sphere, square = figure.subplots(1, 2)
     rows = _sphere(sphere, scene) + _square(square, scene)
-    return Picture(figure, numbers("panel curve x y z", rows), [scene.name])
+    return Picture(figure, numbers("panel curve x y z", rows), [scene_title(scene)])
 
 
 def _sphere(axes: "Axes", scene: Scene) -> list[list[Any]]:

@@ -4,7 +4,15 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from pyharness.checks.check import DRAWS, RECORD, Check, Selection, requested_suites
+from pyharness.checks.check import (
+    DRAWS,
+    RECORD,
+    Check,
+    Selection,
+    may_hold,
+    requested_suites,
+    selected,
+)
 from pyharness.checks.kinds import KINDS, verify
 from pyharness.checks.random_methods import ROUNDING
 from pyharness.checks.report import checks_report, references, samples, summary
@@ -104,20 +112,23 @@ def run(options: argparse.Namespace) -> int:
     for check in verify(chosen):
         checks.append(check)
         shared.progress(kinds.index(check.suite), len(kinds), check.id)
-    if not checks:
+    ids = [check.id for check in checks]
+    missing = [x for x in chosen.only if "/" in x and not any(selected(id, [x]) for id in ids)]
+    if missing or not checks:
         if kinds == ["random"] and not chosen.draws:
             raise InputError("--draws 0 leaves no random scene to check; allowed: 1 or more")
-        if chosen.may_ask("decks") and compiler() is None:
+        asked = missing[:1] or chosen.only
+        if may_hold("decks", asked) and compiler() is None:
             raise InputError(
                 "the check needs gfortran to compile decks; install it, or put it on the PATH"
             )
-        if not chosen.record.is_dir() and chosen.may_ask("golden"):
+        if not chosen.record.is_dir() and may_hold("golden", asked):
             raise InputError(
                 "there are no stored trajectories (golden) here; give --record DIR, or run in a "
                 "source checkout"
             )
         raise InputError(
-            f"--only {options.only}: there is no such check; allowed: {', '.join(KINDS)}"
+            f"--only {','.join(asked)}: there is no such check; allowed: {', '.join(KINDS)}"
         )
     drawn = samples(checks, ROUNDING) if options.draws is not None else []
     more = [*drawn, *references(checks)]

@@ -44,12 +44,10 @@ def documents_folder(given: str | None = None) -> Path:
 
     Raise InputError if a document is missing.
     """
-    folder = Path(given or "docs")
-    if given is None and shipped("docs").is_dir():
-        folder = shipped("docs")
-    missing = [name for name in _LINKED if not (folder / name).is_file()]
-    if not missing:
-        return folder
+    for folder in [shipped("docs"), Path("docs")] if given is None else [Path(given)]:
+        missing = [name for name in _LINKED if not (folder / name).is_file()]
+        if not missing:
+            return folder
     if given is None:
         raise InputError(
             "edition: an installed package does not contain the documents; give --docs DIR, "

@@ -11,7 +11,9 @@ import pytest
 
 from pyharness.cli.main import main
 from pyharness.edition import site
+from pyharness.edition.documents import documents_folder
 from pyharness.edition.report import LIBRARIES, MARK
+from pyharness.model.facts import shipped
 from tests.sweep.sweeps import files
 
 Capture = pytest.CaptureFixture[str]
@@ -118,10 +120,14 @@ def test_without_the_documents_it_says_where_they_are(
     tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """An installed package has no documents, and the files beside it belong to other packages."""
+    checkout = shipped("docs").parent
     monkeypatch.setattr("pyharness.edition.documents.shipped", lambda _: tmp_path)
+    monkeypatch.chdir(tmp_path)
     assert edition(tmp_path / "site") == 2
     assert "--docs" in capsys.readouterr().err
     assert not (tmp_path / "site").exists()
+    monkeypatch.chdir(checkout)
+    assert documents_folder() == Path("docs")
 
 
 @pytest.mark.parametrize("name", LIBRARIES)

@@ -108,3 +108,13 @@ def test_opaque_torque_has_no_spans() -> None:
     scene = Scene("", KINK.omega, moments=KINK.moments, torque=torque)
     assert isinstance(scene.torque, StateTorque)
     assert solve(scene, 6.0, "dop853", 1e-6, dense_output=True).ended == "complete"
+
+
+@pytest.mark.parametrize("method", SCIPY_METHODS)
+def test_perturbations_that_outgrow_the_local_tolerance_are_told(method: str) -> None:
+    scene = Scene("", (1e-6, 1.0, 1e-6), moments=(40.0, 30.0, 20.0))
+    found = solve(scene, 200.0, method, 1e-8)
+    assert found.ended == "sensitive"
+    assert (found.error, found.growth) == (None, None)
+    assert f"{method} meets a tolerance if they grow at most 1000 times" in found.message
+    assert solve(scene, 10.0, method, 1e-8).ended == "complete"

@@ -63,7 +63,9 @@ def test_end_of_a_program_is_marked(drawn: "list[Figure]", printed: Printed) -> 
     printed("run --case 2 --program runge-kutta --plot x.png --out x.txt")
     ends = [(panel, time) for panel, time, _ in _ends(drawn[0])]
     assert ends == [(panel, 0.25) for panel in range(3)]
-    assert "x: stopped at step 25 by V2" in drawn[0].texts[0].get_text()
+    title = drawn[0].texts[0].get_text()
+    assert "x: stopped at step 25 by V2" in title
+    assert title.startswith("Case 2: symmetric top without torque")
 
 
 @pytest.mark.campaign

@@ -35,6 +35,8 @@ _ATTITUDE = {
         Column(f"R{i}{j}", _NUMBER, name=f"R{i}{j}") for i in (1, 2, 3) for j in (1, 2, 3)
     ),
 }
+_POINTS = 2001  # of a curve from dense output, at least
+_MOST_MARKS = 100  # rows that are marked beside such a curve
 _END: dict[str, Any] = {
     "color": "black", "marker": "x", "linestyle": "none", "clip_on": False, "zorder": 5,
 }  # fmt: skip
@@ -131,8 +133,12 @@ def _picture(title: str, trajectory: Trajectory, numbers: Table) -> Picture:
 
     has_attitude = trajectory.attitude is not None and len(trajectory.time) > 0
     figure = Figure(figsize=(12.5 if has_attitude else 7.0, 7.0), dpi=110, layout="constrained")
-    marker = "o" if len(trajectory.time) == 1 else ""
-    style: dict[str, Any] = {"color": "black", "linewidth": 1.2, "marker": marker}
+    curve = _dense(trajectory)
+    has_marks = len(trajectory.time) == 1 or (
+        curve is not trajectory and len(trajectory.time) <= _MOST_MARKS
+    )
+    style: dict[str, Any] = {"color": "black", "linewidth": 1.2}
+    marks: dict[str, Any] = {"color": "black", "linestyle": "", "marker": ".", "markersize": 5}
     note = f"x: {ending(trajectory)}" if not trajectory.has_all_rows else ""
     left: Any = figure
     if has_attitude:
@@ -140,16 +146,32 @@ def _picture(title: str, trajectory: Trajectory, numbers: Table) -> Picture:
 
         parts: Any = figure.subfigures(1, 2, width_ratios=(7.0, 5.5))
         left, right = parts
-        draw_sphere(right.add_subplot(projection="3d"), trajectory)
-    axes = left.subplots(3, 1, sharex=True)
-    for row in range(3):
-        axes[row].plot(trajectory.time, trajectory.omega[:, row], **style)
-        if note:
+        draw_sphere(right.add_subplot(projection="3d"), curve)
+    labels = [*(f"$\\omega_{row + 1}$ (rad/s)" for row in range(3)), *trajectory.states]
+    axes = left.subplots(len(labels), 1, sharex=True)
+    paths = [np.column_stack([x.omega, *x.states.values()]) for x in (curve, trajectory)]
+    for row, label in enumerate(labels):
+        if len(curve.time) > 1:
+            axes[row].plot(curve.time, paths[0][:, row], **style)
+        if has_marks:
+            axes[row].plot(trajectory.time, paths[1][:, row], **marks)
+        if note and row < 3:
             mark_end(axes[row], trajectory, row)
-        axes[row].set_ylabel(f"$\\omega_{row + 1}$ (rad/s)")
+        axes[row].set_ylabel(label, parse_math=row < 3)
         axes[row].grid(visible=True, linewidth=0.3)
-    axes[2].set_xlabel("time (s)")
+    axes[-1].set_xlabel("time (s)")
     return Picture(figure, numbers, (title, note))
+
+
+def _dense(trajectory: Trajectory) -> Trajectory:
+    """Return the trajectory with the rows of its dense output, if it has one."""
+    sol = trajectory.sol
+    if sol is None or sol.t_min == sol.t_max:
+        return trajectory
+    times = np.linspace(sol.t_min, sol.t_max, max(_POINTS, len(trajectory.time)))
+    omega, *rest = np.split(sol(times).T, [3, 3 if trajectory.attitude is None else 7], axis=1)
+    attitude, own = (x if x.size else None for x in rest)
+    return replace(trajectory, time=times, omega=omega, attitude=attitude, own=own)
 
 
 def mark_end(axes: "Axes", trajectory: Trajectory, row: int) -> None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from pyharness import read_scene, solve
 from pyharness.views import pictures as plots
 from tests.conftest import Printed
 
@@ -66,6 +67,20 @@ def test_end_of_a_program_is_marked(drawn: "list[Figure]", printed: Printed) -> 
     title = drawn[0].texts[0].get_text()
     assert "x: stopped at step 25 by V2" in title
     assert title.startswith("Case 2: symmetric top without torque")
+
+
+def test_curves_are_dense_and_own_states_are_shown(
+    drawn: "list[Figure]", printed: Printed, tmp_path: Path
+) -> None:
+    law = "[torque]\nexpression = ['-h', '0', '0']\n[states.h]\nstart = 0.0\nrate = 'w1'\n"
+    (tmp_path / "own.toml").write_text(f"{BODY}{law}")
+    printed("run --scene own.toml --times 1,8 --plot x.png --out x.txt")
+    assert [axes.get_ylabel()[-1:] for axes in drawn[0].axes] == [")", ")", ")", "h"]
+    found = solve(read_scene("own.toml"), np.linspace(0.0, 8.0, 2001))
+    for axes, wanted in zip(drawn[0].axes, found.y, strict=True):
+        curve, rows = axes.lines
+        assert np.asarray(curve.get_ydata()) == pytest.approx(wanted, abs=1e-7)
+        assert list(rows.get_xdata()) == [1.0, 8.0]
 
 
 @pytest.mark.campaign

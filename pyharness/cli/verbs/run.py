@@ -181,7 +181,10 @@ def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajec
             )
         check_animation(options.animate, scene.changing or principal(scene)[0].moments)
         attitude = True
-    more: dict[str, Any] = {"attitude": attitude, "dense_output": options.animate is not None}
+    is_dense = options.animate is not None
+    # Other methods would solve again.
+    is_dense |= options.plot is not None and name in ("auto", "taylor", "closed-form")
+    more: dict[str, Any] = {"attitude": attitude, "dense_output": is_dense}
     trajectory = solve(scene, times, name, tolerance, effort=shared.chosen_effort(options), **more)
     if options.animate is not None:
         trajectory.animate(options.animate)

@@ -22,7 +22,7 @@ module tape_step
   real(dp), parameter :: MOST_ROUNDING = 1e3_dp
   integer, parameter :: MOST_LONGER = 12 ! expansions of a step that is too short
   ! Change of a switch's operand beyond its level, in rounding errors, and the longest time that it
-  ! takes, over the step, unless the tolerance allows more.
+  ! takes, over the step that was tried, unless the tolerance allows more.
   real(dp), parameter :: BEYOND = 16.0_dp, LONGEST_BEYOND = 1e-6_dp
   ! Tolerance whose reciprocal is a number.
   real(dp), parameter :: LEAST_TOLERANCE = 2.0_dp**(-1000)
@@ -183,7 +183,8 @@ contains
         end if
         longer = longer*abs(s%h/switches%slope)
       end associate
-      longer = max(2.0_dp*spacing(request%t + step%h), min(longer, abs(s%h)*max(LONGEST_BEYOND, request%relative)))
+      longer = min(longer, abs(s%h)*max(LONGEST_BEYOND, request%relative))
+      longer = max(longer, 2.0_dp*spacing(request%t + step%h))
       step_beyond = (request%t + (step%h + sign(longer, s%h))) - request%t
       if (abs(step_beyond) > abs(request%longest)) step_beyond = request%longest
     end function step_beyond

@@ -38,7 +38,7 @@ def check_port(options: argparse.Namespace, programs: Sequence[str], cases: Sequ
     for name in names:
         if not any(selected(cell.name, [name]) for cell in cells):
             raise _no_such_cell(name)
-    if options.draws is not None and not drawn and count:
+    if count and names and not any(map(_is_random, names)):
         raise InputError("--draws has no meaning with these cells; add random to --cell")
     shared.check_outputs(options)
     if options.self_test:
@@ -53,9 +53,15 @@ def check_port(options: argparse.Namespace, programs: Sequence[str], cases: Sequ
     return shared.show(report, options, failed=not all(check.passed for check in checks))
 
 
+def _is_random(cell: str) -> bool:
+    return cell.partition("/")[0] == "random"
+
+
 def _no_such_cell(name: str) -> InputError:
-    if name == "random":
-        return InputError(f"--cell {name}: there are no random scenes; give --draws N")
+    if _is_random(name):
+        return InputError(
+            f"--cell {name}: no random scene is in it; give --draws N, or leave out --program"
+        )
     cells = [cell.name for cell in port_cells(PROGRAMS, case_numbers(), [])]
     if any(selected(cell, [name]) for cell in cells):
         return InputError(f"--cell {name}: excluded by --program or --case; leave them out")

@@ -17,6 +17,7 @@ from pyharness.model.dense_output import sizes_of
 # A function reaches 0 by a kink or a jump, not by decay, if it exceeds _SUDDEN times its error at
 # a distance of _BEFORE times the length of the solution's polynomial.
 _SUDDEN, _BEFORE = 32.0, 0.01
+# Samples between two times at which a function is 0 if it is 0 throughout.
 _PARTS = np.array([0.1459, 0.382, 0.618, 0.8541, 1.0])
 
 
@@ -92,7 +93,7 @@ def _is_zero_between(
     n = len(ends)
     if not n:
         return np.zeros(0, dtype=bool)
-    # A periodic function may be 0 at one of them.
+    # A periodic function may be 0 at one sample.
     between = (ends + np.multiply.outer(_PARTS, times - ends)).ravel()
     states = solution.states(between)
     values = np.abs(solution.values(g, between, states)).reshape(-1, n)

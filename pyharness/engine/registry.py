@@ -228,7 +228,7 @@ def computes_attitude(scene: Scene, method: str, requested: bool | None) -> bool
 
 
 def check_attitude(method: str, able: Iterable[str] = WITH_ATTITUDE) -> None:
-    """Raise InputError if the method can't propagate the attitude; some that can are `able`."""
+    """Raise InputError if the method can't propagate the attitude; the message names `able`."""
     if not REGISTRY[method].attitude:
         allowed = ", ".join(able)
         raise InputError(f"method {method} does not compute attitudes; allowed: {allowed}")

@@ -12,7 +12,7 @@ from pyharness.model.listing import Listing
 from pyharness.model.report import Column, Picture, Report, Table, digits, words
 from pyharness.model.scene import Scene
 from pyharness.model.scene_report import ending, estimates, heading, scene_title
-from pyharness.model.trajectory import Array, Trajectory, singular_steps
+from pyharness.model.trajectory import Array, Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -86,7 +86,7 @@ def trajectory_report(
     def record() -> dict[str, Any]:
         from pyharness.model import records
 
-        reason = trajectory.reason or singular_steps(trajectory.ier)
+        singular = 0 if trajectory.ier is None else int(np.count_nonzero(trajectory.ier))
         names = ("time", "recorded_time", "omega", "velocity", "attitude")
         arrays = {name: getattr(trajectory, name) for name in names}
         return {
@@ -102,7 +102,8 @@ def trajectory_report(
             },
             **({} if bound is None else {"reference_bound": bound.record()}),
             **records.ending_record(trajectory),
-            **({"reason": reason} if reason else {}),
+            **({"reason": trajectory.reason} if trajectory.reason else {}),
+            **({"singular_steps": singular} if singular else {}),
             "build": records.build_record(),
             "assumptions": assumption_records([(scene, [listing] if listing else [])]),
         }

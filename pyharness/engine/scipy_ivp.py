@@ -148,13 +148,15 @@ def scipy_method(name: str) -> Integrator:
         # SciPy does not report the number of steps. The evaluations include the preliminary
         # integration.
         found = rows_of(times[:count], rows[:count], run.evaluations, len(times), ended)
-        if ended == "sensitive" and grows:
-            reason = (
-                f"perturbations grow {ahead.growth:.2g} times; {run.label} meets a tolerance if "
-                f"they grow at most {_SENSITIVE:g} times"
-            )
-            found = replace(found, reason=reason)
-        return found
+        if ended != "sensitive":
+            return found
+        reason = (
+            f"a coarse integration estimates an error amplification of {ahead.growth:.2g}; above "
+            f"{_SENSITIVE:g}, {run.label} may miss its tolerance"
+        )
+        if not grows:
+            reason = "parts of the torque cancel, with rounding errors above the tolerance"
+        return replace(found, reason=reason)
 
     return solve
 

@@ -26,15 +26,16 @@ def in_reverse(found: Trajectory) -> Trajectory:
 def joined(before: Trajectory, after: Trajectory) -> Trajectory:
     """Return the trajectories before and after time 0, both in ascending order, as one."""
     both = before, after
+    ended = min((x.ended for x in both), key=_WORST_FIRST.index)
     rows: dict[str, Any] = {
         name: np.concatenate([getattr(x, name) for x in both]) for name in row_names(after)
     }
     return replace(
         after,
         **rows,
-        ended=min((x.ended for x in both), key=_WORST_FIRST.index),
+        ended=ended,
         error=_larger(before.error, after.error),
-        reason=before.reason or after.reason,
+        reason=next((x.reason for x in both if x.ended == ended and x.reason), None),
         growth=_larger(before.growth, after.growth),
         steps=before.steps + after.steps,
         evaluations=before.evaluations + after.evaluations,

@@ -109,8 +109,8 @@ class Trajectory(Conversions):
         The number of steps, and of evaluations of the right-hand side. For SciPy's methods and the
         method `reference`, `steps` is the number of rows.
     ended : str
-        Three endings have all rows: "complete"; "sensitive", if the amplified rounding error
-        exceeds the tolerance; and "unchecked", if SciPy may have stepped over a short change of the
+        Three endings have all rows: "complete"; "sensitive", if amplified errors may exceed the
+        tolerance; and "unchecked", if SciPy may have stepped over a short change of the
         torque. The early endings are "overflow"; "stopped", by the Lipschitz test of the
         Runge-Kutta program; "singular", where the torque is undefined; "sliding", where the torque
         would jump back and forth without end; and "event", at a terminal event.
@@ -123,10 +123,10 @@ class Trajectory(Conversions):
         component along the trajectory; the error of the attitude is an angle (rad).
     growth : float or None
         The error amplification: the largest norm of the state-transition matrix of omega from any
-        time to the end; with attitude multiplied by 1 + omega t / 2, with the largest omega.
+        time to the end.
     reason : str or None
-        The time and the operation at which a recorded torque ended the integration early, or made
-        the ending "sensitive".
+        The time and the operation at which a recorded torque ended the integration early; or why
+        the ending is "sensitive", under such a torque or by a method of SciPy.
     attitude : ndarray, shape (n, 4), or None
         Quaternions from body to space, scalar first, with continuous signs.
     own : ndarray, shape (n, k), or None

@@ -98,10 +98,10 @@ def test_run_counts_the_steps_with_a_singular_matrix(printed: Printed, tmp_path:
     command = f"run --scene {path} --program four-term --listing corrected"
     told = "a singular matrix (IER = 129) in 3 steps"
     assert printed(command).splitlines()[-1].endswith(f"; {told}")
-    assert _record(printed, command)["reason"] == told
+    assert _record(printed, command)["singular_steps"] == 3
     run = run_program(read_scene(path), subset("four-term", "corrected"))
     assert run.message == f"The integration reached all requested times, but with {told}."
-    assert "reason" not in _record(printed, "run --case 3 --program four-term")
+    assert "singular_steps" not in _record(printed, "run --case 3 --program four-term")
 
 
 def test_run_json_is_as_contracted(printed: Printed) -> None:

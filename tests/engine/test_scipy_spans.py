@@ -11,6 +11,7 @@ import pytest
 from pyharness import Scene, opaque, solve
 from pyharness.engine.registry import SCIPY_METHODS
 from pyharness.engine.scipy_run import series_beside
+from pyharness.engine.sides import joined
 from pyharness.model.state_torque import StateTorque
 from pyharness.torques import table
 
@@ -116,5 +117,9 @@ def test_perturbations_that_outgrow_the_local_tolerance_are_told(method: str) ->
     found = solve(scene, 200.0, method, 1e-8)
     assert found.ended == "sensitive"
     assert (found.error, found.growth) == (None, None)
-    assert f"{method} meets a tolerance if they grow at most 1000 times" in found.message
+    assert f"above 1000, {method} may miss its tolerance" in found.message
+    # The reason is that of the side whose ending is told.
+    overflow = replace(found, ended="overflow", reason=None)
+    assert (joined(found, overflow).ended, joined(found, overflow).reason) == ("overflow", None)
+    assert joined(replace(found, reason=None), found).reason == found.reason
     assert solve(scene, 10.0, method, 1e-8).ended == "complete"

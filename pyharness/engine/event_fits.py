@@ -161,9 +161,10 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
         if not is_done.all():
             near = np.flatnonzero(~is_done)
             noise = noise_of(g, solution, low[near], high[near])
-            # The function remains 0 in a part alone, whose end errors of the state hardly move.
+            # A function that is 0 in a part of the interval alone has a kink, which noise must not
+            # smooth: the ends of the part are events.
             is_zero = np.lib.stride_tricks.sliding_window_view(values[near] == 0.0, _RUN, axis=1)
-            is_partly_zero = is_zero.all(axis=2).any(axis=1) & (largest[near] > 2.0 * noise)
+            is_partly_zero = np.any(is_zero.all(axis=2), axis=1) & (largest[near] > 2.0 * noise)
             is_done[near] = (tail[near] <= noise) & ~is_partly_zero
         fits = Fits(low, high, first, last, c, np.zeros(len(low)))
         done.append(fits if is_done.all() else fits.only(is_done))

@@ -54,9 +54,9 @@ def _short(value: Any) -> str:
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
 
 
-def singular_steps(ier: Array | None) -> str:
+def singular_steps(ier: NDArray[Any] | None) -> str:
     """Return a phrase on the steps in which a program's matrix was singular, or nothing."""
-    count = 0 if ier is None else np.count_nonzero(ier)
+    count = 0 if ier is None else int(np.count_nonzero(ier))
     return f"a singular matrix (IER = 129) in {counted(count, 'step')}" if count else ""
 
 

@@ -118,7 +118,7 @@ def test_perturbations_that_outgrow_the_local_tolerance_are_told(method: str) ->
     assert found.ended == "sensitive"
     assert (found.error, found.growth) == (None, None)
     assert f"above 1000, {method} may miss its tolerance" in found.message
-    # The reason is that of the side whose ending is told.
+    # The reason belongs to the side whose ending is reported.
     overflow = replace(found, ended="overflow", reason=None)
     assert (joined(found, overflow).ended, joined(found, overflow).reason) == ("overflow", None)
     assert joined(replace(found, reason=None), found).reason == found.reason

@@ -80,7 +80,7 @@ def test_curves_are_dense_and_own_states_are_shown(
     for axes, wanted in zip(drawn[0].axes, found.y, strict=True):
         curve, rows = axes.lines
         assert np.asarray(curve.get_ydata()) == pytest.approx(wanted, abs=1e-7)
-        assert list(rows.get_xdata()) == [1.0, 8.0]
+        assert np.asarray(rows.get_xdata()).tolist() == [1.0, 8.0]
 
 
 @pytest.mark.campaign

@@ -57,7 +57,7 @@ subroutine tape_rows(n_numbers, numbers, omega0, n_times, times, tolerance, n_at
 end subroutine tape_rows
 
 subroutine tape_step(n_numbers, numbers, n, t, state, tolerances, relative, trial, longest, &
-                     is_beyond, n_terms, h, terms, ends, order, expansions, status)
+                     is_beyond, n_terms, h, terms, ends, order, expansions, is_switched, status)
   ! Compute one step of a system of ordinary differential equations by Taylor series: the terms of
   ! the unknowns, whose sums are the state at its end. The unit of time is the user's.
   !f2py threadsafe
@@ -80,6 +80,7 @@ subroutine tape_step(n_numbers, numbers, n, t, state, tolerances, relative, tria
   real(8), intent(out), target :: ends(n)       ! state at the end
   integer(4), intent(out) :: order
   integer(4), intent(out) :: expansions         ! number of expansions that were tried
+  integer(4), intent(out) :: is_switched        ! 1 if the step ended where a switch changes, else 0
   integer(4), intent(out) :: status             ! 0 complete, 2 no step is short enough
   type(step_t) :: taken
 
@@ -92,6 +93,7 @@ subroutine tape_step(n_numbers, numbers, n, t, state, tolerances, relative, tria
   h = taken%h
   order = taken%order
   expansions = taken%expansions
+  is_switched = merge(1, 0, taken%is_switched)
   status = taken%status
 end subroutine tape_step
 

@@ -34,7 +34,7 @@ module problem
     real(dp) :: relative                        !! tolerance that decides the order
     real(dp), pointer, contiguous :: state(:)
     real(dp), pointer, contiguous :: tolerances(:) !! allowed errors of the unknowns in the step
-    !! whether a step ends so far beyond a switch that rounding errors do not hide the change
+    !! whether a step ends a few rounding errors beyond a switch
     logical :: is_beyond = .false.
   end type step_request_t
 
@@ -44,6 +44,7 @@ module problem
     integer :: order, status, expansions        !! status of the module statuses
     real(dp), pointer, contiguous :: terms(:, :) !! (0:, unknowns); 0 beyond the order
     real(dp), pointer, contiguous :: state(:)
+    logical :: is_switched = .false.            !! whether it ended where a switch changes
   end type step_t
 
   type, public :: variation_request_t

@@ -22,8 +22,8 @@ module tape_step
   real(dp), parameter :: MOST_ROUNDING = 1e3_dp
   integer, parameter :: MOST_LONGER = 12 ! expansions of a step that is too short
   ! Change of a switch's operand beyond its level, in rounding errors, and the longest time that it
-  ! takes, over the step that was tried, unless the tolerance allows more.
-  real(dp), parameter :: BEYOND = 16.0_dp, LONGEST_BEYOND = 1e-6_dp
+  ! takes, over the tolerance and the step that was tried.
+  real(dp), parameter :: BEYOND = 8.0_dp, LONGEST_BEYOND = 0.01_dp
   ! Tolerance whose reciprocal is a number.
   real(dp), parameter :: LEAST_TOLERANCE = 2.0_dp**(-1000)
 
@@ -147,7 +147,8 @@ contains
         end do
         cycle
       end if
-      if (verdict == CROSSES .and. request%is_beyond) step%h = step_beyond()
+      step%is_switched = verdict == CROSSES
+      if (step%is_switched .and. request%is_beyond) step%h = step_beyond()
       factor = step%h/s%h
       do i = 1, tape%n_unknowns
         step%terms(:, i) = 0.0_dp
@@ -174,16 +175,14 @@ contains
       i = switches%first
       associate (operand => switches%operands(i), &
                  terms => s%a(0:s%order - 1, switches%operands(i)))
-        ! The next terms, which are left out, are smaller than the last ones.
-        longer = BEYOND*epsilon(s%h)*max(size_of(terms, factor), s%noise(operand)) &
-                 + factor**(s%order - 2)*size_of(terms(s%order - 1:), factor)
+        longer = BEYOND*epsilon(s%h)*max(size_of(terms, factor), s%noise(operand))
         ! The operand returns to its value at the beginning, which is beside the level.
         if (switches%on_level(i) == switches%crosses(i)) then
           longer = longer + abs(operand_error(i, switches, s))
         end if
         longer = longer*abs(s%h/switches%slope)
       end associate
-      longer = min(longer, abs(s%h)*max(LONGEST_BEYOND, request%relative))
+      longer = min(longer, LONGEST_BEYOND*request%relative*abs(s%h))
       longer = max(longer, 2.0_dp*spacing(request%t + step%h))
       step_beyond = (request%t + (step%h + sign(longer, s%h))) - request%t
       if (abs(step_beyond) > abs(request%longest)) step_beyond = request%longest

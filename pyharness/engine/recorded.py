@@ -301,13 +301,15 @@ class Step(NamedTuple):
     """A Taylor step of length `h`, 0 if no step is short enough.
 
     `terms`, shape (order + 1, n), are Taylor coefficients times powers of `h`; `state`, shape (n,),
-    is their sum. `expansions` counts the computed series.
+    is their sum. `expansions` counts the computed series. `is_switched` says whether the step ended
+    where a switch changes.
     """
 
     h: float
     terms: Array
     state: Array
     expansions: int
+    is_switched: bool = False
 
 
 def taylor_step(
@@ -324,14 +326,14 @@ def taylor_step(
 
     `tolerances`, shape (n,), are the components' largest errors; `relative`, a relative tolerance,
     determines the order. `trial` is a guess of the step, with the sign of `longest`. With
-    `is_beyond`, a step ends so far beyond a switch that rounding errors do not hide the change.
+    `is_beyond`, a step ends a few rounding errors beyond a switch.
     Raise InputError where a switch would change back and forth without end.
     """
-    h, terms, end, order, expansions, status = extension().tape_step(
+    h, terms, end, order, expansions, is_switched, status = extension().tape_step(
         tape, t, state, tolerances, relative, trial, longest, is_beyond, Storage.PERTURBATION_LENGTH
     )
     if status == Statuses.SLIDING:
         raise TimedError(SLIDING, t)
     if status != COMPLETE:
         h = 0.0
-    return Step(h, terms[: order + 1], end, expansions)
+    return Step(h, terms[: order + 1], end, expansions, bool(is_switched))

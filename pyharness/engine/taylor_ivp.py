@@ -32,6 +32,8 @@ _LEAST_SCALE = 2.0**-1000
 # _FIRST_CHANGE, and steps grow at most by the factor _MOST_GROWTH, as in SciPy's methods.
 _FIRST_CHANGE = 0.01
 _MOST_GROWTH = 10.0
+# An event at a switch is 0 there, but for rounding, which hides its sign until a short step later.
+_AFTER_SWITCH = 0.01  # over the step that ended at the switch
 _FIRST_PARTS = 1e-12, 1e-2  # least and largest first step, over the step that the tolerances allow
 
 
@@ -169,6 +171,8 @@ class Taylor(OdeSolver):  # type: ignore[misc]
         # As in `Stepper.step`.
         self._trial = max(self._trial, abs(step.h)) if is_cut else abs(step.h)
         self._longest = max(self._longest, _MOST_GROWTH * abs(step.h))
+        if step.is_switched:
+            self._longest = max(_AFTER_SWITCH * self._trial, 10.0 * math.ulp(end))
         self.t = self.t_bound if is_cut and longest == rest else end
         self.y = step.state
         return True, None

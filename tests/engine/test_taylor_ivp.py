@@ -317,6 +317,20 @@ def test_events_at_a_switch_are_found_once(options: dict[str, Any]) -> None:
     assert found.t_events[0] == pytest.approx([1.0], abs=1e-15)
 
 
+@pytest.mark.parametrize(
+    ("excess", "rtol", "most"), [(1e-8, 1e-4, 1e-6), (1e-8, 1e-9, 1e-8), (1e-10, 1e-12, 3e-6)]
+)
+def test_a_level_that_is_barely_exceeded_keeps_its_width(
+    excess: float, rtol: float, most: float
+) -> None:
+    found = solve_ivp(
+        lambda t, y: [np.where(np.sin(1.3 * t) > 1.0 - excess, 1.0, 0.0)], (0.0, 3.0), [0.0],
+        method=Taylor, rtol=rtol, atol=1e-13,
+    )  # fmt: skip
+    width = 2.0 * math.acos(1.0 - excess) / 1.3
+    assert found.y[0, -1] == pytest.approx(width, rel=most)
+
+
 def test_warnings() -> None:
     with pytest.warns(UserWarning, match="the method Taylor ignores `jac`, `lband`"):
         solve_ivp(pendulum, (0.0, 1.0), [1.0, 2.0], method=Taylor, jac=None, lband=1)

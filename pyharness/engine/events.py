@@ -98,9 +98,12 @@ def _bisected(g: EventFunction, solution: Solution, times: Array, changes: Index
     while k.size:
         middle = 0.5 * low[k] + 0.5 * high[k]
         k, middle = (x[(middle > low[k]) & (middle < high[k])] for x in (k, middle))
-        is_late = solution.values(g, middle) * changes[k] >= 0.0
+        # Of an interval of zeros, the root is the end that integration from time 0 reaches first.
+        is_before = times[k] < 0.0
+        values = solution.values(g, middle) * changes[k]
+        is_late = (values > 0.0) | ((values == 0.0) & ~is_before)
         low[k], high[k] = np.where(is_late, low[k], middle), np.where(is_late, middle, high[k])
-        found[k] = high[k]
+        found[k] = np.where(is_before, low[k], high[k])
     return found
 
 
@@ -125,7 +128,9 @@ def _are_same(g: EventFunction, solution: Solution, roots: Roots) -> Index:
         | ((values < 0.0) != (values[0] < 0.0)).any(axis=0)
         | (gap <= 8.0 * np.spacing(np.abs(time[1:])))
     )
-    return found | _have_one_extremum(g, solution, roots, noise)
+    # Polynomials are inexact by `near`; a larger value separates two roots.
+    is_flat = np.abs(values[0]) <= 2.0 * np.maximum(roots.near[:-1], roots.near[1:])
+    return found | (is_flat & _have_one_extremum(g, solution, roots, noise))
 
 
 def _grouped(roots: Roots, is_same: Index, ends: tuple[float, ...]) -> Roots:

@@ -261,6 +261,33 @@ def test_a_slow_state_has_one_event_in_a_dead_zone(
         assert found == pytest.approx([1.0 - part], abs=20.0 * tolerance / rate)
 
 
+@pytest.mark.parametrize("power", [3, 5, 7])
+def test_roots_of_a_power_are_those_of_its_base(power: int) -> None:
+    source = np.random.default_rng(20261130)
+    for _ in range(12):
+        third, spin, size, phase, level = source.uniform(
+            [0.4, 0.5, 0.2, 0.0, -0.9], [1.9, 3, 2, 6, 0.9]
+        )
+        top = Scene(
+            "", (size * math.cos(phase), size * math.sin(phase), spin), moments=(1.0, 1.0, third)
+        )
+        simple, high = (
+            times_of(
+                top, 25.0, lambda t, w, k=k, size=size, level=level: (w[0] / size - level) ** k
+            )
+            for k in (1, power)
+        )
+        assert high == pytest.approx(simple, abs=1e-3)
+
+
+@pytest.mark.parametrize("rate", [-0.05, 0.05])
+def test_a_narrow_dead_zone_is_an_event_at_its_near_end(rate: float) -> None:
+    torque = TorqueLaw((rate, 0.0, 0.0))
+    ball = Scene("", (-0.1, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=torque)
+    found = times_of(ball, 80.0 * rate, lambda t, w: np.where(np.abs(w[0]) < 0.0015, 0.0, w[0]))
+    assert found == pytest.approx([math.copysign(1.97, rate)], abs=1e-9)
+
+
 def test_an_interval_of_zeros_is_shorter_than_a_polynomial() -> None:
     omega = (-0.0038222917854609335, -5.41380616570781, -0.00823360074077185)
     moments = (2.4789830764403558, 1.8552293637606434, 2.991871515393006)

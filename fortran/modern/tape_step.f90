@@ -168,14 +168,11 @@ contains
 
     real(dp) function step_beyond()
       !! Return a step to beyond the switch that crosses, in spite of rounding errors.
-      real(dp) :: longer, noise(tape%n_unknowns)
-      integer :: i
+      real(dp) :: longer
 
-      call noise_of(s, noise, abs(request%state))
-      i = switches%first
-      associate (operand => switches%operands(i), &
-                 terms => s%a(0:s%order - 1, switches%operands(i)))
-        longer = BEYOND*epsilon(s%h)*max(size_of(terms, factor), s%noise(operand))
+      associate (i => switches%first)
+        ! `is_at_once` has computed the noise.
+        longer = BEYOND*epsilon(s%h)*s%noise(switches%operands(i))
         ! The operand returns to its value at the beginning, which is beside the level.
         if (switches%on_level(i) == switches%crosses(i)) then
           longer = longer + abs(operand_error(i, switches, s))

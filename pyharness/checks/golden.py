@@ -1,7 +1,8 @@
 """The golden record: recorded trajectories, as exact text.
 
 Each program or method has a file. An entry describes one trajectory: the command that prints it,
-its ending, a digest of all rows, and the first, tenth and last row as hexadecimal floats.
+its ending, a digest of all rows, and the first, tenth and last row and the mean of all rows as
+hexadecimal floats.
 """
 
 import hashlib
@@ -36,6 +37,7 @@ from pyharness.model.trajectory import Array, Trajectory
 _ANEW = "verify --update writes it anew"
 _MARK = "# Written by: python -m pyharness verify --update"
 _STEPS = (1, 10)
+_MEAN = "mean"
 _RECORDED_METHODS = ("taylor", "closed-form", "gauss-4", "rk4", *SCIPY_METHODS)
 _TOLERANCE = 1e-9
 _LARGEST = 1 << 24  # largest size (bytes) of a file
@@ -206,6 +208,8 @@ def _entry(each: Recorded, run: Trajectory) -> dict[str, Any]:
     n = len(rows)
     shown = sorted({step for step in (*_STEPS, n) if 1 <= step <= n})
     stop = run.stop
+    # Added one after another, so that the mean is the same on every processor.
+    means = np.cumsum(rows / max(1, n), axis=0)[-1:]
     digest = hashlib.sha256(np.where(np.isnan(rows), np.nan, rows).astype("<f8").tobytes())
     if run.ier is not None:
         digest.update(run.ier.astype("<i4").tobytes())
@@ -216,13 +220,21 @@ def _entry(each: Recorded, run: Trajectory) -> dict[str, Any]:
         "evaluations": run.evaluations,
         "stop": "" if stop is None else f"{stop.step} {stop.variable} {stop.quotient.hex()}",
         "digest": digest.hexdigest()[:32],
-        "rows": [[str(step), *map(float.hex, rows[step - 1].tolist())] for step in shown],
+        "rows": [
+            *([str(step), *map(float.hex, rows[step - 1].tolist())] for step in shown),
+            *([_MEAN, *map(float.hex, mean)] for mean in means.tolist()),
+        ],
     }
 
 
 def _rows(entry: dict[str, Any]) -> Array:
     """Return rows of step, time, printed time, omega and, for programs, velocity."""
-    return np.array([[float(row[0]), *map(float.fromhex, row[1:])] for row in entry["rows"]])
+    return np.array(
+        [
+            [0.0 if row[0] == _MEAN else float(row[0]), *map(float.fromhex, row[1:])]
+            for row in entry["rows"]
+        ]
+    )
 
 
 def _moved(old: dict[str, Any], new: dict[str, Any]) -> str:
@@ -241,7 +253,7 @@ def _moved(old: dict[str, Any], new: dict[str, Any]) -> str:
 def _text(name: str, entries: list[dict[str, Any]]) -> str:
     kind = "program" if name in PROGRAMS else "method"
     lines = [
-        f"# The {kind} {name}: rows are step, time, TIME, omega, velocity (programs).",
+        f"# The {kind} {name}: step, time, TIME, omega, velocity (programs); mean.",
         _MARK,
         f"schema = {SCHEMAS['golden record']}",
         f'mathematics = "{mathematics()}"',

@@ -122,8 +122,8 @@ def _batch(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Batch:
     t_end = own.get("t_end", t_end)
     omega = _omega(scene, own, values if body == "moments" else None, n)
     # The axes replace numbers of the file, which are normalised afterwards.
-    length = min(scene.attitude_length, sys.float_info.max)
-    given = tuple(length * each for each in scene.attitude or IDENTITY)
+    length = min(sweep.scene.attitude_length, sys.float_info.max)
+    given = tuple(length * each for each in sweep.scene.attitude or IDENTITY)
     attitude = _components("attitude", given, own, n, first=0)
     if attitude is not None:
         # A quaternion 0 fails as above.

@@ -73,9 +73,11 @@ def _overflow_time(batch: Batch, _: Mapping[str, Any]) -> Found:
 
 
 def _drift(batch: Batch, given: Mapping[str, Any]) -> Found:
-    bodies = batch.bodies[:, None, :]
-    start = batch.omega0[:, None, :]
-    rows = batch.rows(given["samples"])
+    # Powers of 2, by which no square is out of range.
+    bodies = np.ldexp(batch.bodies, -_exponents(batch.bodies))[:, None, :]
+    exponents = _exponents(batch.omega0)[:, None]
+    start = np.ldexp(batch.omega0[:, None, :], -exponents)
+    rows = np.ldexp(batch.rows(given["samples"]), -exponents)
     found = []
     for weight in (bodies, bodies**2):
         then, before = (weight * rows**2).sum(axis=2), (weight * start**2).sum(axis=2)
@@ -105,16 +107,28 @@ def _flips(batch: Batch, given: Mapping[str, Any]) -> Found:
 
 def _growth(batch: Batch, given: Mapping[str, Any]) -> Found:
     start = batch.omega0
-    size = np.linalg.norm(start, axis=1, keepdims=True)
+    size = _norms(start)[:, None]
     offset = given["offset"] * np.where(size > 0.0, size, 1.0)
     moved = start + offset / np.sqrt(3.0)
-    before = np.linalg.norm(moved - start, axis=1)
-    after = np.linalg.norm(batch.from_start(moved).omega - batch.omega, axis=1)
+    before = _norms(moved - start)
+    after = _norms(batch.from_start(moved).omega - batch.omega)
     return np.asarray(np.log(after / before) / np.abs(batch.t_end))
 
 
+def _exponents(vectors: Array) -> NDArray[np.intc]:
+    """Return the exponent of the largest component of each vector, with one component."""
+    return np.asarray(np.frexp(np.abs(vectors).max(axis=-1, keepdims=True))[1])
+
+
+def _norms(vectors: Array) -> Array:
+    exponents = _exponents(vectors)
+    scaled = np.linalg.norm(np.ldexp(vectors, -exponents), axis=-1)
+    return np.asarray(np.ldexp(scaled, exponents[..., 0]))
+
+
 def _unit(vectors: Array) -> Array:
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
+    scaled = np.ldexp(vectors, -_exponents(vectors))
+    return np.asarray(scaled / np.linalg.norm(scaled, axis=-1, keepdims=True))
 
 
 def _angles(ours: Array, theirs: Array) -> Array:

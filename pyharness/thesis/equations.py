@@ -45,7 +45,9 @@ def initial_torque(scene: Scene) -> Vector | None:
 
 
 def card_torque(scene: Scene) -> Vector | None:
-    """Return the initial torque (N m) of a case in Table 1, or None."""
+    """Return the initial torque (N m) of a case in Table 1, or None, as where no torque varies."""
+    if not scene.law.varies:
+        return None
     given = {each["case"]: each["torque"] for each in facts("printer")["initial_torque"]}
     return given.get(scene.case)
 

@@ -32,6 +32,7 @@ from pyharness.checks.scenes.random_scenes import draw, weekly_seed
 from pyharness.cli.main import main
 from pyharness.engine import problem
 from pyharness.engine.registry import METHODS
+from pyharness.engine.solve import solve
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.scene import Scene
@@ -208,6 +209,20 @@ def test_record_that_was_changed_fails_and_is_mended(tmp_path: Path, capsys: Cap
     assert "omega by 1 ulp" in told
     assert "gone: " in told
     assert path.read_text() == good
+
+
+def test_record_of_a_method_has_all_rows(capsys: Capture) -> None:
+    """Regression test: rows that are not in it were not compared."""
+
+    class Wrong:
+        def rows(self, scene: Scene) -> Trajectory:
+            run = solve(scene, scene.times(), "closed-form", 1e-9)
+            run.omega[50] += 1e-4
+            return run
+
+    with patch("pyharness.checks.golden.method_candidate", lambda *_: Wrong()):
+        assert main(["verify", "--only", "golden/closed-form/case-2"]) == 1
+    assert "golden/closed-form/case-2" in capsys.readouterr().out
 
 
 @pytest.mark.campaign

@@ -206,6 +206,27 @@ def test_error_and_drift_are_those_of_the_method(tmp_path: Path) -> None:
 _COARSE = BASE.replace("0.1", "0.2").replace("100", "50") + "[solve]\ntolerance = 1e-10\n"
 
 
+@pytest.mark.parametrize(("moment", "speed"), [(1.0, 1e155), (1e-30, 1e-130), (1.0, 1e-160)])
+def test_reductions_do_not_depend_on_the_units(moment: float, speed: float, tmp_path: Path) -> None:
+    """Regression test: squares of raw values were out of range."""
+    top = 'reductions = ["drift", "largest-tilt", "growth"]'
+    given = (
+        "scene.body.moments = [{0}, {1}, {2}]\nscene.initial.omega = [{3}, {4}, {5}]\n"
+        "scene.run = {{step_size = {6}, steps = 20}}\nsolve.method = 'taylor'\n"
+    )
+    found = []
+    for m, w in ((1.0, 1.0), (moment, speed)):
+        folder = tmp_path / f"{w}"
+        folder.mkdir()
+        scene = given.format(4 * m, 3 * m, 2 * m, 0.1 * w, w, 0.05 * w, 1 / w)
+        _, each = _found(folder, text(axis("omega.2", [w, 1.01 * w]), top=top, scene=scene))
+        found.append(each)
+    one, other = found
+    assert other["largest-tilt"] == pytest.approx(one["largest-tilt"], rel=1e-9, abs=0.0)
+    assert other["growth"] / speed == pytest.approx(one["growth"], rel=1e-6, abs=0.0)
+    assert (other["drift"] < 1e-9).all()
+
+
 def test_growth_is_that_of_the_middle_axis(tmp_path: Path) -> None:
     _, found = _found(tmp_path, text(axis("t_end", [10.0, 15.0]), top='reductions = ["growth"]'))
     logarithms = found["growth"] * [10.0, 15.0]

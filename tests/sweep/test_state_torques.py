@@ -151,6 +151,18 @@ def test_attitudes_are_relative_to_the_start(constant: float, tmp_path: Path) ->
         assert before.T @ after == pytest.approx(turned, abs=1e-9)
 
 
+@pytest.mark.parametrize("other", [(), axis("torque.constants.m", [2.0]), axis("steps", [20])])
+def test_attitude_beside_another_axis_replaces_a_number_of_the_file(
+    other: Any, tmp_path: Path
+) -> None:
+    """Regression test: it replaced a number of the unit quaternion."""
+    given = SCENE.replace("[0.5, 0.5, -0.5, 0.5]", "[1.0, 1.0, -1.0, 1.0]")
+    content = text(axis("attitude.2", [3.0]), *([other] if other else []), scene=given)
+    sweep = read_sweep(written(tmp_path, content))
+    ((_, batch),) = batches(sweep, every(sweep))
+    assert batch.first_attitudes * 12.0**0.5 == pytest.approx(np.array([[1.0, 1.0, 3.0, 1.0]]))
+
+
 OMEGA = axis("omega.1", [0.2])
 
 

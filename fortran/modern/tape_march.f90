@@ -685,8 +685,10 @@ contains
         correction = -operand_error(switches%first, switches, s)/switches%slope
         if (abs(correction*s%h) <= 2.0_dp*epsilon(factor)*abs(whole_step)) return
         ! The operand itself may be a rounding error, such as a component of omega that is 0.
-        if (abs(correction*switches%slope) <= ROUNDING*s%noise(switches%operands(switches%first))) &
+        if (abs(correction*switches%slope) &
+            <= ROUNDING*s%noise(switches%operands(switches%first))) then
           return
+        end if
         ! Another switch at the same time, but for rounding.
         if (abs(before*s%h) <= spacing(t(1))) return
         if (.not. abs(correction) <= 0.01_dp*before) then

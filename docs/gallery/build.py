@@ -30,9 +30,9 @@ NOTEBOOKS = HERE.parents[1] / "build" / "notebooks"
 
 _HEAD = """
 Each example has a question, a short program that uses public functions only, a picture, and the
-answer in numbers. The programs run as they are; in a script, `figure.savefig("picture.png")` saves
-the picture. `python -m docs.gallery.build` writes the examples as notebooks to `build/notebooks`;
-the web pages offer the same notebooks.
+answer in numbers. In a script, `figure.savefig("picture.png")` saves the picture. `python -m
+docs.gallery.build` writes the examples as notebooks to `build/notebooks`; the web pages offer them
+too.
 """
 
 

@@ -141,7 +141,7 @@ contains
     do while (is_changed)
       call keep_live(tape, switches, s, live)
       call derivatives_at(live, t, y, h, s, rates)
-      call update(tape, switches, s, is_changed)
+      call update(switches, s, is_changed)
     end do
   end subroutine settle
 

@@ -116,7 +116,7 @@ contains
         if (.not. is_settled) then
           ! At the beginning, where the last step ended at a switch, but for rounding.
           switches%part = factor
-          call update(tape, switches, s, is_moved)
+          call update(switches, s, is_moved)
           if (is_moved) cycle
           is_settled = .true.
         end if

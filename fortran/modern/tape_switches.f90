@@ -364,10 +364,9 @@ contains
     switches%is_turned(i) = .true.
   end subroutine turn_back
 
-  pure subroutine update(tape, switches, s, is_changed)
+  pure subroutine update(switches, s, is_changed)
     !! Change the first switch whose result does not fit term 0 of its operand at the end of a step.
     !! A switch that crosses is changed, unless the change of another switch moved its operand away.
-    type(tape_t), intent(in) :: tape
     type(switches_t), intent(inout) :: switches
     type(series_t), intent(inout) :: s
     logical, intent(out) :: is_changed
@@ -377,11 +376,8 @@ contains
     is_changed = .true.
     do i = 1, switches%n
       if (.not. switches%is_live(i)) cycle
-      if (switches%part > 0.0_dp) then
-        near = nearness(i, switches%part, switches, s)
-      else
-        near = ROUNDED*sum_size(i, tape, switches, s)
-      end if
+      near = 0.0_dp
+      if (switches%part > 0.0_dp) near = nearness(i, switches%part, switches, s)
       level = switches%crosses(i)
       if (level /= 0) then
         switches%crosses(i) = 0
@@ -400,28 +396,6 @@ contains
     end do
     is_changed = .false.
   end subroutine update
-
-  pure real(dp) function sum_size(i, tape, switches, s)
-    !! Return the size of the terms of an operand that is a sum of several components, as of omega
-    !! about principal axes; else 0.
-    integer, intent(in) :: i
-    type(tape_t), intent(in) :: tape
-    type(switches_t), intent(in) :: switches
-    type(series_t), intent(in) :: s
-    integer :: n
-
-    sum_size = 0.0_dp
-    do n = 1, tape%n_operations
-      if (tape%operations(1, n) /= LINEAR) cycle
-      if (tape%operations(4, n) /= switches%operands(i)) cycle
-      associate (first => tape%starts(tape%operations(2, n)), &
-                 last => tape%starts(tape%operations(2, n) + 1) - 1)
-        if (last > first) then
-          sum_size = sum(abs(tape%coefficients(first:last)*s%a(0, tape%slots(first:last))))
-        end if
-      end associate
-    end do
-  end function sum_size
 
   pure subroutine follow(switches, s, is_changed)
     !! Set the results of switches whose operands depend on other switches alone.

@@ -18,6 +18,7 @@ from pyharness.model.arrays import (
 )
 from pyharness.model.attitude import IDENTITY, rotated, scalar_first
 from pyharness.model.codes import Methods, Places, Statuses
+from pyharness.model.constant_body import uses_principal_axes
 from pyharness.model.ensemble import Ensemble, place_for
 from pyharness.model.errors import InputError
 from pyharness.model.extension import ENDS, extension
@@ -45,7 +46,7 @@ def many_starts(
     if np.may_share_memory(starts, omega):  # a kernel may write a result before it reads the start
         starts = starts.copy()
     times = times_within(solver.scene, times)
-    axes = None if solver.scene.inertia is None else axes_and_turn(solver.scene)[0]
+    axes = axes_and_turn(solver.scene)[0] if uses_principal_axes(solver.scene) else None
     if axes is not None:
         starts = rotated(starts, axes.T)
     status = np.empty(n, np.int8)
@@ -107,7 +108,7 @@ def solve_each(
     the inertia matrix is full, or the torque is neither recorded nor about the axes of space.
     """
     left = list(range(piece.start, piece.stop))
-    if solver.packed[Places.METHOD] == Methods.TAPE and solver.scene.inertia is None:
+    if solver.packed[Places.METHOD] == Methods.TAPE and not uses_principal_axes(solver.scene):
         own = times if solver.scene.changing is None else times_within(solver.scene, times)
         left = solve_lanes(solver.packed, NO_PARAMETERS, starts, own, turns, found, piece, given_up)
     for i in left:

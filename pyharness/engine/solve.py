@@ -32,10 +32,10 @@ from pyharness.engine.steps import transformed_steps
 from pyharness.engine.switch_text import with_text
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY
-from pyharness.model.constant_body import with_constant_body
+from pyharness.model.constant_body import integrated, with_constant_body
 from pyharness.model.errors import InputError, known
 from pyharness.model.keywords import with_hints
-from pyharness.model.principal import in_scene_axes, principal, states_in_scene_axes
+from pyharness.model.principal import PrincipalScene, in_scene_axes, principal, states_in_scene_axes
 from pyharness.model.scene import Scene, checked_scene, most_steps
 from pyharness.model.state_torque import is_opaque
 from pyharness.model.torque_law import TorqueLaw
@@ -162,9 +162,11 @@ def solve(
     if start is not scene.attitude:
         scene = replace(scene, attitude=start)
     axes = None
-    if scene.inertia is not None:
-        scene, axes = principal(scene)
     moments = scene.changing or scene.moments
+    if scene.inertia is not None:
+        about, axes = principal(scene)
+        moments = about.moments
+        scene = about if method == "reference" else integrated(scene)
     values, turned = ascending_times(times)
     if scene.changing is not None:
         scene.changing.check((values[0], values[-1]))
@@ -190,7 +192,7 @@ def solve(
 
 
 class _Call(NamedTuple):
-    """The checked arguments of `solve`; `scene` is `given` about its principal `axes`."""
+    """The checked arguments of `solve`; `scene` is what is integrated; `axes` are principal."""
 
     given: Scene
     scene: Scene
@@ -221,9 +223,11 @@ class _Call(NamedTuple):
         found = parts[0] if len(parts) == 1 else joined(*parts)
         sol = found.sol if needs_steps else None
         if self.axes is not None:
-            own = 7 if found.attitude is not None else 3
-            turned_to = partial(states_in_scene_axes, axes=self.axes, own=own)
-            sol, found = transformed_steps(sol, turned_to), in_scene_axes(found, self.axes)
+            if isinstance(scene, PrincipalScene):
+                own = 7 if found.attitude is not None else 3
+                turned_to = partial(states_in_scene_axes, axes=self.axes, own=own)
+                sol, found = transformed_steps(sol, turned_to), in_scene_axes(found, self.axes)
+            found = replace(found, axes=self.axes)
         if sol is not None:
             sol = replace(sol, rates=partial(rates_of, given))
         found = replace(

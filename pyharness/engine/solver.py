@@ -23,10 +23,11 @@ from pyharness.engine.registry import (
 from pyharness.engine.sensitivity import judge_ending
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.codes import Methods, Places
+from pyharness.model.constant_body import integrated, uses_principal_axes
 from pyharness.model.errors import known
 from pyharness.model.extension import extension
 from pyharness.model.keywords import with_hints
-from pyharness.model.principal import axes_and_turn, principal
+from pyharness.model.principal import axes_and_turn
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.trajectory import Array, Trajectory, digits_left
 from pyharness.model.values import Number, Numbers, boolean, checked_effort, three
@@ -131,7 +132,7 @@ class Solver(BoundKernel[Result]):
             is_sphere = chosen.closed_form == "sphere" and not with_attitude
             packed_with_gil[Places.METHOD] = CODES["sphere" if is_sphere else "closed-form"]
         axes = None
-        if scene.inertia is not None:
+        if uses_principal_axes(scene):
             columns, turn = axes_and_turn(scene)
             axes = tuple(columns), turn
         solver = super().__new__(
@@ -341,10 +342,10 @@ def prepare(
     check_torque(scene, method, attitude)
     # An attitude that was not requested is not computed, unless the torque needs it.
     own = scene.attitude or IDENTITY if attitude else None
-    about_principal, _ = principal(replace(scene, attitude=own))
+    solved = integrated(replace(scene, attitude=own))
     if attitude:
         check_attitude(method, PREPARED_WITH_ATTITUDE)
     else:
-        about_principal = replace(about_principal, attitude=None)
-    chosen = plan(with_merged_waves(about_principal), method, tolerance, rows=attitude)
+        solved = replace(solved, attitude=None)
+    chosen = plan(with_merged_waves(solved), method, tolerance, rows=attitude)
     return Solver(scene, chosen, tolerance, method, effort, attitude, compiled)

@@ -9,7 +9,7 @@ import numpy as np
 from pyharness.engine.recorded import outputs_at, slopes_of, system_of
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import product, quaternion_of_axes, quaternion_rates
-from pyharness.model.constant_body import with_constant_body
+from pyharness.model.constant_body import integrated, uses_principal_axes, with_constant_body
 from pyharness.model.dense_output import POINTS, DenseOutput, Pieces, nodes
 from pyharness.model.principal import principal
 from pyharness.model.scene import Scene
@@ -25,8 +25,8 @@ def rates(scene: Scene, times: Array, state: Array) -> Array:
 
     A state is omega, the quaternion, and `Scene.states`.
     """
-    bare, axes = principal(scene)
-    bare = with_constant_body(bare)
+    axes = principal(scene)[1] if uses_principal_axes(scene) else None
+    bare = with_constant_body(integrated(scene))
     torque = bare.torque
     if isinstance(torque, TorqueLaw):
         torque = of_law(torque)
@@ -34,7 +34,7 @@ def rates(scene: Scene, times: Array, state: Array) -> Array:
     end = state.shape[1] - len(scene.states)
     omega, attitude, own = state[:, :3], state[:, 3:end], state[:, end:]
     inner = state
-    if scene.inertia is not None:
+    if axes is not None:
         turned = product(attitude.T, quaternion_of_axes(axes)) if attitude.size else []
         inner = np.column_stack([omega @ axes, *turned, own])
     more = own
@@ -46,7 +46,7 @@ def rates(scene: Scene, times: Array, state: Array) -> Array:
         slopes = slopes_of(bare)
         rows = zip(times.tolist(), inner.tolist(), strict=True)
         found = np.array([slopes(*row)[:3] for row in rows]).reshape(-1, 3)
-    if scene.inertia is not None:
+    if axes is not None:
         found = found @ axes.T
     if attitude.size:
         found = np.column_stack([found, *quaternion_rates(omega.T, attitude.T)])

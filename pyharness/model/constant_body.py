@@ -1,13 +1,48 @@
 """Conversion of changing inertias and torques in space to torques about the body axes."""
 
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 from pyharness.model.attitude import IDENTITY
-from pyharness.model.changing import rates_of_changing
+from pyharness.model.changing import rates_of_changing, rates_of_inertia
+from pyharness.model.principal import principal
 from pyharness.model.scene import Scene
-from pyharness.model.state_torque import of_law, replayed, torque_of
+from pyharness.model.state_torque import StateTorque, has_switches, of_law, replayed, torque_of
+from pyharness.model.tape import Tape
 from pyharness.model.torque_law import TorqueLaw
+from pyharness.model.values import Matrix
+
+
+def integrated(scene: Scene) -> Scene:
+    """Return the scene about the axes about which it is integrated.
+
+    They are principal axes; under a torque with switches they are the body axes, because rounding
+    would move a state off the level on which it begins.
+    """
+    torque = scene.torque
+    if scene.inertia is None or uses_principal_axes(scene):
+        return principal(scene)[0]
+    assert isinstance(torque, StateTorque)
+    assert torque.tape is not None
+    attitude = (scene.attitude or IDENTITY) if torque.needs_attitude else scene.attitude
+    rates = _rates(torque.tape, torque.own, scene.inertia)
+    given: dict[str, Any] = {"inertia": None, "coefficients": (0.0, 0.0, 0.0)}
+    return replace(scene, torque=rates, attitude=attitude, **given)
+
+
+def uses_principal_axes(scene: Scene) -> bool:
+    """Return whether `integrated` transforms a scene to principal axes."""
+    return scene.inertia is not None and not has_switches(scene.torque)
+
+
+@lru_cache(maxsize=64)
+def _rates(tape: Tape, own: tuple[str, ...], inertia: Matrix) -> StateTorque:
+    def rates(time: Any, omega: Any, q: Any, *states: Any) -> list[Any]:
+        torque = torque_of(tape, time, omega, q, *states)
+        return [*rates_of_inertia(inertia, omega, torque[:3]), *torque[3:]]
+
+    return replayed(rates, own)
 
 
 def with_constant_body(scene: Scene) -> Scene:

@@ -219,11 +219,13 @@ def _interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None) -> An
                 f"interp of {len(places)} points",
                 f"at most {_MOST_PIECES} points, torques.table for a function of time",
             )
-        found = values[0]
-        for k in range(len(places) - 1):
-            slope = (values[k + 1] - values[k]) / (places[k + 1] - places[k])
-            if slope:
-                found = found + slope * (_limited(at, places[k], places[k + 1]) - places[k])
+        # A sum over all pieces would have the rounding errors of the largest.
+        found, before = values[0], 0.0
+        slopes = [*(np.diff(values) / np.diff(places)), 0.0]
+        for place, value, slope in zip(places, values, slopes, strict=True):
+            if slope != before:
+                found = select(at > place, value + slope * (at - place), found)
+            before = slope
         if left is not None:
             found = select(at < places[0], float(left), found)
         if right is not None:

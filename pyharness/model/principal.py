@@ -110,7 +110,7 @@ def in_scene_axes(found: Trajectory, axes: Array) -> Trajectory:
     attitude = found.attitude
     if attitude is not None:
         attitude = _attitude_in_scene_axes(attitude, axes)
-    return replace(found, omega=found.omega @ axes.T, attitude=attitude, axes=axes)
+    return replace(found, omega=found.omega @ axes.T, attitude=attitude)
 
 
 def states_in_scene_axes(states: Array, axes: Array, own: int) -> Array:

@@ -89,7 +89,8 @@ def solve(
         Factor on the work limit; 1 means some ten seconds.
     attitude : bool, optional
         Whether to compute the attitude, from the scene's initial attitude, else from (1, 0, 0, 0).
-        By default it is computed if the scene has an attitude or its torque needs one.
+        By default it is computed if the scene has an attitude and the method can, or the torque
+        needs one.
     dense_output : bool
         Whether to return `sol`, the solution as a function of time between 0 and `times`, to within
         the tolerance. Closed forms, Taylor series, and `dop853` and `lsoda` under an opaque torque

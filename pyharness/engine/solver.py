@@ -62,9 +62,9 @@ _FEW_WAVES = 16  # fewer waves take less time than releasing the GIL
 class Solver(BoundKernel[Result]):
     """A solver of a scene, prepared for one method by `prepare`.
 
-    ``solver(omega, t_end, out=None)`` takes three numbers, the initial omega (rad/s), and the final
-    time (s), of any sign. It returns omega (rad/s) at `t_end` as a new array of shape (3,), or in
-    `out`, a contiguous array of three floats, which may be the array `omega`.
+    ``solver(omega, t_end, *, out=None)`` takes three numbers, the initial omega (rad/s), and the
+    final time (s), of any sign. It returns omega (rad/s) at `t_end` as a new array of shape (3,),
+    or in `out`, a contiguous array of three floats, which may be the array `omega`.
 
     Prepared with ``attitude=True``, ``solver(omega, t_end, attitude=None)`` takes the initial
     quaternion from body to space, scalar first; the default is the scene's, or (1, 0, 0, 0). It

@@ -116,12 +116,12 @@ def inertia_table(
     >>> solve(Scene(omega=(1.0, 0.0, 0.0), moments=boom), 10.0).omega
     array([[0.5, 0. , 0. ]])
     """
-    if interpolation not in ("linear", "cubic"):
+    if not isinstance(interpolation, str) or interpolation not in ("linear", "cubic"):
         raise unknown("interpolation", str(interpolation), ("linear", "cubic"), "[body] table")
     found = _ascending("[body] table times", times)
     try:
         rows = np.array(_as_array(values), dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         rows = np.zeros(0)
     n = len(found)
     if rows.shape not in ((n, 3), (n, 3, 3)) or not np.isfinite(rows).all():

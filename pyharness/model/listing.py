@@ -95,6 +95,7 @@ class Listing:
     @classmethod
     def original(cls, program: str, readings: Iterable[str] = ()) -> "Listing":
         """Return the program as printed, with the names of `switches`, and `readings`, active."""
+        _check_program(program)
         return cls(program, frozenset(switches(program)), frozenset(readings))
 
     @classmethod

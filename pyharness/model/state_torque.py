@@ -104,8 +104,14 @@ class StateTorque:
     ) -> Triple:
         """Return the torque at `time` (s), omega (rad/s), attitude and own states; NaN if singular.
 
-        Raise InputError if an opaque function does not return three numbers.
+        Raise InputError for another number of components, or if an opaque function does not return
+        three numbers.
         """
+        if len(omega) != 3 or len(attitude) != 4:
+            raise InputError(
+                f"[torque]: omega has {len(omega)} components, and the attitude {len(attitude)}; "
+                "allowed: 3 and 4"
+            )
         if self.tape is None:
             assert self.function is not None
             given = [time, np.array(omega)] + ([np.array(attitude)] if self.needs_attitude else [])

@@ -30,7 +30,7 @@ from pyharness.model.effort import check_steps
 from pyharness.model.errors import InputError, kind_of, known, unknown
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset, switchable
 from pyharness.model.scene import Scene, checked_scene
-from pyharness.model.values import are_several, boolean
+from pyharness.model.values import are_several, boolean, checked_effort
 from pyharness.thesis.in_word import compiled_words
 from pyharness.thesis.programs import (
     BINARY64,
@@ -107,7 +107,10 @@ def compare_programs(
     may_stop = boolean("may_stop", may_stop)
     attitude = boolean("attitude", attitude)
     methods = boolean("methods", methods)
+    effort = checked_effort(effort)
     listings = listings_for() if listings is None else listings
+    if not isinstance(listings, Sequence):
+        raise InputError(f"listings: {kind_of(listings)}; allowed: a list of Listing, as of subset")
     for each in listings:
         if not isinstance(each, Listing):
             raise InputError(f"listings: {kind_of(each)}; allowed: a list of Listing, as of subset")
@@ -226,6 +229,7 @@ def compare_methods(
     if not are_several(methods):
         raise InputError(f"methods is {kind_of(methods)}; allowed: a list, as in ['auto', 'rk45']")
     attitude = attitude or scene.torque.needs_attitude
+    effort = checked_effort(effort)
     tolerances = {}
     for given in methods:
         name = known("method", given, METHODS)

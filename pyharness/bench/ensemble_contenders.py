@@ -63,7 +63,7 @@ class EnsembleLoad:
         return replace(self, **own)
 
     def ends(self) -> Array:
-        """Return omega (rad/s) or, if requested, the attitude of all bodies at the end time."""
+        """Return omega (rad/s) or the requested attitude of all bodies at the end time."""
         found = []
         for scene in self.scenes():
             attitude = scene.attitude is not None
@@ -98,7 +98,7 @@ class EnsembleContender(Contender):
 
     @property
     def ways(self) -> Mapping[str, EnsembleMaker]:
-        """Return the ways to prepare the solver, by note; a single way has an empty note."""
+        """Return the ways to prepare the solver, by note, "" for a single way."""
         return self.variants or {"": self.prepare}
 
 

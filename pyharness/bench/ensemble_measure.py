@@ -1,8 +1,8 @@
 """Measurements of many bodies at once: speed at a target error, time by number of bodies, memory.
 
 Each contender uses the coarsest setting whose error on a sample is at most the target. Calls are
-interleaved in several rounds; the shortest time counts, as other work of the machine only lengthens
-it. Calls on one core are timed in processor time.
+interleaved in several rounds; the shortest time counts. Calls on one core are timed in processor
+time.
 """
 
 import subprocess
@@ -74,7 +74,7 @@ class Rate:
 
 @dataclass(frozen=True)
 class Rates:
-    """All measured speeds, and reasons why others are missing."""
+    """All measured speeds, and reasons for missing ones."""
 
     seed: str
     bodies: int
@@ -134,10 +134,10 @@ def measure_ensembles(
     progress: Progress = no_progress,
     least: int = 64,
 ) -> Rates:
-    """Return the measured speed of each contender on each load, at each target error.
+    """Return each contender's speed on each load, at each target error.
 
-    On the last load, RK4 contenders also run `STEPS` steps. `seed`, which determined the loads, is
-    only recorded. A call solves at least `least` bodies, or all if fewer.
+    On the last load, RK4 contenders also run `STEPS` steps. `seed` is only recorded. A call solves
+    at least `least` bodies, or all if fewer.
     """
     found = Rates(seed, loads[0].n)
     tasks: list[_Task] = []
@@ -194,7 +194,7 @@ def _ladder(each: EnsembleContender, target: float) -> Iterator[float]:
 def _enough(
     prepare: EnsembleMaker, load: EnsembleLoad, setting: float, threads: int, least: int
 ) -> tuple[EnsembleLoad, Callable[[], Array]]:
-    """Return a part of the load that takes long enough to time, and its solver."""
+    """Return a part of the load, long enough to time, and its solver."""
     n, before = min(load.n, least), 0.0
     while True:
         part = load.part(slice(0, n))
@@ -213,7 +213,7 @@ def clock_of(threads: int) -> Clock:
 
 @dataclass(frozen=True)
 class Size:
-    """The run times per body (s), by method, of a call for `bodies` bodies on one core."""
+    """The run times per body (s) by method, for `bodies` bodies on one core."""
 
     bodies: int
     seconds: dict[str, float]
@@ -235,7 +235,7 @@ class Memory:
 
 
 def sizes(seed: str, most: int, progress: Progress = no_progress) -> list[Size]:
-    """Return the run times per body (s) for 1, 10, 100, ... up to `most` bodies.
+    """Return the run times per body (s) for 1, 10, ... up to `most` bodies.
 
     The closed form runs without torque; "prepared" is the same by a prepared solver.
     """
@@ -265,7 +265,7 @@ def _prepared(load: EnsembleLoad) -> Callable[[], object]:
 def memory(bodies: int) -> list[Memory]:
     """Return the memory that a call of each of our methods takes.
 
-    Each call runs in a new process, because peak memory never decreases.
+    Each runs in a new process, because peak memory never decreases.
     """
     found = []
     for method in own_ensembles():

@@ -108,7 +108,6 @@ def _integrator(
     with_torque: bool, tolerance: float, size: int, scene: Scene | None = None,
     with_attitude: bool = False,
 ) -> Any:  # fmt: skip
-    """Return a compiled integrator of `size` bodies for `scene`, by default with `MOMENTS`."""
     import heyoka
 
     attitude = IDENTITY if with_attitude else None
@@ -210,8 +209,8 @@ def numba_rk4(
 ) -> Callable[[], Array]:
     """Return an integration by RK4, compiled by numba.
 
-    If `in_blocks`, each step is a loop over a block's bodies; otherwise one body after another is
-    integrated to the end.
+    If `in_blocks`, each step is a loop over a block's bodies; else bodies are integrated one after
+    another.
     """
     blocks, bodies = _numba_kernels()
     kernel = blocks if in_blocks else bodies

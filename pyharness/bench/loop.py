@@ -42,7 +42,7 @@ def timed(
 ) -> Iterator[_Row]:
     """Yield a row for each call that `calls` prepares for each task.
 
-    The last four arguments are as in `checks.compare.timing.seconds`.
+    `length` to `slow` are as in `checks.compare.timing.seconds`.
     """
     for number, task in enumerate(tasks):
 

@@ -69,16 +69,12 @@ class Workload:
 
     @property
     def place(self) -> str:
-        """Return the name in messages, as in ``case 5`` or ``scene 12``."""
+        """Return the name, as in ``case 5`` or ``scene 12``."""
         return f"{'scene' if self.kinds else 'case'} {self.label}"
 
     @property
     def group(self) -> str:
-        """Return the name of the group over which ratios are averaged.
-
-        A group has one end time. At 3 s, or with attitudes, workloads with and without torque are
-        separate groups.
-        """
+        """Return the name of the group over which ratios are averaged."""
         if self.horizon != HORIZON and self.scene.attitude is None:
             return f"T = {self.horizon:g}"
         return f"{'torque-free' if self.scene.torque.is_zero else 'torque'}, T = {self.horizon:g}"
@@ -104,7 +100,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Refusal:
-    """The reason why a contender has no result for a workload."""
+    """The reason for a missing result."""
 
     workload: Workload
     method: str
@@ -259,7 +255,7 @@ def _first_calls(
     load: Workload, contender: SceneContender, make: Maker, truth: Reference,
     refused: list[Refusal], clock: Clock,
 ) -> tuple[list[tuple[Ready, Row]], float]:  # fmt: skip
-    """Return a contender's tried calls on a workload, and the time (s) to prepare them."""
+    """Return a contender's calls on a workload, and the time (s) to prepare them."""
     entries: list[tuple[Ready, Row]] = []
     errors: list[float | None] = []
     spent = preparing = last = before = 0.0

@@ -64,8 +64,7 @@ def heyoka_maker(
 ) -> Maker:
     """Return a maker of heyoka integrations, compiled once for each tolerance.
 
-    `formula` is as in `heyoka_equations`; `variational` adds the derivatives of the solution with
-    respect to the initial state.
+    `formula` is as in `heyoka_equations`; `variational` adds derivatives by the initial state.
     """
     import heyoka
 
@@ -165,8 +164,8 @@ def _odeint(scene: Scene) -> Maker:
 def heyoka_equations(scene: Scene, formula: Formula | None = None) -> list[tuple[Any, Any]]:
     """Return pairs (unknown, derivative) for omega and, if the scene has one, the attitude.
 
-    A torque that depends on the state is computed by `formula`, or else from its tape (the recorded
-    operations). Raise InputError for an unrecorded torque, or one with a table or floor function.
+    A torque that depends on the state is computed by `formula`, or else from its tape. Raise
+    InputError for an unrecorded torque, or one with a table or floor function.
     """
     import heyoka
 
@@ -254,7 +253,7 @@ def compiled_function(source: str) -> Any:
 def rates(
     scene: Scene, time: str, state: Sequence[str], coefficients: Sequence[float] = ()
 ) -> list[str]:
-    """Return the right-hand sides of omega's components as Python source.
+    """Return the right-hand sides of omega as Python source.
 
     The source contains `time` (an expression) and `state` (names). `coefficients` are A, B, C, by
     default the scene's.
@@ -291,7 +290,7 @@ def end_of(state: Array, evaluations: int | None = None) -> End:
 def steps_source(scene: Scene, formula: Tableau) -> str:
     """Return the Python source of a Runge-Kutta integration with unrolled stages.
 
-    Its function takes the end time in s, and writes the final omega into its last argument.
+    Its function takes the end time (s), and writes omega into its last argument.
     """
     stages, weights, nodes = formula
     step = ["t = step * h"]

@@ -1,7 +1,6 @@
 """Random scenes of several kinds, on which no method was tuned.
 
-Torques and frequencies scale with the initial angular velocity, so that they affect slow and fast
-bodies alike.
+Torques and frequencies scale with the initial angular velocity.
 """
 
 import math
@@ -42,8 +41,7 @@ def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
 
     The kind of torque changes with the number. A scene with too large an error amplification, or
     too few or too many revolutions, is drawn again. With `attitude`, the body is initially aligned
-    with the axes of space, and the workload has no `truth`, because `integer_series` has no
-    attitude.
+    with the axes of space; there is no `truth`, because `integer_series` has no attitude.
     """
     source = Random(f"bench/{seed}/{number}")
     place = number - 1

@@ -64,7 +64,7 @@ def measured_report(
 def grouped(reasons: Iterable[tuple[str, str, str]], most: int | None = None) -> list[str]:
     """Return lines on missing results from tuples of contender, reason and task.
 
-    Contenders with the same reason and tasks share a line, which lists at most `most` tasks.
+    Contenders with equal reason and tasks share a line of at most `most` tasks.
     """
     places: dict[tuple[str, str], list[str]] = {}
     for who, why, where in reasons:
@@ -120,7 +120,7 @@ def _data(finding: Finding) -> Table:
 
 
 def savings_report(found: Sequence[Saving]) -> Report:
-    """Return the report of run times with and without computations that can be omitted."""
+    """Return the report of savings."""
     time = digits(".3g", 1e6)
     columns = (
         *words("skipped where"), Column("us with it", time, unit="s", full=time),
@@ -261,7 +261,7 @@ def _notes(finding: Finding) -> list[str]:
 
 
 def not_measured(finding: Finding) -> list[str]:
-    """Return a line for each reason why results are missing, with examples."""
+    """Return a line for each reason of missing results, with examples."""
     # Reasons that differ only in the expected time or last step at their end share a line.
     came: list[tuple[Row | Refusal, str]] = [
         (each, each.reason.split(", a call would take")[0]) for each in finding.refused

@@ -35,7 +35,7 @@ class Saving:
 
 
 def savings(t_end: float = 3.0, tolerance: float = 1e-9) -> list[Saving]:
-    """Return the run times with and without each computation that can be omitted."""
+    """Return the savings by each computation that can be omitted."""
     constant = case_scene(5)
     times = [t_end * k / 100.0 for k in range(1, 101)]
     rows = prepare(constant, "taylor", tolerance)

@@ -101,10 +101,10 @@ _VECTORS = Basis(
 def words(chosen: Selection) -> Iterator[Attempt]:
     """Yield checks of our arithmetic of machine words, bit for bit.
 
-    The first check compares CDC instructions with their expected results. In each case and listing,
-    our arithmetic with 53 bits must agree with floats; in other arithmetics, the compiled program
-    must agree with its Python version. By default only the original and corrected listings are
-    checked; against floats, also those with a single defect or reading.
+    The first check compares CDC instructions with their expected results. Our arithmetic with 53
+    bits must agree with floats; in other arithmetics, compiled programs must agree with their
+    Python versions. By default the original and corrected listings are checked; against floats,
+    also those with a single defect or reading.
     """
     yield Attempt(Name("words", "vectors"), _vectors)
     for listing, case in all_cells():

@@ -108,7 +108,7 @@ class Check:
     )
 
     def __post_init__(self) -> None:
-        """Raise ValueError if only one of limit and basis is present."""
+        """Require limit and basis together."""
         if (self.limit is None) != (self.basis is None):
             raise ValueError(f"{self.id}: a limit has a basis, and a basis has a limit")
 
@@ -124,7 +124,7 @@ class Check:
 
     @property
     def mark(self) -> str:
-        """Return how the limit was set: proved, derived or measured; empty without a limit."""
+        """Return how the limit was set: proved, derived, measured, or ""."""
         return self.basis.mark if self.basis else ""
 
     @property
@@ -147,7 +147,7 @@ _OF_ANY = len(fields(Check))
 
 @dataclass(frozen=True)
 class Sample(Check):
-    """A check in a random scene, with fields by which reports group checks."""
+    """A check in a random scene, with fields to group reports by."""
 
     entrance: str = ""  # call that solved the scene, as in ``solve-taylor``
     tolerance: float = math.nan
@@ -156,10 +156,7 @@ class Sample(Check):
 
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """A deferred computation of all checks whose ids begin with the id of `name`.
-
-    ``make(name)`` is called only if such a check is requested.
-    """
+    """A deferred computation of all checks whose ids begin with the id of `name`."""
 
     name: Name
     make: Callable[[Name], "Check | Iterable[Check | Attempt]"]
@@ -205,8 +202,8 @@ def run_suites(
 ) -> Iterator[Check]:
     """Yield the requested checks of all suites (kinds of checks).
 
-    An exception becomes a failed check, except NotBuiltError and, in the suites `of_the_user`,
-    which read the user's files, InputError.
+    An exception becomes a failed check, except NotBuiltError and, in the suites `of_the_user` (on
+    the user's files), InputError.
     """
     for suite, attempts in suites.items():
         raised = (NotBuiltError, InputError) if suite in of_the_user else (NotBuiltError,)

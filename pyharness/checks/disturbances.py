@@ -1,9 +1,8 @@
-"""Amplification of perturbations by the programs, and step sizes of divergence.
+"""Amplification of perturbations by the programs, and divergent step sizes.
 
-The amplification by a step, measured in a run, may differ from the exact one of
-`theory.amplification` by rounding errors only. The step size at which a run diverges is compared
-with that predicted by linear stability. J is the Jacobian of Euler's equations (13-15 of the
-thesis).
+The measured amplification by a step may differ from that of `theory.amplification` by rounding
+errors only. The step size at which a run diverges is compared with the prediction of linear
+stability. J is the Jacobian of Euler's equations (13-15 of the thesis).
 """
 
 import math
@@ -96,8 +95,8 @@ def eigenvalues(scene: Scene) -> Array:
 def first_step(scene: Scene, listing: Listing) -> Probe:
     """Return the 3 x 3 derivative of the first step at a steady rotation.
 
-    A step is a polynomial of omega with known degree. Differences over enough neighbours therefore
-    give its derivative, exact except for rounding.
+    A step is a polynomial of omega with known degree, so that differences over enough neighbours
+    give its derivative, except for rounding.
     """
 
     def stepped(omega: Array) -> Array:
@@ -115,7 +114,7 @@ def later_steps(scene: Scene, listing: Listing) -> Probe:
     """Return the perturbation of a spinning top after all steps of a scene.
 
     The spin is omega3; omega1 and omega2 are the perturbation. Euler's coefficient C and the torque
-    are zero, so that the equations are linear and the perturbation may have any size.
+    are zero, so that the equations are linear.
     """
     rows = _run(scene, listing)
     found = rows[-1, :2] if len(rows) == scene.steps else np.full(2, np.nan)
@@ -157,9 +156,8 @@ def observed_boundary(listing: Listing, direction: complex) -> Probe:
     """Return the distance of z from 0 at which perturbations begin to grow.
 
     z is the step size times an eigenvalue of the Jacobian. The distance is bisected along
-    `direction`, -1 or 1j, in runs of a spinning top. With the defect `base-not-restored`, a
-    constant part of omega might hide the growth, so the change of omega from step to step is
-    measured.
+    `direction`, -1 or 1j, in runs of a spinning top. With the defect `base-not-restored`, the
+    change of omega from step to step is measured, because a constant part might hide the growth.
     """
     matrix = amplification(listing)
     expected, slope = boundary(matrix, direction)
@@ -278,8 +276,8 @@ def divergence(
 ) -> tuple[float, float, float]:
     """Return measured and predicted step size (s) of divergence, and a bound on their difference.
 
-    The bound is relative to the predicted step size, with which the wobble (omega1, omega2) doubles
-    by linear theory. The body spins for `time` (s) about axis 3, which is stable.
+    With the predicted step size, to which the bound is relative, the wobble (omega1, omega2)
+    doubles by linear theory. The body spins for `time` (s) about axis 3, which is stable.
     """
     found = smallest_divergent(scene, time, runner, smallest)
     a, b, c = scene.euler_coefficients
@@ -304,8 +302,8 @@ def divergence(
 def smallest_divergent(scene: Scene, time: float, runner: Runner, smallest: float) -> float:
     """Return the smallest step size (s) with which a run diverges.
 
-    In such a run a component of omega exceeds twice its largest true value, or the run ends early.
-    Return 0 if the run with steps of `smallest` (s) diverges too, infinity if none does.
+    Then a component of omega exceeds twice its largest true value, or the run ends early. Return 0
+    if steps of `smallest` (s) diverge too, infinity if none do.
     """
     bounds = 2.0 * np.array(_bounds(scene, time))
 

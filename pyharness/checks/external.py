@@ -89,8 +89,8 @@ def _triples(triple: Triple | None, part: float) -> Iterator[Triple]:
 def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> Iterator[Check]:
     """Yield checks of each method that accepts a problem: ``external/<problem>/<time>/<method>``.
 
-    The value is the error of the component of omega with the largest ratio of error to limit, in
-    the problem's unit.
+    The value is the error, in the problem's unit, of the omega component with the largest ratio of
+    error to limit.
     """
     for problem in problems:
         # Values are always solved together, so that repeating one check gives the same bits.
@@ -122,7 +122,7 @@ def _names(
 
 
 def _without(problem: Problem, name: Name, refusal: str, value: Value) -> Check:
-    """Return the check of a method without result; only a user's problem may be refused."""
+    """Return a check without result; only a user's problem may be refused."""
     given = problem.path is not None and name.subject not in _MAY_NOT_REFUSE
     if refusal:
         return name.judged(given, f"{REFUSED}{refusal}")
@@ -214,7 +214,7 @@ def _as_far_as_solved(
 
 
 def _results(problem: Problem, method: str, values: Sequence[Value]) -> list[_Result | None]:
-    """Return omega and its error bound (rad/s) at each value; None if a matrix is singular."""
+    """Return omega and its error bound (rad/s) by value; None if a matrix is singular."""
     if method in PROGRAMS:
         return [_program(problem, value, method) for value in values]
     scene, times = problem.scene, [float(value.time) for value in values]

@@ -70,8 +70,7 @@ class Problem:
 def figure(where: str, text: object, good_to: float = 0.0) -> Figure:
     """Return the published number with the digits `text`.
 
-    Its accuracy is half a unit of the last digit or, if larger, `good_to`. Raise InputError if
-    `text` is no number or too large for binary64.
+    Its accuracy is half a unit of the last digit or, if larger, `good_to`.
     """
     if not isinstance(text, str):
         raise InputError(f"{where}: {kind_of(text)}; allowed: the digits as text, '0.606'")

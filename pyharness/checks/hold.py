@@ -1,7 +1,7 @@
 """Checks of methods against the true solution of a scene, within bounds derived beforehand.
 
-Errors of the programs of the thesis are reported without a bound. `auto`, `quick` and methods
-without a tolerance run as prepared solvers, whose results report a refused scene; the others raise
+Errors of the thesis's programs are reported without a bound. `auto`, `quick` and methods without a
+tolerance run as prepared solvers, whose results report a refused scene; the others raise
 InputError.
 """
 
@@ -121,9 +121,9 @@ def check_methods(
 
     By default, the limit is the sum of the amplified tolerance, the amplified rounding error, and
     the error of the true solution. For fixed steps without torque, a bound from the order replaces
-    the tolerance. There is no limit without tolerance and bound, or if the sum leaves fewer than
-    two digits of omega. Without torque, energy and momentum always have a limit, because their
-    errors are not amplified. A refusal fails, unless `refusable` permits it.
+    the tolerance. There is no limit without either, or if the sum leaves fewer than two digits of
+    omega. Without torque, energy and momentum always have a limit, because their errors are not
+    amplified. A refusal fails, unless `refusable` permits it.
     """
     scene = scene_of(name)
     known = cache(partial(truth, scene, time))
@@ -239,8 +239,8 @@ def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:
     """Return the smallest error of `omega` that explains its drift of energy and momentum.
 
     The error is relative to `largest` (rad/s). Energy and squared momentum are sums of q w**2 over
-    the components w, where q is the moment or its square. An error e of every component changes
-    such a sum by at most 2 e times the sum of q abs(w), which bounds e from below.
+    the components w, where q is the moment or its square. An error e changes such a sum by at most
+    2 e times the sum of q abs(w), which bounds e from below.
     """
     assert scene.moments is not None
     if not np.isfinite(omega).all():

@@ -44,7 +44,7 @@ class Answer:
 
 
 def of_end(method: str, end: End) -> Answer:
-    """Return a method's answer from the `End` of its call."""
+    """Return a method's answer from an `End`."""
     if end.is_refused:
         return Answer(refusal=f"{method}: {end.ended}")
     attitude = None if end.attitude is None else end.attitude[None, :]
@@ -142,7 +142,7 @@ class Truth:
 
 
 def unknown_flow(largest: float) -> Conditioning:
-    """Return a conditioning of infinite amplification, for closed forms, whose limits ignore it."""
+    """Return a conditioning of infinite amplification, for closed forms."""
     return Conditioning(math.inf, MOST, MOST, MOST, largest)
 
 
@@ -152,7 +152,7 @@ def reference_truth(
     effort: float | None = None,
     flow: Conditioning | None = None,
 ) -> Truth:
-    """Return the reference solution at `times` (s); raise InputError if it does not reach them."""
+    """Return the reference solution at `times` (s)."""
     flow = flow or conditioning_at(scene, times)
     # The usual reference has errors of 1e-22 in its steps, too large for an amplification above
     # 1e3.
@@ -167,7 +167,7 @@ def reference_truth(
 
 @dataclass(frozen=True)
 class Policy:
-    """A rule for judging methods: the limit of the error, and the permitted refusals."""
+    """A rule for judging methods: limit of the error, and permitted refusals."""
 
     limit: Callable[[Truth, MethodRun], float | None]
     basis: Basis
@@ -190,7 +190,7 @@ def lively(growth: float) -> float:
 
 
 def linear(limit: float) -> float:
-    """Return `limit`, or infinity if it is above 0.01, where the linearised equations fail."""
+    """Return `limit`, or infinity above 0.01, where linearised equations fail."""
     return limit if limit <= LINEAR else math.inf
 
 
@@ -228,8 +228,8 @@ AMPLIFIED = Policy(_granting(lambda growth: growth), FLOW)
 def judge(name: Name, tried: MethodRun, truth: Truth, policy: Policy) -> Check:
     """Return the check that a method's error is within its limit, or that its refusal is permitted.
 
-    Without a limit, a finite error is only reported. `closed-form` fails if it solves a scene
-    without closed form.
+    Without a limit, a finite error is only reported. `closed-form` must refuse a scene without
+    closed form.
     """
     answer = tried.answer
     if why := answer.refusal:

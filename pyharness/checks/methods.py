@@ -1,10 +1,10 @@
-"""Checks of methods against the high-precision reference in the cases of Table 1 of the thesis.
+"""Checks of methods against the reference in the cases of Table 1 of the thesis.
 
 The limit of an error is the requested tolerance. Errors of omega are relative to the largest omega;
 errors of the attitude are angles (rad).
 
 An order is the power of the step size to which errors are proportional. The programs' omega is
-compared with `solve_ivp`; their translational velocity and fixed-step methods, with the reference.
+compared with `solve_ivp`; their velocity, and fixed-step methods, with the reference.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -122,7 +122,7 @@ def _prepared(
 
 
 def run_of_solve(method: str, tolerance: float, scene: Scene, times: Sequence[float]) -> MethodRun:
-    """Return a deferred run by `solve` at `times` (s), with a tolerance that SciPy can meet."""
+    """Return a deferred run by `solve` at `times` (s), at a tolerance that SciPy meets."""
     if method in SCIPY_METHODS and scene.attitude:
         # SciPy's methods can't meet a smaller tolerance over a long time.
         tolerance = max(tolerance, 1.01 * finest(method, scene, times[-1]))
@@ -210,7 +210,7 @@ def _order_of_method(scene: Scene, method: str, truth: Reference, **limits: Any)
 
 
 def in_few_steps(scene: Scene, time: float) -> Scene:
-    """Return the scene in 16 steps until `time` (s), the fewest to measure orders."""
+    """Return the scene in 16 steps until `time` (s), enough to measure orders."""
     return replace(scene, step_size=time / _FEWEST, steps=_FEWEST)
 
 
@@ -218,7 +218,7 @@ def order_if_seen(scene: Scene, truth: Callable[[], Reference], name: Name) -> C
     """Return the check of a fixed-step method's order.
 
     The order is only reported if the scene is too fast or sensitive for 4096 steps, or if the
-    torque has a table, because steps across its changes lower the order.
+    torque has a table, whose changes lower it.
     """
     method = name.setting or name.subject
     found = _order_of_method(scene, method, truth(), most_steps=_MOST)

@@ -1,7 +1,7 @@
-"""Checks of a port, an implementation of the programs in any language, against our Python versions.
+"""Checks of a port of the programs, in any language, against our Python versions.
 
-Results must agree bit for bit in random scenes and in all cells, the combinations of program, case,
-defects and readings of doubtful cards. Protocol: `docs/how-to/ports.md`.
+Results must agree bit for bit in random scenes and in all cells (program, case, defects and
+readings). Protocol: `docs/how-to/ports.md`.
 """
 
 import math
@@ -82,8 +82,8 @@ def random_cells(
 ) -> list[Cell]:
     """Return runs in random scenes, named as in ``random/7/two-term`` and ordered by number.
 
-    `cells` has the beginnings of the requested names, whose numbers may exceed `draws`. If it is
-    empty, all `draws` scenes are requested.
+    `cells` has beginnings of the requested names, whose numbers may exceed `draws`; if empty, all
+    `draws` scenes are requested.
     """
     named = {int(match[1]) for each in cells if (match := _DRAWN.match(each))}
     found = []
@@ -101,8 +101,7 @@ def random_cells(
 def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Iterator[PortCheck]:
     """Yield checks that a port, started by `command`, agrees bit for bit with the Python version.
 
-    An invalid answer, or none within `patience` (s), is a failed check and ends the comparison.
-    Raise InputError if `command` is empty.
+    An invalid answer, or none within `patience` (s), fails and ends the comparison.
     """
     name, again = Name("port", "start"), replay_command(command)
     try:
@@ -118,14 +117,14 @@ def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Ite
 
 
 def refuse_port(command: str) -> None:
-    """Raise InputError that advises `--port` if the integrator `command` answers as a port."""
+    """Raise InputError that advises `--port` if `command` answers as a port."""
     cell = port_cells(PROGRAMS, (1,), ())[0]
     read = partial(read_answer, steps=cell.scene.steps)
     refuse_other(command, "--integrator", "--port", cell.request, read)
 
 
 def replay_command(command: str, cell: Cell | None = None) -> str:
-    """Return the command that repeats a port's checks in one run or all."""
+    """Return the command that repeats one or all of a port's checks."""
     verb = f"python -m pyharness verify --port {shlex.quote(command)}"
     return verb if cell is None else f"{verb} {cell.options}"
 

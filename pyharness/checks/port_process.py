@@ -29,7 +29,7 @@ class PortError(Exception):
 
 
 def split_command(command: str, option: str = "--port") -> list[str]:
-    """Return program and arguments, split as by a shell; raise InputError if there are none."""
+    """Return program and arguments, split as by a shell."""
     try:
         words = shlex.split(command)
     except ValueError as error:
@@ -76,7 +76,7 @@ class PortProcess:
         self._patience = patience
 
     def __enter__(self) -> Self:
-        """Start the port in its own process group, so that child processes can be ended too."""
+        """Start the port in its own process group, to end child processes too."""
         self._mark = f"{_MARK}={os.urandom(16).hex()}"
         self._told = b""  # end of the output to stderr
         try:
@@ -122,7 +122,7 @@ class PortProcess:
     def ask(self, line: bytes) -> bytes:
         """Send a request and return the answer, both without line feed.
 
-        Raise PortError if the answer is late, too long, or longer than one line.
+        Raise PortError if it is late or longer than one line.
         """
         end = time.monotonic() + self._patience
         rest = line + b"\n"

@@ -62,7 +62,7 @@ def requested_scene(scene: Scene) -> dict[str, Any]:
 
 
 def read_answer(line: bytes, steps: int) -> Answer:
-    """Return a port's answer for `steps` steps; raise PortError if it is invalid."""
+    """Return a port's answer for `steps` steps, or raise PortError."""
     given = read_object(line)
     for name in ("rows", "ended", "stop", "ier"):
         if name not in given:
@@ -85,7 +85,7 @@ def read_answer(line: bytes, steps: int) -> Answer:
 
 
 def read_object(line: bytes) -> dict[str, Any]:
-    """Return the JSON object in `line`; raise PortError if it has none."""
+    """Return the JSON object in `line`, or raise PortError."""
     try:
         given = json.loads(line)
     except (ValueError, RecursionError) as error:
@@ -107,7 +107,7 @@ def _stop(stop: object) -> Stop:
 
 
 def read_list(where: str, value: object) -> list[Any]:
-    """Return a JSON list; raise PortError for another value."""
+    """Return a JSON list, or raise PortError."""
     if not isinstance(value, list):
         raise PortError(f"{where}: {kind_of(value)} where a list belongs")
     return value
@@ -122,14 +122,14 @@ def read_row(where: str, row: object, width: int, told: str) -> list[float]:
 
 
 def read_name(field: str, value: object, allowed: Sequence[str]) -> str:
-    """Return one of the `allowed` texts; raise PortError for another value."""
+    """Return one of the `allowed` texts, or raise PortError."""
     if value not in allowed:
         raise PortError(f"{field} is {json.dumps(value)[:60]}; allowed: {', '.join(allowed)}")
     return str(value)
 
 
 def read_whole(where: str, value: object) -> int:
-    """Return a whole number; raise PortError for another value."""
+    """Return a whole number, or raise PortError."""
     if type(value) is not int:
         raise PortError(f"{where}: {kind_of(value)} where a whole number belongs")
     return value

@@ -1,11 +1,11 @@
-"""Checks of methods in scenes drawn from a seed, against an independent true solution.
+"""Checks of methods in random scenes against an independent true solution.
 
 The true omega is from `integer_series`, the true attitude from `reference`. An entry point is
 `solve` or a prepared solver, with one method. The tolerance limits the error of the attitude (rad)
 or of omega, relative to the largest omega until the last time.
 
-Torques that depend on omega or attitude are sums of recorded functions or of ready-made terms. The
-reference's series for them (`pyharness.truth.tape_series`) shares no code with the methods.
+Torques that depend on omega or attitude are sums of recorded functions or ready-made terms. The
+reference's series for them (`truth.tape_series`) shares no code with the methods.
 """
 
 from collections.abc import Callable, Iterator
@@ -74,7 +74,7 @@ Entrances = dict[str, Callable[[], MethodRun]]
 
 
 def truth_of(drawn: Draw) -> Truth:
-    """Return the true omega of a draw at 0.4 of its end time and at its end time.
+    """Return the true omega of a draw at 0.4 and 1 of its end time.
 
     Raise InputError if the motion is unbounded or too fast, or rounding leaves no digit of omega.
     """
@@ -90,10 +90,9 @@ def truth_of(drawn: Draw) -> Truth:
 def may_refuse(tried: MethodRun, truth: Truth, why: str) -> bool:
     """Return whether a method may refuse its run `tried` with the message `why`.
 
-    `auto` may never refuse, `quick` always, a closed form only near the limits of binary64. Others
-    may refuse scenes of the kinds in `_MAY_REFUSE`, or with an error amplification above 10.
-    SciPy's methods may also refuse a tolerance finer than they meet, or one below 1e-9 that takes
-    too much work.
+    `auto` never may, `quick` always, a closed form only near the limits of binary64. Others may
+    refuse the kinds in `_MAY_REFUSE`, or an error amplification above 10; SciPy's methods also a
+    tolerance finer than they meet, or one below 1e-9 that takes too much work.
     """
     method, kind = tried.method, tried.scene.name
     if method == "auto":

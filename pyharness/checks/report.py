@@ -50,7 +50,7 @@ def summary_page(
     depth: int = 1,
     more: Sequence[Section] = (),
 ) -> list[Section]:
-    """Return a Markdown page: verdict, a table by the first `depth` parts of ids, failures."""
+    """Return a Markdown page: verdict, table by the first `depth` parts of ids, failures."""
     failed = [check for check in checks if not check.passed]
     lines: list[str] = []
     for check in failed[:_MOST_ON_PAGE]:
@@ -78,13 +78,13 @@ def _failure(check: Check) -> str:
 
 
 def marks(checks: Sequence[Check]) -> str:
-    """Return how limits were set, as in ``proved, derived``; a dash without limits."""
+    """Return how limits were set, as in ``proved, derived``, or a dash."""
     found = {check.mark for check in checks}
     return ", ".join(mark for mark in MARKS if mark in found) or "-"
 
 
 def basis_note(checks: Sequence[Check]) -> list[str]:
-    """Return a legend of the marks, with the number of limits of each; empty without limits."""
+    """Return a legend of the marks, with numbers of limits; empty without limits."""
     counts = Counter(check.mark for check in checks if check.mark)
     told = ", ".join(f"{counts[mark]} {mark}" for mark in MARKS)
     legend = (
@@ -115,7 +115,7 @@ def _groups(checks: Sequence[Check], depth: int) -> Table:
 
 
 def listed_singly(checks: Sequence[Check]) -> list[str]:
-    """Return lines on failed checks, or on all if few, with the commands that repeat them."""
+    """Return lines on failed checks, or all if few, with commands to repeat them."""
     failed = [check for check in checks if not check.passed]
     lines = []
     for check in failed[:_MOST_FAILURES]:
@@ -146,7 +146,7 @@ def samples(checks: Sequence[Check], rounding: float) -> Section:
     """Return a table of the worst ratios of error to tolerance.
 
     `rounding` times the error amplification is first subtracted from the error. Rows are entry
-    points and ranges of tolerance; columns are ranges of the amplification.
+    points and tolerances, columns amplifications.
     """
     cells: dict[tuple[str, str], list[list[float]]] = {}
     for check in checks:
@@ -167,7 +167,7 @@ def samples(checks: Sequence[Check], rounding: float) -> Section:
 
 
 def references(checks: Sequence[Check]) -> Section:
-    """Return lines on the references: largest proved and estimated errors, and warnings."""
+    """Return lines on the references' largest proved and estimated errors, and warnings."""
     bounds = [each.reference_bound() for each in checks if each.reference_bound is not None]
     known = [each for each in bounds if each is not None]
     lines = []

@@ -49,10 +49,7 @@ State = tuple[Array, Array | None]
 
 
 def scene_trials(scene: Scene, options: str) -> dict[str, Trial]:
-    """Return the trials of a scene by name; `options` end the command that repeats them.
-
-    Raise InputError if the torque can't be recorded, or needs an attitude that the scene lacks.
-    """
+    """Return the trials of a scene by name; `options` end the command that repeats them."""
     if isinstance(scene.torque, StateTorque):
         system_of(scene)  # raises InputError for an opaque torque
         if scene.torque.needs_attitude and scene.attitude is None:

@@ -1,12 +1,12 @@
 """Checks of the programs' steps and stops, by recomputing every step from its scheme.
 
 Fortran and Python could share a fault too small to change the order. Each step of the corrected
-programs is therefore recomputed from the previous state; only rounding errors may differ.
+programs is therefore recomputed from the previous state, to within rounding errors.
 
 The stop test of the Runge-Kutta program (equation 19 of the thesis) divides the change of K
-(right-hand side) in a step by the change of U (state). A quotient above the stop constant stops the
-run. The quotients are recomputed too, and the program is run with constants just below and above
-each new maximum.
+(right-hand side) in a step by the change of U (state); a quotient above the stop constant ends the
+run. The quotients are recomputed, and the program is run with constants just below and above each
+new maximum.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -121,7 +121,7 @@ def _beginning(scene: Scene, run: Trajectory) -> _Stage:
 
 
 def _stage(scene: Scene, part: float, state: Array) -> _Stage:
-    """Return rates at the fraction `part` of every step, with bounds on their rounding errors."""
+    """Return rates, with rounding error bounds, at the fraction `part` of every step."""
     # Equations 16-18 of the thesis, and dV/dt = F/m - omega x V.
     omega, velocity = state[:, :3], state[:, 3:]
     times = scene.step_size * (np.arange(len(state), dtype=np.float64) + part)

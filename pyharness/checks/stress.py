@@ -24,7 +24,7 @@ named = partial(Name, command="stress")
 
 @dataclass(frozen=True)
 class Trial:
-    """A group of checks of `stress` under one kind of extreme conditions."""
+    """A group of checks under one kind of extreme conditions."""
 
     name: str
     title: str
@@ -41,7 +41,7 @@ def trial(name: str) -> Trial:
 
 
 def stress(only: Sequence[str] = (), trials: Mapping[str, Trial] | None = None) -> Iterator[Check]:
-    """Yield the checks of `stress` whose ids begin with an element of `only`; all if empty."""
+    """Yield the checks of `stress` that `only` selects."""
     suites = {
         name: lambda name=name: (trials[name] if trials else trial(name)).attempts(only)
         for name in trials or TRIALS

@@ -36,8 +36,7 @@ class Solver:
     """The solver of a batch: a method or a program of the thesis; the other field is None.
 
     `t_end` (s) is by default the step size times the number of steps. `listing` to `may_stop` are
-    for programs: `reading` is the interpretation of doubtful cards, `lipschitz` the limit (1/s) of
-    the stop test, which may end a run if `may_stop`. `compiled` requests a compiled torque.
+    for programs; `lipschitz` (1/s) is the limit of their stop test.
     """
 
     method: str | None = "auto"
@@ -53,7 +52,7 @@ class Solver:
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Many scenes that one method or program solves; results are computed when first read.
+    """Many scenes that one method or program solves, when a result is first read.
 
     `scene` has the shared quantities, `arrays` the others, with a row for each scene. The keys of
     `arrays` are arguments of `solve_many` and `run_many`, and include `omega`. `listing` is None
@@ -105,7 +104,7 @@ class Batch:
 
     @property
     def leaves(self) -> str | None:
-        """The kind of code that computed a recorded torque's Taylor series (`Ensemble.leaves`)."""
+        """The code that computed a recorded torque's Taylor series (`Ensemble.leaves`)."""
         return self._ends.leaves
 
     @property
@@ -126,8 +125,7 @@ class Batch:
     def rows(self, samples: int) -> Array:
         """Return omega (rad/s) at the ends of `samples` equal parts, shape (n, samples, 3).
 
-        A method integrates from time 0 to each end, so that errors do not accumulate. A program's
-        ends are the steps of `sample_steps`.
+        A program's ends are the steps of `sample_steps`.
         """
         if not self.is_program:
             return np.stack([each.omega for each in self._samples(samples)], axis=1)
@@ -138,7 +136,7 @@ class Batch:
     def attitudes(self, samples: int) -> Array:
         """Return the attitudes at the ends of `samples` equal parts, shape (n, samples, 4).
 
-        They are quaternions, scalar first, from the body's axes to those at time 0.
+        They are scalar first, from the body's axes to those at time 0.
         """
         ends = [each.attitude for each in self._samples(samples) if each.attitude is not None]
         found = np.stack(ends, axis=1)
@@ -165,7 +163,7 @@ class Batch:
         """Return a program's results at the ascending steps `at`.
 
         If the scenes differ in `torque_rate`, or the program refuses one, each scene runs alone,
-        without the error codes IER. Only refused scenes have the status REFUSED.
+        without the error codes IER.
         """
         if "torque_rate" not in self.arrays:  # `run_many` takes one rate for all bodies
             try:
@@ -175,10 +173,7 @@ class Batch:
         return self._run_each(at)
 
     def scene_of(self, i: int) -> Scene:
-        """Return scene `i` (from 0), with an attitude only if the torque needs it.
-
-        Raise InputError if it is invalid.
-        """
+        """Return scene `i` (from 0), with an attitude only if the torque needs it."""
         own = {name: array for name, array in self.arrays.items() if name != "lipschitz"}
         return scene_of_row(self._shared, own, i)
 

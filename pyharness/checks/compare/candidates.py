@@ -1,7 +1,7 @@
 """The common interface of methods, prepared solvers and programs: the candidates.
 
-A prepared solver, made by `prepare`, solves one scene by one method, from many initial states.
-Tolerances are relative to the largest omega; `effort` multiplies the work limit.
+A prepared solver (`prepare`) solves one scene by one method, from many initial states. Tolerances
+are relative to the largest omega; `effort` multiplies the work limit.
 """
 
 import math
@@ -38,7 +38,7 @@ class End:
 
     @property
     def is_refused(self) -> bool:
-        """Return whether a prepared solver refused the scene or exceeded its work limit."""
+        """Return whether a prepared solver refused, or exceeded its work limit."""
         return self.ended in ("refused", "gave up")
 
     @property
@@ -49,7 +49,7 @@ class End:
 
 @dataclass(frozen=True)
 class Ready:
-    """An integration from time 0 to one time: `run` is timed, `read` converts its result."""
+    """An integration to one time: `run` is timed, `read` converts its result."""
 
     run: Callable[[], Any]
     read: Callable[[Any], End]
@@ -96,8 +96,8 @@ def prepared_candidate(
 ) -> Candidate:
     """Return a candidate that calls a prepared solver of the method `name`.
 
-    If `primed`, the solver is first called with another omega, which must not affect the result.
-    Fixed-step methods, and Gauss collocation without a tolerance, use the scene's step.
+    If `primed`, the solver is first called with another omega. Fixed-step methods, and Gauss
+    collocation without a tolerance, use the scene's step.
     """
     make: Any = partial(prepare, attitude=attitude, compiled=compiled)
     read = _turned if attitude else _answered
@@ -126,7 +126,7 @@ def program_candidate(
     effort: float = 1.0,
     word: str = BINARY64,
 ) -> Candidate:
-    """Return a candidate that runs a program, with the options of `Program.run`."""
+    """Return a candidate that runs a program; see `Program.run`."""
     options = lipschitz, may_stop, velocity
 
     def ready(scene: Scene, time: float) -> Ready:
@@ -149,12 +149,12 @@ def program_candidate(
 
 
 def unstopped(listing: Listing) -> Candidate:
-    """Return a candidate that runs a compiled program without stop test and velocity."""
+    """Return a candidate of a compiled program without stop test and velocity."""
     return program_candidate(listing, may_stop=False, velocity=False)
 
 
 def copied_result(values: Iterable[float]) -> Array:
-    """Return a copy of a compiled function's result, which its next call overwrites."""
+    """Return a copy of a compiled result, which the next call overwrites."""
     return np.array([float(x) for x in values])
 
 

@@ -1,4 +1,4 @@
-"""Comparisons of programs, original and corrected, and of methods, on one scene.
+"""Comparisons of programs (original and corrected) and methods on one scene.
 
 Errors (rad/s) below the reference solution's own have no meaning. Differences between Fortran and
 Python are in units in the last place.
@@ -148,11 +148,10 @@ def listings_for(
     readings: Sequence[str] = (),
     conjectures: Sequence[str] | None = None,
 ) -> list[Listing]:
-    """Return each program's listings to compare: original, selected (if any) and corrected.
+    """Return each program's original, selected (if any) and corrected listings.
 
     `base`, changed by `fix` and `keep`, is the selected one; without a change, a specified `base`
-    is the only one. `readings` and `conjectures` apply to all. Raise InputError for a name that no
-    program has.
+    is the only one. `readings` and `conjectures` apply to all.
     """
     chosen = list(programs)
     assumed = [name for name in conjectures or () if name != "none"]

@@ -116,9 +116,9 @@ class Comparison:
     def unexpected(self) -> tuple[str, ...]:
         """Return a sentence for each unexpected result.
 
-        With programs, these are differences between Fortran and Python, and corrected programs that
-        miss their order. Without programs, they are errors above the limit that follows from a
-        method's tolerance, missing times, and no result of any method.
+        For programs, these are differences between Fortran and Python, and a missed order; for
+        methods alone, errors above the limit from the tolerance, missing times, and no result at
+        all.
         """
         found = [] if self.programs else [*filter(None, map(self._excess, self.methods))]
         if not self.programs and all(each.trajectory is None for each in self.methods):

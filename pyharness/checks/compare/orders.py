@@ -44,7 +44,7 @@ State = Literal["as due", "rounding", "misses", "unsettled", "singular", "sensit
 
 @dataclass(frozen=True)
 class Order:
-    """A method's order of convergence, measured by halving the step, or why it is undecided."""
+    """A method's measured order of convergence, or why it is undecided."""
 
     due: int  # order expected by theory
     # `as due`: as expected. `rounding`: the error reached rounding before the order showed.
@@ -60,7 +60,7 @@ class Order:
 
     @property
     def is_judged(self) -> bool:
-        """Return whether the measurement decides if the method has its order."""
+        """Return whether the measurement is decisive."""
         return self.state in ("as due", "rounding", "misses")
 
     def __str__(self) -> str:
@@ -84,7 +84,7 @@ def measured_order(
 ) -> Order:
     """Return the measured order of convergence of a compiled program's omega to `truth`.
 
-    Without convergence, the state is `misses` if a textbook method of the same order converges, and
+    Without convergence, the state is `misses` if a textbook method of the same order converges,
     `sensitive` if the error may be amplified rounding.
     """
 
@@ -121,8 +121,8 @@ def order_of(
 
     `solution` returns `quantity` after each step, shape (n, 3), with fewer rows after an overflow.
     The measurement ends when `pairs` successive orders are all at least `due` - 0.5 or all smaller,
-    or the error is only rounding. A run has at most `most_steps` steps, by default 2**18, or more
-    if eight halvings need it.
+    or the error is only rounding. A run has at most `most_steps` steps, by default 2**18 or, if
+    more, those of eight halvings.
     """
     n = len(truth.time)
     if n < scene.steps:

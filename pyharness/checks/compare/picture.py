@@ -31,7 +31,6 @@ _MARKERS: dict[str, dict[str, Any]] = {
 
 
 def _curves(comparison: Comparison) -> list[tuple[str, str, Trajectory, Accuracy]]:
-    """Return program or method, listing label, trajectory and errors of each curve."""
     found: list[tuple[str, str, ProgramFinding | MethodFinding]]
     found = [(each.listing.program, each.listing.label, each) for each in comparison.programs]
     found += [(each.method, "", each) for each in comparison.methods if not comparison.programs]

@@ -27,9 +27,9 @@ def seconds(
 ) -> list[float]:
     """Return the time of one call of each function in `runs` (s), measured in several rounds.
 
-    A round calls each function for about `length` seconds. If the first call, which is not counted,
-    takes at least `slow` seconds, there are only three rounds, if five times as long, only one.
-    `statistic` combines the times of the rounds.
+    A round calls each function for about `length` seconds. If the first call, not counted, takes at
+    least `slow` seconds, there are three rounds; if five times as long, one. `statistic` combines
+    the rounds' times.
     """
     clocks = [perf_counter] * len(runs) if clocks is None else clocks
     timed = list(zip(runs, clocks, strict=True))
@@ -66,7 +66,7 @@ def batch_seconds(run: Run, calls: int = 1, clock: Clock = perf_counter) -> floa
 def ended_after(limit: float) -> Iterator[None]:
     """Raise RuntimeError if a ``with`` block takes longer than `limit` (s).
 
-    Only Python code in the main thread, where signals arrive, is interrupted.
+    Only Python code in the main thread is interrupted.
     """
 
     def end(*_: object) -> None:

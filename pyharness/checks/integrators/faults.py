@@ -1,7 +1,7 @@
 """Known faults of integrators, each with the motion that a faulty integrator computes.
 
-We compute this motion by solving a changed scene, or by changing the right states. An integrator
-that converges to this motion has the fault.
+This motion is computed from a changed scene, or by changing the right states. An integrator that
+converges to it has the fault.
 """
 
 import math
@@ -56,7 +56,7 @@ class Fault:
 
 
 def true_motion(scene: Scene, times: Array) -> State:
-    """Return the states at ascending times (s); raise ArithmeticError if one is missing."""
+    """Return the states at ascending times (s)."""
     run = solve(scene, times.tolist(), tolerance=_TOLERANCE, attitude=True)
     if run.attitude is None or len(run.omega) < len(times):
         raise ArithmeticError("the motion does not reach the last time")

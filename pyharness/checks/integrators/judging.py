@@ -1,7 +1,7 @@
-"""Checks of an integrator of rigid bodies in any language, against the true solution.
+"""Checks of a rigid-body integrator in any language against the true solution.
 
-Errors are measured in random scenes with decreasing steps or tolerances. If the results converge to
-the motion of a known fault, the fault is named (docs/how-to/integrators.md).
+Errors are measured in random scenes with decreasing steps or tolerances. If results converge to the
+motion of a known fault, it is named (docs/how-to/integrators.md).
 """
 
 import math
@@ -94,9 +94,9 @@ def judge_integrator(
 ) -> Verdict:
     """Return the results of all checks of an integrator, started by `command`.
 
-    `chosen` are the problems (random scenes), `due` is the required order. ``again(name)`` returns
-    the command that repeats a scene's checks; `told` receives the number of finished problems and
-    the next one's name. An invalid answer ends the checks. Raise InputError for an empty command.
+    `chosen` are random scenes; `due` is the required order. ``again(name)`` returns the command
+    that repeats a scene's checks; `told` receives the number of finished problems and the next
+    one's name. An invalid answer ends the checks.
     """
     found = Verdict(command, again)
     where = "start"
@@ -265,7 +265,7 @@ def _judge_long(ask: Ask, found: Verdict) -> None:
 
 
 def replay_command(command: str, seed: str, draws: int, name: str = "") -> str:
-    """Return the command that repeats an integrator's checks, in one problem or all."""
+    """Return the command that repeats an integrator's checks in one problem or all."""
     verb = f"python -m pyharness verify --integrator {shlex.quote(command)}"
     where = f" --cell {name}" if name else ""
     return f"{verb} --seed {shlex.quote(seed)} --draws {draws}{where}"

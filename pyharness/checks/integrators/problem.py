@@ -1,4 +1,4 @@
-"""Random scenes in which an integrator is judged, its errors in them, and its drift.
+"""Random scenes in which an integrator is judged, and its errors and drift.
 
 The drift is the change of conserved quantities in a long torque-free motion: relative for energy
 and |L|, an angle (rad) for the direction of the angular momentum L in space. A level, from 0 to
@@ -58,7 +58,7 @@ CHANGE = Basis(
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A random scene in which an integrator is judged, named as in ``wave-1``."""
+    """A random scene to judge an integrator, named as in ``wave-1``."""
 
     scene: Scene
 
@@ -69,7 +69,7 @@ class Problem:
 
     @property
     def kind(self) -> str:
-        """The kind of the torque, one of `scenes.random_scenes.MODERATE`."""
+        """The kind of torque, one of `MODERATE`."""
         return self.scene.name.partition("-")[0]
 
     @cached_property
@@ -112,11 +112,11 @@ class Problem:
 
     @property
     def most_steps(self) -> float:
-        """The number of steps of the smallest size until the last time."""
+        """The number of smallest steps until the last time."""
         return float(self.times[-1] / self.step_size(LEVELS - 1))
 
     def floor(self, rounding: float) -> float:
-        """Return the largest error that roundings of relative size `rounding` cause."""
+        """Return the largest error by roundings of relative size `rounding`."""
         return _ROUNDINGS * rounding * math.sqrt(self.most_steps)
 
     def request(self, level: int, scene: Scene | None = None, times: Array | None = None) -> bytes:
@@ -160,7 +160,7 @@ class Convergence:
 
     @property
     def is_first(self) -> bool:
-        """Return whether the order is about 1 at the last two settings and at the last four."""
+        """Return whether the order is about 1 over the last two and last four settings."""
         if self.order is None:
             return False
         far = _power(self.errors[-_SEVERAL] / max(self.errors[-1], _LEAST),
@@ -178,7 +178,7 @@ class Convergence:
         return self.order is None or self.order >= _ORDER_ONE
 
     def predicted(self, level: int) -> float:
-        """Return a level's error, extrapolated from the next level by the order."""
+        """Return a level's error, extrapolated from the next by the order."""
         ratio = self.settings[level] / self.settings[level + 1]
         return self.errors[level + 1] * math.pow(ratio, self.order or 0.0)
 
@@ -189,8 +189,8 @@ def convergence(
     """Return a part's errors and their order of convergence, measured above `floor`.
 
     It is the order of the last two settings. If `overall`, for tolerances, with which errors
-    decrease irregularly, it is the smaller of the orders from the first setting to the last and
-    from the fourth last to the last.
+    decrease irregularly, it is the smaller of those from the first and from the fourth last setting
+    to the last.
     """
     seen = [k for k in range(1, len(errors)) if not errors[k] <= floor]
     order = None
@@ -227,7 +227,7 @@ class Judged:
     def lost(self) -> int:
         """The number of states that should be finite and are not.
 
-        A level may overflow if the next level's error and the order predict an error of 1 or more.
+        A level may overflow if an error of 1 or more is predicted.
         """
         rows = self.finest.lost
         for level in range(LEVELS - 2, -1, -1):
@@ -273,10 +273,10 @@ class Drift:
 
 
 def long_motion(free: Judged) -> tuple[int, Array, float | None]:
-    """Return level and times (s) of the long motion, and the limit of the drift between two times.
+    """Return level and times (s) of the long motion, and the limit of drift between two times.
 
     The level is the first that allows enough times, else the last or, if errors do not decrease,
-    the first. The limit is None if the errors in the problem `free` are too large.
+    the first. The limit is None if errors in `free` are too large.
     """
     control = free.finest.control
     levels = range(_FIRST[control], LEVELS)

@@ -23,10 +23,10 @@ ROUNDINGS = {"binary64": 2.0**-53, "binary32": 2.0**-24}
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """An integrator's answer: the states at the requested times, or its refusal.
+    """An integrator's states at the requested times, or its refusal.
 
     `omega` (rad/s) is about the body axes, shape (n, 3). `attitude` is from body to space, scalar
-    first, normalised, shape (n, 4); `norm` is the largest difference of its norm from 1 before
+    first, normalised, shape (n, 4); `norm` is its norm's largest deviation from 1 before
     normalisation. `control` is the request's field that sets the accuracy; `rounding` is the
     relative rounding error of the arithmetic.
     """
@@ -64,12 +64,12 @@ Ask = Callable[[bytes, int], Motion]
 
 
 def asking_of(process: PortProcess) -> Ask:
-    """Return a function that sends requests to an integrator and returns its answers."""
+    """Return a function that requests an integrator's answers."""
     return lambda line, rows: read_motion(process.ask(line), rows)
 
 
 def refuse_integrator(command: str) -> None:
-    """Raise InputError that advises `--integrator` if `command` is an integrator, not a port."""
+    """Raise InputError that advises `--integrator` if `command` is an integrator."""
     line = request(draw_moderate("", MODERATE[0], 0), [1.0], 0.5, 1e-3)
     refuse_other(command, "--port", "--integrator", line, lambda answer: read_motion(answer, 1))
 

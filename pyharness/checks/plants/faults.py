@@ -1,7 +1,7 @@
-"""Faults of a chosen size, each planted in the running process while a context lasts.
+"""Faults of a chosen size, planted in the running process within a context.
 
-A fault replaces a function, or changes its result. The Python version of a program (twin) becomes
-faulty by one replacement in a copy of its sources.
+A fault replaces a function, or changes its result. A program's Python version (twin) becomes faulty
+by one replacement in a copy of its source.
 """
 
 import importlib
@@ -44,7 +44,7 @@ Its arguments are the size of the fault, the right function, and the arguments o
 
 
 def instead(target: str, faulty: Faulty) -> Fault:
-    """Return a fault that replaces the function with the dotted name `target` by `faulty`."""
+    """Return a fault that replaces the function `target` (a dotted name) by `faulty`."""
 
     def planted(size: float) -> AbstractContextManager[Any]:
         right = pkgutil.resolve_name(target)
@@ -63,12 +63,12 @@ def in_method(name: str, faulty: Faulty) -> Fault:
 
 
 def changing(change: Change) -> Faulty:
-    """Return a faulty function that applies `change` to the right function's result."""
+    """Return a faulty function that changes the right one's result."""
     return lambda size, right, *rest, **named: change(right(*rest, **named), size)
 
 
 def change_result(target: str, change: Change) -> Fault:
-    """Return a fault that changes the result of the function with the dotted name `target`."""
+    """Return a fault that changes the result of the function `target`."""
     return instead(target, changing(change))
 
 

@@ -14,7 +14,7 @@ CONTROL = "none"
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of one planted fault: whether checks detected it, and how many failed."""
+    """The outcome of one planted fault: whether it was detected, and failed checks."""
 
     name: str
     fault: str
@@ -37,10 +37,7 @@ def control(failed: int, note: str) -> Outcome:
 def self_test_report(
     title: Sequence[str], found: Sequence[Outcome], again: str, **extra: Any
 ) -> Report:
-    """Return the report of a self-test, which the command `again` repeats.
-
-    `extra` has further JSON fields.
-    """
+    """Return the report of a self-test, which the command `again` repeats."""
     lines = []
     for each in found:
         lines += [f"{'' if each.passed else 'FAILED '}{each.name}: {each.fault}", f"  {each.note}"]

@@ -44,7 +44,7 @@ _PROGRAM = "pyharness.thesis.programs.Program.run"  # in either language
 
 @dataclass(frozen=True)
 class Plant:
-    """A planted fault, its size in the self-test, and the kinds of checks that can detect it."""
+    """A planted fault, its size, and the kinds of checks that can detect it."""
 
     name: str
     fault: str
@@ -58,7 +58,6 @@ def _plus(found: Any, size: float) -> Any:
 
 
 def _off(found: Array, size: float) -> Array:
-    """Return the array with elements enlarged by `size` times the largest one."""
     return np.asarray(found + size * np.abs(found).max(initial=0.0) * np.sign(found))
 
 
@@ -94,7 +93,7 @@ _Answer = tuple[Array, int, int, Array]
 
 
 def _prepared(change: Callable[[Array, _Answer, float], _Answer]) -> Fault:
-    """Return a fault that changes prepared solvers' results to ``change(packed, result, size)``."""
+    """Return a fault that changes prepared results to ``change(packed, result, size)``."""
 
     def planted(size: float) -> AbstractContextManager[Any]:
         entry = extension.extension().solve_packed
@@ -109,7 +108,7 @@ def _prepared(change: Callable[[Array, _Answer, float], _Answer]) -> Fault:
 
 
 def _stale_solver(size: float) -> AbstractContextManager[Any]:
-    """Return a context in which every second call of prepared solvers repeats a result."""
+    """Return a context in which every second prepared call repeats a result."""
     calls = itertools.count()
     before: list[_Answer] = []
 
@@ -166,7 +165,7 @@ def _label_both(
 def _shifted(
     size: float, solve: _Run, scene: Scene, times: Sequence[float], *rest: float
 ) -> Trajectory:
-    """Return results of later times, labelled with `times`; only the true solution reveals this."""
+    """Return results of later times, labelled with `times`."""
     late = size * scene.step_size if times[-1] >= 0.0 else -size * scene.step_size
     found = solve(scene, [t + late for t in times], *rest)
     time = np.array(times[: len(found.time)], dtype=float)

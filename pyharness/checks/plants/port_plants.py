@@ -232,7 +232,6 @@ def _planted(process: PortProcess, cells: Sequence[Cell]) -> Iterator[Outcome]:
 
 
 def _parsed(line: bytes) -> dict[str, Any]:
-    """Return a valid answer as a dictionary, with numbers as floats."""
     answer: dict[str, Any] = json.loads(line)
     answer["rows"] = [[read_number("rows", x) for x in row] for row in answer["rows"]]
     change_at("stop.quotient", partial(read_number, "stop"))(answer)

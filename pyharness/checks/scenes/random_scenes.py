@@ -52,7 +52,7 @@ def weekly_seed(day: datetime.date | None = None) -> str:
 
 
 def draw(seed: str, number: int) -> Draw:
-    """Return the random inputs of check `number`, the same in all versions of Python."""
+    """Return the random inputs of check `number`, equal in all versions of Python."""
     # Each draw has its own generator, so that it can be repeated alone.
     source = Random(f"{seed}/{number}")
     scene = _plain(source)
@@ -89,8 +89,8 @@ def random_scene(kind: str, seed: str | int, name: str = "") -> Scene:
 def draw_moderate(seed: str, kind: str, number: int) -> Scene:
     """Return scene `number` of a seed, with a torque of `kind`, an element of `MODERATE`.
 
-    The moments are possible and differ by at least a tenth. The body rotates by some radians in 12
-    steps of 0.5 s. Torques over moments are some tenths of 1 rad/s2.
+    The moments are possible, and differ by at least a tenth. The body rotates by some radians in 12
+    steps of 0.5 s; torques over moments are some tenths of 1 rad/s2.
     """
     source = Random(f"{seed}/moderate/{kind}/{number}")
     size = 10.0 ** source.uniform(-1.0, 1.0)
@@ -175,7 +175,7 @@ def _from_rest(source: Random) -> Scene:
 
 
 def _slow_waves(source: Random) -> Scene:
-    """Return a scene with torque waves of 1e-12 to 0.1 rad/s, whose phase may hardly change."""
+    """Return a scene with torque waves of 1e-12 to 0.1 rad/s."""
     scene = _plain(source)
     size = _largest(scene) * 10.0 ** source.uniform(-2.0, 2.0)
     law = _law(source, size, source.choice((4, 8, 12)), (1e-12, 0.1))

@@ -1,7 +1,7 @@
-"""Random scenes with torques that depend on omega or attitude, reproducible from a seed.
+"""Random scenes with torques that depend on omega or attitude.
 
-Torques are sums of recorded functions, or of ready-made terms. They are about as large as the
-gyroscopic torque, to affect slow and fast bodies alike. End times may be negative.
+Torques are sums of recorded functions or ready-made terms, about as large as the gyroscopic torque.
+End times may be negative.
 """
 
 from collections.abc import Callable

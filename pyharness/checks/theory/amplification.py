@@ -7,8 +7,8 @@ original Runge-Kutta program propagates two: the result, and U(1), at which the 
 evaluated. A program is linearly stable for z where the spectral radius is at most 1.
 
 A collocation program evaluates the right-hand side along its first estimate, a straight line, and
-corrects once. At time s of this line the right-hand side is F + s J F + s**2 Q(F), where F is its
-value at s = 0 and Q its quadratic part.
+corrects once. At time s it is F + s J F + s**2 Q(F), with its value F at s = 0 and quadratic part
+Q.
 """
 
 from dataclasses import dataclass
@@ -67,7 +67,7 @@ class Amplification:
     def moving(self) -> "Amplification":
         """Return the matrix without the row and column of the step's result.
 
-        Return the whole matrix if the old result affects more than the new one.
+        Return all of it if the old result affects more than the new one.
         """
         column = self.coefficients[:, -1]
         if self.size > 1 and not column[:-1].any() and not column[-1, 1:].any():
@@ -92,7 +92,7 @@ class Amplification:
 def amplification(listing: Listing, step: int = 1) -> Amplification:
     """Return the amplification matrix of step `step` (from 1) of a program.
 
-    Steps differ only with the defect `dt-accumulates`, which moves the collocation points.
+    Steps differ only with the defect `dt-accumulates`.
     """
     if listing.program == "runge-kutta":
         return _runge_kutta(listing)
@@ -103,10 +103,7 @@ def amplification(listing: Listing, step: int = 1) -> Amplification:
 
 
 def weight_of_squares(listing: Listing, step: int) -> Fraction:
-    """Return the weight of h**3 Q(F) in a collocation step; exact integration gives 1/3.
-
-    F is the right-hand side, Q its quadratic part.
-    """
+    """Return the weight of h**3 Q(F) in a collocation step; exact integration gives 1/3."""
     points, weights = _quadrature(listing, step)
     return Fraction(weights @ points**2)
 
@@ -157,9 +154,8 @@ def _polynomial_text(coefficients: Fractions) -> str:
 def boundary(matrix: Amplification, direction: complex) -> tuple[float, float]:
     """Return the distance of the stability boundary from z = 0, and the slope there.
 
-    `direction` is -1 for the negative real axis, 1j for the imaginary axis. The slope is the
-    derivative of the spectral radius just beyond the boundary. Return (0, 1) if perturbations grow
-    at a distance of 1/16.
+    `direction` is -1 (negative real axis) or 1j (imaginary axis). The slope is that of the spectral
+    radius just beyond the boundary. Return (0, 1) if perturbations grow at a distance of 1/16.
     """
 
     def grows(distance: float) -> bool:
@@ -204,8 +200,7 @@ class Regions:
 def regions() -> Regions:
     """Return the stability regions of all programs, original and corrected.
 
-    The Runge-Kutta program also has regions with `stage-base` or `base-not-restored` alone. The
-    region of Gauss collocation, the left half-plane, is omitted.
+    The Runge-Kutta program also has regions with `stage-base` or `base-not-restored` alone.
     """
     real, imaginary = np.linspace(*_REAL), np.linspace(*_IMAGINARY)
     distances = np.geomspace(*_DISTANCES)

@@ -1,8 +1,7 @@
-"""Bounds, by Brouwer's law, of rounding errors over many steps of a torque-free motion.
+"""Bounds on rounding errors over many steps of torque-free motion, by Brouwer's law.
 
 Brouwer 1937, Astronomical Journal 46: with random rounding, errors of energy and momentum grow with
-the power 1/2 of the number of steps, the phase error with 3/2. With biased rounding the powers are
-1 and 2.
+the power 1/2 of the number of steps, the phase error with 3/2; with biased rounding, 1 and 2.
 """
 
 import math
@@ -116,7 +115,7 @@ def floats(rows: Sequence[Sequence[Decimal]]) -> Array:
 
 
 def taylor_noise(body: Orbit, scene: Scene, step: float, order: int, left_out: float) -> Noise:
-    """Return error bounds of a Taylor step of size `step` (s), by a running error analysis.
+    """Return error bounds of a Taylor step (s), by running error analysis.
 
     `left_out` is the truncation error relative to the largest omega.
     """
@@ -137,7 +136,7 @@ def taylor_noise(body: Orbit, scene: Scene, step: float, order: int, left_out: f
 
 
 def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
-    """Return error bounds of a step of Gauss collocation of size `step` (s)."""
+    """Return error bounds of a step (s) of Gauss collocation."""
     from pyharness.checks.theory.tableau import tableau
 
     matrix = tableau("collocation", stages, "gauss").matrix
@@ -184,8 +183,8 @@ def errors(
 ) -> dict[str, float]:
     """Return the signed errors of energy and momentum (relative) and of the phase (rad).
 
-    The phase error is the time by which `omega` is ahead of the exact solution, times the frequency
-    of the motion. If `rounded`, the exact solution uses A, B, C rounded to binary64, as methods do.
+    The phase error is the time by which `omega` is ahead, times the frequency of the motion. If
+    `rounded`, the exact solution uses A, B, C rounded to binary64, as methods do.
     """
     start = [Decimal(w) for w in scene.omega]
     found = [Decimal(float(w)) for w in omega]

@@ -1,7 +1,6 @@
 """The collocation matrices (eq. 36 of the thesis), and the accuracy of their solution by LEQT1F.
 
-LEQT1F is the linear solver of the programs "two-term" and "four-term". Exact solutions are computed
-in fractions.
+LEQT1F is the linear solver of the two-term and four-term programs. Exact solutions are fractions.
 """
 
 import math
@@ -88,7 +87,7 @@ def collocation_matrix(points: Sequence[Fraction]) -> Fractions:
 
 @dataclass(frozen=True)
 class Solved:
-    """LEQT1F's accuracy for A X = B with one collocation matrix and six right-hand sides."""
+    """LEQT1F's accuracy with one collocation matrix and six right-hand sides."""
 
     ier: int  # of the compiled solver: 0, or 129 for a singular matrix
     differing: int  # elements of X, and IER, that differ between Fortran and Python
@@ -196,10 +195,10 @@ def _small_step(program: str) -> tuple[Fraction, Fractions]:
 def solver_roundings(program: str) -> tuple[float, float]:
     """Return two bounds on the rounding error that the solver adds to a step's result.
 
-    Both are in units of 2**-53 times step size times rate. The first is for equal rates at all
-    points, where only the coefficient of t is not zero. The second, for unequal rates, is to be
-    multiplied by their relative deviation from equal rates. Both are independent of the step size
-    while the largest element of each row is 1.
+    Both are in units of 2**-53 times step size times rate, and independent of the step size while
+    the largest element of each row is 1. The first is for equal rates at all points, where only the
+    coefficient of t is not zero. The second, for unequal rates, is to be multiplied by their
+    relative deviation from equal rates.
     """
     step, matrix = _small_step(program)
     count = len(matrix)
@@ -219,8 +218,8 @@ def solver_roundings(program: str) -> tuple[float, float]:
 def singular_below(program: str, bits: int = 53) -> float:
     """Return the largest step size (s) for which LEQT1F must report a singular matrix.
 
-    LEQT1F reports this if adding the last scaled pivot to the number of rows, in a precision of
-    `bits` bits, leaves the number unchanged.
+    It reports this if the number of rows plus the last scaled pivot, in `bits` bits, equals the
+    number of rows.
     """
     step, matrix = _small_step(program)
     count = len(matrix)

@@ -1,9 +1,8 @@
-"""Error amplification by Euler's equations themselves, which affects all methods.
+"""Error amplification by Euler's equations, which affects all methods.
 
-An error of omega at time s, multiplied by the state-transition matrix Phi(t, s) of the equations
-linearised along the solution, is the resulting error at time t. Under a torque that depends on
-omega or attitude, the Jacobian follows from the tape, the recorded operations of the equations, and
-Phi includes the scene's attitude, if any.
+An error of omega at time s, multiplied by the state-transition matrix Phi(t, s) of the linearised
+equations, is the resulting error at time t. Under a torque that depends on omega or attitude, the
+Jacobian follows from the tape of recorded operations, and Phi includes the scene's attitude.
 """
 
 import math
@@ -53,10 +52,10 @@ _Sample = TypeVar("_Sample")
 class Conditioning:
     """The sensitivity of omega at the end of a motion to errors during it.
 
-    `limit` and `angle_limit` add rounding errors to `made`, the sum of the errors allowed in the
-    steps (relative, or rad). `limit` amplifies `made`, and is at most 2, because components up to
-    `largest` differ by no more; `steps` is the number of roundings of omega, 0 with compensated
-    summation. `angle_limit` assumes the largest rounding error of omega at all times.
+    `limit` and `angle_limit` add rounding errors to `made`, the sum of the steps' allowed errors
+    (relative, or rad). `limit` amplifies `made`, and is at most 2; `steps` is the number of
+    roundings of omega, 0 with compensated summation. `angle_limit` assumes omega's largest rounding
+    error at all times.
     """
 
     # Largest factor, at least 1, from an error of omega at any time to the error at the end.
@@ -84,8 +83,8 @@ class Conditioning:
 def conditioning(scene: Scene, time: float) -> Conditioning:
     """Return the sensitivity of omega at `time` (s) to earlier errors.
 
-    Raise InputError if the solution grows without bound before `time`, if the motion is too fast or
-    too long to be sampled, or if the amplification exceeds binary64.
+    Raise InputError if the solution is unbounded before `time`, too fast or too long to be sampled,
+    or amplifies errors beyond binary64.
     """
     # Near the separatrix a numerical integration deviates after a few revolutions.
     method = "closed-form" if closed_form(scene) else "taylor"
@@ -109,8 +108,7 @@ def conditioning(scene: Scene, time: float) -> Conditioning:
 def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
     """Return the final sensitivity along `omega` (rad/s), the solution at n `times` (s).
 
-    `omega` has the shape (n, 3), and changes little between times, which begin at 0. Raise
-    InputError if the amplification exceeds binary64.
+    `omega` has the shape (n, 3), and changes little between times, which begin at 0.
     """
     with np.errstate(all="ignore"):
         largest = float(np.abs(omega).max()) or 1.0
@@ -121,10 +119,10 @@ def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
 def sampled(
     sample: Callable[[Array], tuple[float, _Sample]], time: float, fewest: int, most: int
 ) -> tuple[Array, _Sample]:
-    """Return equally spaced times (s), close enough for the rates, and results at them.
+    """Return equally spaced times (s), close enough for the rates, and their results.
 
     `sample` takes times up to `time`, and returns the largest rate (1/s) and the results. The first
-    attempt has `fewest` intervals. Raise InputError if more than `most` are needed.
+    attempt has `fewest` intervals, the last at most `most`.
     """
     count = fewest
     while True:
@@ -146,7 +144,7 @@ def of_flow(flow: Array, times: Array, state: Array, source: Array, largest: flo
 
     `flow` has the matrix from each time to the last, shape (n, m, m). `state` and `source`, the
     sums of magnitudes of the terms of its derivative, have the shape (n, m). Errors are divided by
-    `largest`. Raise InputError if the amplification exceeds binary64.
+    `largest`.
     """
     steps, sizes = np.diff(times), np.abs(flow)
 
@@ -193,9 +191,9 @@ _OF_ANGLE = 0.5
 def conditioning_at(scene: Scene, times: Sequence[float]) -> Conditioning:
     """Return the sensitivity of a scene's solution at `times` (s) to earlier errors.
 
-    Under a torque law it is that at the last time; under other torques the largest at any of the
-    times, because damping may reduce errors. Raise InputError as `conditioning` does, or if the
-    torque can't be recorded.
+    Under a torque law it is that at the last time; under other torques, where damping may reduce
+    errors, the largest at any time. Raise InputError as `conditioning` does, or if the torque can't
+    be recorded.
     """
     if not isinstance(scene.torque, StateTorque):
         return conditioning(scene, times[-1])
@@ -225,7 +223,7 @@ def _of_state(scene: Scene, time: float) -> Conditioning:
 
 
 def _path(scene: Scene, times: Array) -> Array:
-    """Return omega and any attitude of the scene at `times` (s), which begin at 0."""
+    """Return omega and any attitude at `times` (s), which begin at 0."""
     if times[-1] == 0.0:
         return np.tile([*scene.omega, *(scene.attitude or ())], (len(times), 1))
     attitude = scene.attitude is not None

@@ -19,7 +19,7 @@ _NEAR = 2.0**-27
 def flip_times(moments: ArrayLike, omega0: ArrayLike) -> Array:
     """Return the time (s) between flips of each body, half the period of omega, shape (n,).
 
-    It is infinite on the separatrix and for a steady rotation. `moments` (kg m2, in any order) and
+    It is infinite on the separatrix and in steady rotation. `moments` (kg m2, in any order) and
     `omega0` (rad/s) have the shape (n, 3) or (3,).
     """
     bodies, omega = np.broadcast_arrays(np.atleast_2d(moments), np.atleast_2d(omega0))

@@ -5,8 +5,8 @@ small perturbation proportional to exp(Q t). With the coefficients A, B, C of Eu
 torque over moment M = N / I, (a, b, c) is steady if A bc = -M1, B ca = -M2, C ab = -M3. The rates Q
 (1/s) are the roots of Q**3 - (BC a**2 + CA b**2 + AB c**2) Q - 2 ABC abc = 0.
 
-`share` is the initial perturbation divided by the rotation. Of a continuous family of steady
-rotations only some members are reported.
+`share` is the initial perturbation divided by the rotation. Of a continuous family, only some
+rotations are reported.
 """
 
 import cmath
@@ -39,7 +39,7 @@ OFF = 0.1
 
 @dataclass(frozen=True)
 class SteadyRotation:
-    """A steady rotation of a scene, and the development of a small perturbation."""
+    """A steady rotation, and the development of a small perturbation."""
 
     place: str  # an axis, a point of a hyperbola, ...
     omega: Triple  # rad/s
@@ -74,10 +74,9 @@ class SteadyRotations:
 
 
 def steady_rotations(scene: Scene, disturbance: float) -> SteadyRotations:
-    """Return a scene's steady rotations, and the development of perturbations.
+    """Return a scene's steady rotations.
 
-    `disturbance` is the perturbation divided by the rotation. Raise InputError if the torque varies
-    with time, or a rotation or its rates exceed binary64.
+    `disturbance` is the perturbation divided by the rotation.
     """
     if scene.body_torque.varies:
         raise InputError(

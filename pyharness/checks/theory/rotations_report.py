@@ -133,7 +133,7 @@ def rotations_picture(scene: Scene) -> Picture:
     """Return the picture of a scene's polhodes and of the growth rates of all bodies.
 
     The scene must have moments. The right panel shows the growth rate about the middle axis over
-    the spin, and marks the cases of Table 1.
+    the spin.
     """
     from matplotlib.figure import Figure
 

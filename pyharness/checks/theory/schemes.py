@@ -1,8 +1,7 @@
 """Independent implementations of the schemes of programs and fixed-step methods.
 
-A scheme computes one step from `omega` under constant torque (equations 16-18 of the thesis). Its
-argument `on` is a `Numbers`, or a `Series` for power series in the step size, which yield each term
-of the truncation error.
+A scheme computes one step from `omega` under constant torque (equations 16-18 of the thesis), with
+`on` a `Numbers` or, for the terms of the truncation error, a `Series` in the step size.
 """
 
 import math
@@ -109,8 +108,8 @@ def collocation(program: str) -> Scheme:
 def collocation_singular(program: str) -> Scheme:
     """Return the scheme of a collocation program whose matrix is reported as singular.
 
-    The linear solver LEQT1F then returns the right-hand sides, which the program uses as
-    coefficients c1, c2, ... of its trial functions.
+    LEQT1F then returns the right-hand sides, which the program uses as coefficients c1, c2, ... of
+    its trial functions.
     """
     parts = PARTS[program]
 
@@ -206,7 +205,7 @@ def spacing(count: int) -> Sequence[Fraction]:
     """Return the weights of a central difference for the first derivative.
 
     Weight i, from 1, multiplies the difference of the values at i and -i spacings. The sum over the
-    spacing is exact for polynomials up to degree 2 `count`.
+    spacing is exact up to degree 2 `count`.
     """
     middle = math.comb(2 * count, count)
     return [

@@ -1,7 +1,7 @@
 """Predicted truncation and rounding errors of fixed steps at the end of a scene.
 
 The state-transition matrix propagates the steps' errors to the end. Truncation errors come from
-`schemes`, without running the methods.
+`schemes`.
 """
 
 import math
@@ -35,7 +35,7 @@ FORECAST = Basis(
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """A scene's solution, with the state-transition matrices from each time to the end."""
+    """A scene's solution, with state-transition matrices to the end."""
 
     scene: Scene  # with constant torque
     times: Array  # shape (n,), s: from 0 to the end
@@ -67,10 +67,7 @@ class Forecast:
 
 
 def path(scene: Scene, time: float) -> Path:
-    """Return the solution to `time` (s), with its state-transition matrices.
-
-    Raise InputError if the solution grows without bound before `time`, or is too fast.
-    """
+    """Return the solution until `time` (s)."""
     from pyharness.engine.solve import solve
 
     flow = conditioning(scene, time)
@@ -132,10 +129,7 @@ class Forecaster:
         return Forecast(truncation, 2.0 * worst + rounding, rounding, wandering)
 
     def crossing(self, smallest: float) -> float:
-        """Return the step size (s) below which expected rounding exceeds the truncation error.
-
-        It is at least `smallest` (s).
-        """
+        """Return the step size (s) below which expected rounding exceeds the truncation error."""
         time = float(self._path.times[-1])
         high = max(1, math.floor(time / smallest))
         low = 1

@@ -37,8 +37,7 @@ def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None =
 
     `weighting` is "collocation", "subdomain", "galerkin" or "least-squares", `terms` is n;
     `points`, for collocation, is as in `grid`. The other weightings use Gauss-Legendre quadrature,
-    exact under constant torque. Under torques that vary with time, its error is of order 2n + 1 or
-    higher, above the method's order.
+    exact under constant torque; else its error is of order 2n + 1 or higher, above the method's.
     """
     # Products of two omegas have degree 2n, and the weight functions n (Galerkin), n - 1 (least
     # squares) or 0 (subdomain).

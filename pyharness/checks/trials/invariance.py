@@ -1,6 +1,6 @@
 """Trial of invariance: results must transform with a rotated or rescaled problem.
 
-Methods whose operations differ only in axes, signs or exponents must return the same bits, others
+Methods whose operations differ only in axes, signs or exponents must return equal bits, others
 agree within an error bound.
 """
 

@@ -67,11 +67,11 @@ Runner = Callable[[Scene, Sequence[float]], tuple[Array, Array]]
 
 @dataclass(frozen=True)
 class Integrator:
-    """A method whose error growth is measured, with bounds on the errors of its steps.
+    """A method whose error growth is measured.
 
     `run` returns omega, shape (n, 3), and the number of steps until each time; `noise` bounds the
     errors of a step of given size (s). `revolutions` is the length of the first run, `others` of
-    each run from another initial condition. `preference` tells whether rounding errors are biased.
+    runs from other initial conditions. `preference` means biased rounding.
     """
 
     run: Runner
@@ -156,10 +156,10 @@ def check_growth(integrator: Integrator, name: Name) -> Iterator[Check]:
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """The errors of one quantity of a motion, by one method, after n numbers of `steps`.
+    """The errors of one quantity, `what`, after n numbers of `steps`.
 
-    `what` is the quantity, `error` the root mean square over `starts` initial conditions; `limits`
-    are its bounds by Brouwer's law.
+    `error` is the root mean square over `starts` initial conditions; `limits` are its bounds by
+    Brouwer's law.
     """
 
     motion: str
@@ -213,7 +213,7 @@ def orbit_of(motion: str) -> Orbit:
 
 
 def starts(scene: Scene, body: Orbit) -> list[Scene]:
-    """Return scenes that start along one motion, because errors depend on the initial phase."""
+    """Return scenes that start along one motion, with other phases."""
     times = [0.37 * k / body.frequency for k in range(STARTS)]
     rows = brouwer.floats([torque_free(scene, t, rounded=True) for t in times])
     return [replace(scene, omega=row) for row in rows]

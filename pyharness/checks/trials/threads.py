@@ -53,7 +53,7 @@ _LATE = 20.0  # end time (s)
 
 @dataclass(frozen=True)
 class Job:
-    """A call of a method or program, which returns its results' bits."""
+    """A call that returns its results' bits."""
 
     subject: str
     scene: Scene
@@ -72,7 +72,7 @@ def _run(only: Sequence[str]) -> Iterator[Check]:
 
 
 def different(jobs: Sequence[Job], repeats: int = _REPEATS) -> list[Job]:
-    """Return the jobs whose results differ in threads, once for each differing call."""
+    """Return the jobs that differ in threads, once for each differing call."""
     alone = [bits(job) for job in jobs]
     order = [index for index in range(len(jobs)) for _ in range(repeats)]
     random.Random("threads").shuffle(order)
@@ -95,7 +95,7 @@ def bits(job: Job) -> bytes:
 
 
 def jobs() -> list[Job]:
-    """Return jobs for every method, prepared solver and program, LEQT1F, and refusals."""
+    """Return jobs for methods, prepared solvers, programs, LEQT1F and refusals."""
     found = []
     for scene in SCENES:
         found += [Job(name, scene, partial(_rows, scene, name)) for name in METHODS]

@@ -45,7 +45,7 @@ class _Terminal:
 
 
 def progress(done: int, total: int, what: str) -> None:
-    """Show on a terminal that `done` of `total` parts are complete, and the current part."""
+    """Show on a terminal `done` of `total` parts, and the current one."""
     global _bar
     if not sys.stderr.isatty():
         return

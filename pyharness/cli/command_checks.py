@@ -149,8 +149,7 @@ def show_self_test(
 ) -> int:
     """Write the report of a self-test; return 1 if an outcome fails, else 0.
 
-    `outcomes` has a control without fault, then `count` planted faults. `refuse` is called if the
-    control fails.
+    `outcomes` has a control, then `count` planted faults. `refuse` is called if the control fails.
     """
     found = []
     for each in outcomes:

@@ -1,7 +1,7 @@
-"""Interruption: Ctrl-C ends a command at any time, with a one-line message and exit status 130.
+"""Interruption: Ctrl-C ends a command with a one-line message and exit status 130.
 
-Python may lose a KeyboardInterrupt: an import may replace it by another exception, and a finalizer
-or callback may drop it. This module therefore records the signal, and raises a dropped one again.
+Python may lose a KeyboardInterrupt: an import may replace it, and a finalizer or callback drop it.
+This module therefore records the signal, and raises it again.
 """
 
 import atexit
@@ -31,7 +31,7 @@ class _Interruption:
         self.is_reported = False
 
     def leave_at_once(self, *_: object) -> None:
-        """Print "pyharness: interrupted", unless done before; end the process without cleanup."""
+        """Print "pyharness: interrupted", if not yet done; end the process without cleanup."""
         try:
             if not self.is_reported:
                 os.write(2, LINE.encode())
@@ -67,7 +67,7 @@ def came() -> bool:
 def leave_when_interrupted() -> bool:
     """Make Ctrl-C end the process at once and return True; return False if SIGINT is ignored.
 
-    Call it only while nothing needs cleanup: during imports, and after the results are written.
+    Call it only while nothing needs cleanup: during imports, and after output.
     """
     # A shell starts background processes with SIGINT ignored, which must remain so.
     if not callable(signal.getsignal(signal.SIGINT)):
@@ -110,9 +110,9 @@ def report() -> int:
 def leave(code: int) -> None:
     """Remove temporary files and end the process with exit status `code`.
 
-    Python's own exit would wait for threads and free all memory. On Ctrl-C it would ignore the
-    interrupt, or end by the signal instead of with status 130. If `code` is 130, child processes
-    are killed, and cleanup takes at most two seconds.
+    Python's own exit would wait for threads and free all memory, and on Ctrl-C ignore the interrupt
+    or end by the signal. If `code` is 130, child processes are killed, and cleanup takes at most
+    two seconds.
     """
     if code == CODE:
         # Messages of ending threads and finalizers would follow the report of the interrupt.

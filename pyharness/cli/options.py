@@ -132,7 +132,7 @@ def chosen_tolerance(options: argparse.Namespace) -> float | None:
 
 
 def chosen_seed(options: argparse.Namespace) -> str | None:
-    """Return --seed, or None; raise InputError if it is not printable."""
+    """Return --seed, which must be printable, or None."""
     if options.seed is not None and not options.seed.isprintable():
         raise InputError(
             "--seed: contains characters that can't be printed; allowed: printable characters"
@@ -150,7 +150,7 @@ def check_known(what: str, name: str | None, allowed: Sequence[str]) -> None:
 def chosen_names(text: str | None, what: str, allowed: Sequence[str]) -> list[str]:
     """Return the names in --only, beginnings of check ids, as in ``cells/two-term``.
 
-    Raise InputError if a name's part before the first slash is not in `allowed`.
+    The part before the slash must be in `allowed`.
     """
     only = names(text)
     for each in only:
@@ -162,9 +162,8 @@ def chosen_names(text: str | None, what: str, allowed: Sequence[str]) -> list[st
 def chosen_scene(options: argparse.Namespace, **allowed: bool) -> Scene:
     """Return the scene of --case or --scene, changed by --omega, --step-size and --steps.
 
-    Warn of impossible moments of inertia, and of a normalised attitude. Raise InputError unless
-    exactly one of --case and --scene is given, and `checked_scene` with the flags `allowed` accepts
-    the scene.
+    Warn of impossible moments of inertia, and of a normalised attitude. `allowed` are flags of
+    `checked_scene`.
     """
     if (options.case is None) == (options.scene is None):
         raise InputError("give either --case N (1 to 7) or --scene FILE")
@@ -213,7 +212,7 @@ def chosen_listing(options: argparse.Namespace) -> Listing:
 def changes_of(options: argparse.Namespace) -> dict[str, Any]:
     """Return the names in --fix, --keep, --reading and --conjecture, as arguments of `subset`.
 
-    Raise InputError for defects to fix in the corrected, or keep in the original program.
+    A corrected program has nothing to fix, an original one nothing to keep.
     """
     if options.listing == "corrected":
         refuse(options, "--listing corrected", ("fix",))
@@ -259,7 +258,7 @@ def chosen_stops(options: argparse.Namespace) -> dict[str, Any]:
 def refuse(options: argparse.Namespace, chosen: str, names: Iterable[str]) -> None:
     """Raise InputError if an option of `names` is given besides `chosen`.
 
-    A name is an attribute of `options`, such as "no_stop", or a key of OPTIONS, such as "--case N".
+    A name is an attribute of `options`, such as "no_stop", or a key of OPTIONS, as "--case N".
     """
     for name in names:
         option = name.partition(" ")[0].removeprefix("--").replace("_", "-")
@@ -273,12 +272,12 @@ def names(text: str | None) -> list[str]:
 
 
 def numbers(text: str, option: str) -> list[float]:
-    """Return the numbers in a text such as 1,2; else raise InputError."""
+    """Return the numbers in a text such as 1,2."""
     return [number(part, option) for part in text.split(",")]
 
 
 def number(text: str, option: str) -> float:
-    """Return an option's finite number; else raise InputError."""
+    """Return an option's finite number."""
     try:
         value = parsed_float(text)
     except ValueError:
@@ -289,7 +288,7 @@ def number(text: str, option: str) -> float:
 
 
 def positive(text: str | None, option: str, default: float) -> float:
-    """Return an option's number above 0, or the default; else raise InputError."""
+    """Return an option's number above 0, or the default."""
     if text is None:
         return default
     value = number(text, option)
@@ -299,7 +298,7 @@ def positive(text: str | None, option: str, default: float) -> float:
 
 
 def whole(text: str, option: str) -> int:
-    """Return an option's whole number; else raise InputError."""
+    """Return an option's whole number."""
     try:
         return parsed_whole(text)
     except ValueError:
@@ -307,7 +306,7 @@ def whole(text: str, option: str) -> int:
 
 
 def whole_up_to(most: int, text: str | None, option: str, default: int) -> int:
-    """Return an option's whole number, 1 to `most`, or the default; else raise InputError."""
+    """Return an option's whole number, 1 to `most`, or the default."""
     count = default if text is None else whole(text, option)
     if not 1 <= count <= most:
         raise InputError(f"{option}: {count}; allowed: 1 to {most}")
@@ -317,7 +316,7 @@ def whole_up_to(most: int, text: str | None, option: str, default: int) -> int:
 def chosen_count(text: str | None, option: str, default: int, least: int, cost: Cost) -> int:
     """Return an option's number of draws, from `least` to `cost.most`, or the default.
 
-    Raise InputError for other numbers. Print a forecast if the draws take more than a minute.
+    Print a forecast if the draws take more than a minute.
     """
     if text is None:
         return default
@@ -342,7 +341,7 @@ def warn(message: str) -> None:
 
 
 def also_files(options: argparse.Namespace) -> dict[str, str]:
-    """Return each --also file's format; raise InputError for unknown endings or repeated files."""
+    """Return each --also file's format, from its ending."""
     found: dict[str, str] = {}
     for path in names(getattr(options, "also", None)):
         suffix = path[path.rfind(".") :] if "." in path else ""
@@ -413,8 +412,8 @@ def show(
 ) -> int:
     """Write a report in the format of --format, the picture of --plot, and the files of --also.
 
-    `own` maps formats of this report alone, such as "tape5", to functions that return the content.
-    Return 1 if `failed`, else 0.
+    `own` maps formats of this report alone, such as "tape5", to content functions. Return 1 if
+    `failed`, else 0.
     """
     from pyharness.views.render import render
 

@@ -19,7 +19,7 @@ _LARGEST_MARK = 1 << 24  # bytes of the file that lists the files written by a v
 
 
 def check_folder(path: str, names: Iterable[str], option: str) -> None:
-    """Raise InputError if files `names` can't be written in the folder `path`, which may be new."""
+    """Raise InputError if files `names` can't be written in `path`, which may be new."""
     folder = Path(path)
     if not path or "\0" in path or os.path.lexists(folder):
         if not path or "\0" in path or not folder.is_dir():
@@ -67,8 +67,7 @@ def write_folder(path: str, contents: dict[str, bytes], option: str) -> None:
 def check_tree(path: str, mark: str, option: str, kind: str = "edition") -> None:
     """Raise InputError if `write_tree` may not replace the folder.
 
-    A folder that is not empty may contain only the JSON file `mark`, of schema `kind`, and the
-    files that `mark` lists.
+    It may contain only the JSON file `mark`, of schema `kind`, and the files listed there.
     """
     check_replaceable(path, lambda folder: {mark, *_listed(folder / mark, kind)}, option)
 
@@ -76,8 +75,7 @@ def check_tree(path: str, mark: str, option: str, kind: str = "edition") -> None
 def check_replaceable(path: str, made: Callable[[Path], set[str]], option: str) -> None:
     """Raise InputError if `write_tree` may not replace the folder.
 
-    The folder may be missing, or contain only files whose paths `made(folder)` returns: those that
-    the verb wrote.
+    The folder may be missing, or contain only files that the verb wrote, ``made(folder)``.
     """
     check_folder(path, (), option)
     folder = Path(os.path.realpath(path))
@@ -129,8 +127,7 @@ def _beside(folder: Path) -> tuple[Path, Path]:
 def write_tree(path: str, contents: dict[str, bytes], option: str) -> None:
     """Replace a folder by one with only the files in `contents`, by path.
 
-    The new folder is complete before the old one is removed. On failure, the old one remains, and
-    InputError is raised.
+    The new folder is complete before the old one is removed; on failure the old one remains.
     """
     folder = Path(os.path.realpath(path))
     new, old = _beside(folder)

@@ -17,7 +17,7 @@ _NARROWEST, _WIDEST = 80, 100  # columns
 
 
 class _Formatter(argparse.HelpFormatter):
-    """A help formatter whose usage has only required options; it keeps an example's line breaks."""
+    """A help formatter that shows only required options in the usage, and keeps line breaks."""
 
     def _split_lines(self, text: str, width: int) -> list[str]:
         from textwrap import wrap
@@ -38,7 +38,7 @@ class _Formatter(argparse.HelpFormatter):
 
 
 class Parser(argparse.ArgumentParser):
-    """The parser of one verb's options; an error suggests the nearest known name."""
+    """The parser of one verb's options, whose errors suggest the nearest name."""
 
     def __init__(self, verb: str, description: str = "") -> None:
         self._width = _WIDEST
@@ -91,7 +91,7 @@ class Parser(argparse.ArgumentParser):
         return [name for name in self._option_string_actions if name.startswith("--")]
 
     def read(self, verb: str, arguments: Sequence[str]) -> argparse.Namespace:
-        """Return the parsed options; raise InputError for an unknown option or format."""
+        """Return the parsed options."""
         options, rest = self.parse_known_args(self._joined(arguments))
         if rest:
             raise unknown("option", rest[0], self.option_names(), verb)

@@ -1,8 +1,8 @@
 """Bundling of JavaScript (ES) modules into one classic script.
 
 Browsers do not import modules into a page opened from a file. In the script, each module is a
-function that returns its exports, after the modules that it imports. Only the project's forms of
-import and export are supported.
+function that returns its exports, after its imports. Only the project's forms of import and export
+are supported.
 """
 
 import re

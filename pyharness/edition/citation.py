@@ -59,7 +59,7 @@ def check_publishable() -> None:
 
 
 def bibtex(place: str = "", path: str = "") -> str:
-    """Return BibTeX entries of the thesis, and of the edition or a `place` in it.
+    """Return BibTeX entries of the thesis and of the edition, or a `place` in it.
 
     The place's `path` is appended to the address of the pages, if they have one.
     """
@@ -155,8 +155,7 @@ def _entry(kind: str, key: str, fields: dict[str, str]) -> str:
 class Part(NamedTuple):
     """A file of the data package; `path` is relative to the package.
 
-    `media_type` is a MIME type, such as ``text/csv``; `content` is empty for files that describe
-    the others.
+    `content` is empty for files that describe the others.
     """
 
     path: str

@@ -59,7 +59,7 @@ _COLUMNS = "card kind text scan entries port twin swhid"
 def data_package(progress: Progress = no_progress) -> dict[str, bytes]:
     """Return all files of the data package, content by path.
 
-    `progress` receives the numbers of completed and of all parts, and a part's name.
+    `progress` receives numbers of completed and all parts, and a part's name.
     """
     parts = [*_list_files(progress)]
     parts.append(_readme(parts))
@@ -153,7 +153,6 @@ def run_parts() -> Iterator[Part]:
 
 @cache
 def _listings() -> dict[tuple[str, str], Listing]:
-    """Return the original, corrected and one-defect versions, by program and name."""
     found = {}
     for program in PROGRAMS:
         found[program, "original"] = Listing.original(program)

@@ -1,6 +1,6 @@
 """The data of the pages that show the listings card by card, with scan and ports.
 
-A note is a numbered entry of the apparatus, the list of defects and deviations of the scan.
+A note is a numbered entry of the apparatus.
 """
 
 import math
@@ -35,7 +35,7 @@ _ORDER = (
 class Run(NamedTuple):
     """Successive characters of a card or its line in the scan.
 
-    If card and scan differ here, `entry` identifies the note on the difference.
+    If card and scan differ here, `entry` is the note's.
     """
 
     text: str
@@ -61,7 +61,7 @@ class Note(NamedTuple):
 class Corrected(NamedTuple):
     """The corrected form of a card, with the cards `inserted` after it.
 
-    `text` is None for a deleted card; `changes` tells whether the card is deleted or replaced.
+    `text` is None for a deleted card; `changes` is true for a deleted or replaced one.
     """
 
     text: str | None
@@ -73,12 +73,12 @@ class Corrected(NamedTuple):
 class CardView(NamedTuple):
     """A card as shown on a page.
 
-    `card` is our text, in brackets if the scan lacks the card. `witness` is our text with the
-    scan's names: None if equal to `card`, empty if the scan lacks the card. `scan` is the card's
-    line in the scan, or None; `after` has the next lines that belong to no card. `port` has each
-    line of the Fortran port, the defect or reading that switches it, and whether it is executed if
-    this is active. `notes` begin with the most important kind; `begins` has the notes on a range of
-    cards that begins here, each with only this range.
+    `card` is our text, in brackets if the scan lacks it. `witness` is our text with the scan's
+    names: None if equal to `card`, empty if the scan lacks it. `scan` is the scan's line, or None;
+    `after` has the next lines of no card. `port` has each line of the Fortran port, the defect or
+    reading that switches it, and whether it is executed if this is active. `notes` begin with the
+    most important kind; `begins` has the notes on a range of cards that begins here, each with only
+    this range.
     """
 
     number: int
@@ -96,7 +96,7 @@ class CardView(NamedTuple):
 class Sheet(NamedTuple):
     """A printed page, with its number from 1.
 
-    `moved` is the entry that explains an unexpected place in the scan, or None.
+    `moved` is the entry on an unexpected place in the scan, or None.
     """
 
     number: int

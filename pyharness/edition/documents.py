@@ -40,9 +40,9 @@ _LINK = re.compile(r"(?<!!)\[((?:[^][]|\[[^]]*\])*)\]\([^):]*\)")
 
 
 def documents_folder(given: str | None = None) -> Path:
-    """Return `given`, or `docs` of the checkout or the current folder; check its documents.
+    """Return `given`, or `docs` of the checkout or the current folder.
 
-    Raise InputError if a document is missing.
+    Raise InputError if a document is missing there.
     """
     for folder in [shipped("docs"), Path("docs")] if given is None else [Path(given)]:
         missing = [name for name in _LINKED if not (folder / name).is_file()]
@@ -83,7 +83,7 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 def with_notebooks(folder: Path) -> list[Path]:
-    """Return the documents that also become notebooks."""
+    """Return the documents that become notebooks too."""
     files = [path for name in _NOTEBOOKS for path in sorted((folder / name).glob("*.md"))]
     return [path for path in files if "```python\n" in path.read_text(encoding="utf-8")]
 
@@ -102,8 +102,7 @@ def notebooks(folder: Path) -> dict[str, bytes]:
 def notebook(text: str, pictures: Mapping[str, bytes]) -> bytes:
     """Return a document as a notebook, JSON in format 4.5.
 
-    `pictures` maps file names to contents. Links to other documents become text, because notebooks
-    may be in any folder.
+    `pictures` maps file names to contents. Links to other documents become text.
     """
     cells: list[dict[str, Any]] = []
 
@@ -140,7 +139,7 @@ def _display(form: str, content: bytes) -> dict[str, Any]:
 
 
 def _link(folder: Path, name: str, target: str) -> str | None:
-    """Return a document's link as a link in the site; None if the site lacks the target."""
+    """Return a document's link in the site; None if the site lacks the target."""
     path, hash_, anchor = target.partition("#")
     if "://" in target or not path:
         return target

@@ -1,8 +1,8 @@
 """The data of the pages on claims, thesis, figures and apparatus (list of defects).
 
-A claim is a statement of the thesis that we test; a judgement has our verdicts on it, for original
-and corrected programs. `judged` are the judgements of all claims, `told` all sentences with
-judgements, and `figures` our Figures 6 to 12, by file name without suffix.
+A claim is a tested statement of the thesis; a judgement has our verdicts on it, for original and
+corrected programs. `judged` has the judgements of all claims, `told` all sentences with judgements,
+`figures` our Figures 6 to 12 by file name without suffix.
 """
 
 from collections import Counter
@@ -38,9 +38,9 @@ class SentenceVerdicts(NamedTuple):
 class Formula(NamedTuple):
     """A displayed formula of the thesis.
 
-    `number`, such as ``34a`` or ``13-15``, may be empty; `lines` are MathML; `what` explains the
-    formula in HTML. `cards` has, by program, the numbers of the cards that compute it; `entry`
-    identifies its apparatus entry, or is empty.
+    `number`, such as ``34a`` or ``13-15``, may be empty; `lines` are MathML; `what` is an
+    explanation. `cards` has, by program, the cards that compute it; `entry` is its apparatus entry,
+    or empty.
     """
 
     number: str
@@ -68,7 +68,7 @@ def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
 
 
 def verdicts(judgement: Judgement) -> list[tuple[str, str]]:
-    """Return one or two verdicts to show, each after a text on the programs judged."""
+    """Return one or two verdicts, each after a text on the programs."""
     original, corrected = judgement.original.verdict, judgement.corrected.verdict
     if judgement.claim["kind"] == "result":
         return [("as printed", original), ("corrected", corrected)]
@@ -76,7 +76,7 @@ def verdicts(judgement: Judgement) -> list[tuple[str, str]]:
 
 
 def assumption(case: int, programs: Iterable[str] = (), listing: str = "original") -> str:
-    """Return a text on our assumptions in a case of Table 1 and in runs of `programs`, or ""."""
+    """Return a text on our assumptions in a case and in runs of `programs`, or ""."""
     found = ["its initial omega"] if case in open_starts() else []
     start = " and ".join([*found, *(["its cards"] if case_scene(case).torque.varies else [])])
     among = assumed(case_scene(case), map(SETS[listing], programs))
@@ -99,7 +99,7 @@ def counted(judged: Sequence[Judgement]) -> str:
 
 
 def account() -> dict[str, Markup]:
-    """Return texts in HTML by id, those of `data/account.toml` and effects of single defects."""
+    """Return HTML by id: texts of `data/account.toml`, effects of single defects."""
     texts = {each["id"]: each["text"] for each in facts("account")["statement"]}
     texts |= {each["id"]: each["part"] for each in entries() if "part" in each}
     return {name: inline(text) for name, text in texts.items()}
@@ -108,8 +108,7 @@ def account() -> dict[str, Markup]:
 def claims_context(judged: Sequence[Judgement], told: Sequence[SentenceVerdicts]) -> dict[str, Any]:
     """Return the data of the claims page.
 
-    `groups` has, by kind in the order of `KINDS`, each claim with its verdicts, story and
-    sentences.
+    `groups` has, by kind, each claim with its verdicts, story and sentences.
     """
     groups: dict[str, list[Any]] = {kind: [] for kind in KINDS}
     for each in judged:
@@ -179,8 +178,8 @@ def printed_figures(
 ) -> list[dict[str, Any]]:
     """Return the thesis's figures in order, with number, caption and place.
 
-    `drawn` has our drawings; `says` has the thesis's sentences on the figure, each with its anchor,
-    or "" in sections I to IV. `ours` is our text on a figure that we do not draw.
+    `drawn` has our drawings; `says` the thesis's sentences on the figure, with anchors, "" in
+    sections I to IV; `ours` is our text on a figure that we do not draw.
     """
     found = []
     for each in facts("figures")["printed"]:

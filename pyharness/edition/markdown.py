@@ -36,8 +36,8 @@ class Document(NamedTuple):
 def document(text: str, link: Callable[[str], str | None]) -> Document:
     """Return a Markdown text, whose first line is the title, as a Document.
 
-    `link` maps the target of a link or picture to its target on the site, or to None: then a link
-    becomes plain text, and a picture raises ValueError.
+    `link` maps a link's or picture's target to the site's, or to None: then a link becomes plain
+    text, and a picture raises ValueError.
     """
     tokens = _parser().parse(text)
     for token in _walk(tokens):

@@ -60,7 +60,7 @@ def operations() -> list[Operation]:
 
 
 def thesis_on(disagreement: Disagreement) -> str:
-    """Return a text on the equations and place in the thesis that a disagreement concerns."""
+    """Return a text on a disagreement's equations and place in the thesis."""
     given = ", ".join(disagreement.equations)
     noun = "equations" if "," in given or "-" in given else "equation"
     return "; ".join(filter(None, (given and f"{noun} {given}", disagreement.where)))

@@ -139,7 +139,7 @@ def chosen(
 ) -> list[SceneContender]:
     """Return the solvers that `text`, the value of option `what`, selects, by default all.
 
-    Raise InputError if `attitude` is true and a solver named in `text` can't compute attitudes.
+    With `attitude`, solvers named in `text` must compute attitudes.
     """
     found = named(contenders, text, what)
     lacking = [each.name for each in found if not each.attitude]
@@ -242,7 +242,7 @@ def _choose_bodies(options: argparse.Namespace, default: int) -> int:
 
 
 def named(contenders: Sequence[_Named], text: str | None, what: str) -> list[_Named]:
-    """Return the solvers whose names or packages are in `text`, the value of option `what`.
+    """Return the solvers whose names or packages are in `text`, of option `what`.
 
     None selects all, "none" no solver.
     """

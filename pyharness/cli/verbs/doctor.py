@@ -14,7 +14,7 @@ EXAMPLE = "doctor"
 def run(options: argparse.Namespace) -> int:
     """Print build, machine, packages and environment.
 
-    Return 3 if the Fortran extension is not built, 1 if a compiler option or a library changes its
+    Return 3 without the Fortran extension, 1 if a compiler option or a library changes its
     arithmetic.
     """
     shared.check_outputs(options)

@@ -1,7 +1,6 @@
 """Ready events: predefined functions whose roots `pyharness.solve` finds along a trajectory.
 
-Pass one of them, or a list, as the argument `events`. A Python function of time and omega can also
-be an event.
+Pass one or a list as the argument `events`, which also takes Python functions of time and omega.
 """
 
 from pyharness.engine.event_functions import Event

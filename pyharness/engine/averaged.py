@@ -1,7 +1,7 @@
 """The method `averaged`: weak torques over very many revolutions, by two-scale averaging.
 
-A weak torque slowly changes the periodic torque-free motion. A macro-step computes this change from
-the state once per revolution (the stroboscopic solution).
+A macro-step computes the slow change of the periodic torque-free motion from the state once per
+revolution (the stroboscopic solution).
 
 Stroboscopic averaging: Calvo, Chartier, Murua and Sanz-Serna 2011, Applied Numerical Mathematics
 61. Two scales: Chartier, Crouseilles, Lemou and Mehats 2015, Numerische Mathematik 129.
@@ -67,7 +67,7 @@ def estimates(
 ) -> tuple[float, float]:
     """Return the estimated error of omega (rad/s), and the error amplification.
 
-    Both are maxima over the ends of up to five macro-steps, including the last.
+    Both are maxima over up to five macro-steps, including the last.
     """
     a, b, c = coefficients
     error, growth, count = 0.0, 1.0, len(done)
@@ -95,16 +95,16 @@ def estimates(
 def averaged(
     scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
 ) -> Trajectory:
-    """Return the trajectory of a scene with a weak torque at `times` (s), by averaging.
+    """Return the trajectory under a weak torque at `times` (s), by averaging.
 
     The result's `steps` are macro-steps, of 100 revolutions or more. Its `error` is estimated from
     a solution with more nodes and a higher order of averaging. A recorded torque must be a sum of
-    polynomials in omega and time, times sines and cosines of time; a macro-step might miss changes
-    of another torque.
+    polynomials in omega and time, times sines and cosines of time; a macro-step might miss other
+    changes.
 
     Raise InputError for another torque, or one that is opaque, depends on the attitude, is not
-    weak, or may be in resonance with omega. Raise it also near the separatrix, for a sphere, and at
-    the work limit.
+    weak, or may be in resonance with omega; also near the separatrix, for a sphere, and at the work
+    limit.
     """
     # The next macro-step refuses a point that is not finite.
     with np.errstate(all="ignore"):

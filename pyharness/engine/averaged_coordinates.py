@@ -8,8 +8,8 @@ Without torque, with a suitable sign of y, the exact period in psi is 2 pi:
     dx/dpsi = -y,  dy/dpsi = x,  du/dpsi = 2 k x y,  with a constant k.
 
 Therefore x + i y = (p1 + i p2) exp(i psi) and u = p3 + k y^2 with constant p1, p2, p3. These
-coordinates need no elliptic function. They are regular at rotation about axis a, but undefined on
-the separatrix, where w_a reaches 0.
+coordinates are regular at rotation about axis a, but undefined on the separatrix, where w_a reaches
+0.
 """
 
 import math
@@ -177,8 +177,8 @@ class _Slot(NamedTuple):
 def fastest_of(torque: TorqueLaw | StateTorque) -> float:
     """Return the highest frequency (rad/s) of a torque's waves (sines and cosines of time).
 
-    Raise InputError unless a recorded torque is a sum of polynomials of degree 8 at most, times
-    waves. In another torque, a macro-step may miss a pulse or an effect in a narrow range of omega.
+    A recorded torque must be a sum of polynomials of degree 8 at most, times waves; in another, a
+    macro-step may miss a pulse or an effect in a narrow range of omega.
     """
     if isinstance(torque, TorqueLaw):
         return max((abs(f) for a, f in torque.sines + torque.cosines if any(a)), default=0.0)

@@ -6,15 +6,15 @@ angle. The equation dv/dpsi = F(v, psi) becomes
 
     dv/dpsi + (1/length) dv/ds = F(v, psi).
 
-Let V(s) be v at psi = 0 (the stroboscopic solution), W = v - V the oscillation, and < > the mean
-over psi. An equivalent form is
+With V(s) for v at psi = 0 (the stroboscopic solution), W = v - V, and < > the mean over psi, an
+equivalent form is
 
     V + <W> = V(0) + <W>(0) + length (integral of <F> over s from 0),
     W = integral of G - <G> over psi from 0, where G = F - (1/length) dW/ds.
 
-A sweep inserts V and W into the right sides, and raises the order of averaging by one. Newton's
-method solves the first equation at Chebyshev points (nodes) of s. Two more sweeps, with more nodes
-and angles, measure the error.
+A sweep inserts V and W on the right, and raises the order of averaging by one. Newton's method
+solves the first equation at Chebyshev points (nodes) of s. Two more sweeps, with more nodes and
+angles, measure the error.
 """
 
 from functools import lru_cache

@@ -47,7 +47,7 @@ def _largest_estimate(
 def known_solution(
     scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
 ) -> Trajectory:
-    """Return the trajectory of a scene at `times` (s) from its closed form.
+    """Return the trajectory of a scene at `times` (s) in closed form.
 
     Raise InputError without a closed form, at the work limit, or if the phase exceeds 1e15 rad.
     """

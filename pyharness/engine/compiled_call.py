@@ -18,8 +18,8 @@ class CompiledCall(NamedTuple):
     """A prepared solver as a function for compiled code, such as numba's.
 
     ``function(data, start, t_end, state)`` reads doubles at the address `start`: omega (rad/s), and
-    for an attitude solver a unit quaternion. It writes the state at `t_end` (s) to address `state`,
-    and returns a status of `pyharness.h`; 0 means complete. `data` is valid while `solver` exists.
+    for an attitude solver a unit quaternion. It writes the state at `t_end` (s) to `state`, and
+    returns a status of `pyharness.h`, 0 if complete. `data` is valid while `solver` exists.
     """
 
     function: Any
@@ -59,7 +59,7 @@ def check_call(
 ) -> tuple[tuple[float, ...], float]:
     """Return the initial state and `t_end` (s) of a call that the C code refused.
 
-    `third` is the attitude or `out`. Raise InputError for an invalid argument.
+    `third` is the attitude or `out`.
     """
     start, time = three_floats("omega", omega0), number("t_end", t_end)
     if scene.changing is not None and math.isfinite(time):

@@ -22,10 +22,7 @@ from pyharness.model.trajectory import Trajectory
 def solution_of(
     scene: Scene, found: Trajectory, rows: dense.Rows, method: str, tolerance: float
 ) -> DenseOutput:
-    """Return the solution as a function of time, from time 0 to the last row of `found`.
-
-    ``rows(times, tolerance)`` computes states by `method`.
-    """
+    """Return the solution as a function of time, from time 0 to the last row of `found`."""
     is_closed = not found.evaluations and method != "reference"
     return dense.dense_output(scene, found, rows, tolerance, METHODS[method].finest, is_closed)
 

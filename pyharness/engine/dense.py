@@ -89,9 +89,9 @@ def dense_output(
 ) -> DenseOutput:
     """Return the solution as a function of time, from time 0 to the last row of `found`.
 
-    ``rows(times, tolerance)`` computes states. `finest` is the method's smallest tolerance; a
-    `tolerance` of 1 means fixed steps. A closed form is evaluated directly. Raise InputError if
-    over 200 000 polynomials are needed.
+    ``rows(times, tolerance)`` computes states; a closed form is evaluated directly. `finest` is the
+    method's smallest tolerance; a `tolerance` of 1 means fixed steps. At most 200 000 polynomials
+    are allowed.
     """
     ends = sorted({0.0, *found.time[[0, -1]].tolist()}) if len(found.time) else [0.0]
     states: Callable[[Array], Array]

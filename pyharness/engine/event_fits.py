@@ -47,8 +47,8 @@ def _refining() -> Array:
 class Solution:
     """The solution of a scene in which events are searched.
 
-    `pieces` are the polynomials of `sol`, or approximate a closed form that `sol` evaluates.
-    `tolerance` applies to omega; 0 means a fixed step.
+    `pieces` are the polynomials of `sol`, or approximate its closed form. `tolerance` applies to
+    omega; 0 means a fixed step.
     """
 
     pieces: Pieces
@@ -115,7 +115,7 @@ class Solution:
         return found[1], *(errors @ np.abs(found - found[1]))
 
     def changed_values(self, g: EventFunction, times: Array, part: float) -> Array:
-        """Return a function's values at n times (s), also with each unknown changed, (m, n)."""
+        """Return values at n times (s), also with each unknown changed, (m, n)."""
         states = self.states(times)
         n, width = states.shape
         count = 2 * width + 1
@@ -126,7 +126,7 @@ class Solution:
 
     @property
     def state_error(self) -> float:
-        """The relative error of the state, at most 1e-10: a larger one would hide close roots."""
+        """The relative error of the state, at most 1e-10, not to hide close roots."""
         return max(ROUNDING, min(self.tolerance, _COARSEST))
 
     @cached_property
@@ -141,7 +141,7 @@ class Solution:
 
 
 def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
-    """Return polynomials through a function's values, and sign changes where none converges."""
+    """Return polynomials through a function, and sign changes where none converges."""
     edges = solution.pieces.edges
     low, high = edges[:-1], edges[1:]
     times, inner = solution.at_nodes
@@ -200,7 +200,7 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
 def noise_of(
     g: EventFunction, solution: Solution, low: Array, high: Array, shift: float = _SHIFT
 ) -> Array:
-    """Return the largest noise at some nodes of each interval from `low` to `high` (s)."""
+    """Return the largest noise at nodes of each interval from `low` to `high` (s)."""
     times = nodes(low, high, POINTS)[:, _SOME]
     noise = solution.noise(g, times.ravel(), shift).reshape(times.shape)
     return np.asarray(noise.max(axis=1))

@@ -36,9 +36,9 @@ _MORE_ARGUMENTS = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS
 class Event:
     """An event of `pyharness.events`.
 
-    `function` takes time, omega, attitude, and the derivative of omega. Own states (unknowns that
-    `Scene.states` adds) follow the attitude in its array. `terminal` and `direction` are as in
-    `pyharness.events.crosses`. With `counts_touches`, roots without sign change are events.
+    `function` takes time, omega, attitude (followed by own states, `Scene.states`), and the
+    derivative of omega. `terminal` and `direction` are as in `pyharness.events.crosses`. With
+    `counts_touches`, roots without sign change are events.
     """
 
     name: str
@@ -54,8 +54,8 @@ class Event:
 class EventFunction:
     """A checked event.
 
-    The event with number `limit`, from 1, ends the integration; infinity means none.
-    `is_vectorized` says whether the function accepts arrays; None means unknown.
+    Event number `limit`, from 1, ends the integration; infinity means none. `is_vectorized` says
+    whether the function accepts arrays; None means unknown.
     """
 
     name: str
@@ -65,7 +65,7 @@ class EventFunction:
     _tapes: list[Tape | None] = field(default_factory=list, repr=False)  # at most one
 
     def __call__(self, times: Array, states: Array, rates: Array | None = None) -> Array:
-        """Return the values at n times (s), (n,); raise InputError if one is not finite."""
+        """Return the finite values at n times (s), (n,)."""
         given = times, states, None if rates is None else rates[:, :3]
         found = self._of_arrays(*given) if self.is_vectorized is not False else None
         if found is None:
@@ -162,7 +162,7 @@ class EventFunction:
 def event_functions(
     events: object, attitude: bool, states: Sequence[OwnState] = ()
 ) -> list[EventFunction]:
-    """Return one event or a list as checked functions, or raise InputError."""
+    """Return one event or a list as checked functions."""
     if callable(events) or isinstance(events, Event):
         events = [events]
     if not isinstance(events, (list, tuple)):

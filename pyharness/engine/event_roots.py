@@ -1,9 +1,9 @@
 """Isolation of all real roots of polynomials on intervals, for many intervals at once.
 
 A polynomial with Chebyshev coefficients c has no root on the interval if |c[0]| > |c[1]| + |c[2]| +
-... If this bound holds for the derivative, there is at most one root; for the second derivative, at
-most two, with one extremum between. Other intervals are halved, so that no root is missed
-(Trefethen 2013, Approximation Theory and Approximation Practice, chapters 3 and 18).
+... If this holds for the derivative, there is at most one root; for the second derivative, at most
+two. Other intervals are halved, so that no root is missed (Trefethen 2013, Approximation Theory and
+Approximation Practice, chapters 3 and 18).
 """
 
 from dataclasses import dataclass
@@ -96,9 +96,9 @@ class Roots(_Columns):
     """Candidates for roots at n times (s).
 
     `change` is the sign (1 or -1) after a sign change, else 0. `slope` and `curvature` are the
-    first two time derivatives of the polynomial. Function values below `noise`, and polynomial
-    values below `near`, can't be distinguished from 0. The function remains 0 for the time
-    `lasting` (s), negative before time 0.
+    polynomial's time derivatives. Function values below `noise`, and polynomial values below
+    `near`, can't be distinguished from 0. The function remains 0 for `lasting` (s), negative before
+    time 0.
     """
 
     time: Array

@@ -25,8 +25,8 @@ _PARTS = np.array([0.1459, 0.382, 0.618, 0.8541, 1.0])
 class ZeroIntervals:
     """The ascending intervals, `low` to `high` (s), in which a function is 0 to within its error.
 
-    Near an interval, values below `noise` can't be distinguished from 0. `before` and `after` are
-    the function's signs on both sides: 0 where it decays to 0, or at an end of the solution.
+    Near one, values below `noise` can't be distinguished from 0. `before` and `after` are the
+    function's signs on both sides: 0 where it decays to 0, or at an end of the solution.
     """
 
     low: Array
@@ -38,8 +38,8 @@ class ZeroIntervals:
     def roots(self, counts_touches: bool) -> Roots:
         """Return each interval's root, at the end that integration from time 0 reaches first.
 
-        Without `counts_touches`, only intervals that exclude time 0, and have opposite signs on
-        both sides, have a root.
+        Without `counts_touches`, only intervals without time 0, with opposite signs on both sides,
+        have one.
         """
         is_before = self.high < 0.0
         is_first = (self.low <= 0.0) & ~is_before
@@ -75,7 +75,7 @@ class ZeroIntervals:
         return found
 
     def merged(self, g: EventFunction, solution: Solution) -> "ZeroIntervals":
-        """Return the intervals, with those as one between which the function is 0."""
+        """Return the intervals, joined where the function is 0 between."""
         noise = np.maximum(self.noise[1:], self.noise[:-1])
         is_one = _is_zero_between(g, solution, self.high[:-1], self.low[1:], noise)
         first = np.flatnonzero(np.append(True, ~is_one))

@@ -1,8 +1,8 @@
 """Events: the times at which functions of time, omega and attitude are 0.
 
-A function is approximated by polynomials, on intervals divided until the polynomials converge. All
-their roots are isolated, including close and double roots. Where the function is not smooth, only
-sign changes between nodes of tiny intervals are found.
+A function is approximated by polynomials, on intervals divided until they converge. All roots are
+isolated, including close and double ones. Where the function is not smooth, only sign changes
+between nodes of tiny intervals are found.
 """
 
 import math
@@ -190,7 +190,7 @@ def _chosen(roots: Roots, group: Index, change: int, ends: tuple[float, ...]) ->
 def side_events(g: EventFunction, solution: Solution, roots: Roots, side: int) -> Array:
     """Return event times (s) after (`side` 1) or before (-1) time 0, in order away from 0.
 
-    As in SciPy, a root at time 0 is a sign change from 0, and one at the end a sign change to 0.
+    As in SciPy, a root at time 0 is a sign change from 0, at the end one to 0.
     """
     end = solution.pieces.edges[-1 if side > 0 else 0]
     if side * end <= 0.0 or not roots.time.size:

@@ -18,9 +18,8 @@ _MORE, _LESS = 0.25 + math.sqrt(3.0) / 6.0, 0.25 - math.sqrt(3.0) / 6.0
 def attitude_from_rows(scene: Scene, time: Array, omega: Array) -> Array:
     """Return the attitudes, (n, 4), at the times (s) of a table of omega (rad/s).
 
-    A commutator-free step of order 4 (Celledoni, Marthinsen and Owren 2003) leads from row to row.
-    Cubic Hermite interpolation supplies omega at its Gauss points. After a rotation that overflows,
-    attitudes are NaN.
+    A commutator-free step of order 4 (Celledoni, Marthinsen and Owren 2003) leads from row to row,
+    with omega at its Gauss points by Hermite's cubic. After an overflow, attitudes are NaN.
     """
     times = np.concatenate([[0.0], time])
     rows = np.vstack([scene.omega, omega])

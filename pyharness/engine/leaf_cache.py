@@ -1,7 +1,7 @@
-"""Compilation and folder of leaves: C code for the Taylor series of a recorded torque.
+"""Compilation and folder of leaves, C code for recorded torques.
 
 A file is loaded only if it and the folder belong to the user, nobody else may write them, and its
-name ends in its content's hash.
+name has its content's hash.
 """
 
 import ctypes
@@ -68,10 +68,7 @@ def leaves_for(scene: Scene, compiled: bool) -> tuple[int, str]:
 
 
 def leaves_of(tape: Tape) -> tuple[int, str]:
-    """Return the address of a tape's compiled code and ``compiled``, or 0 and the reason.
-
-    Code that the folder lacks is compiled.
-    """
+    """Return the address of a tape's compiled code and ``compiled``, or 0 and the reason."""
     shape = structure(listing(tape))
     if shape is None:
         return 0, "interpreter: switches and torques of 500 operations are not compiled"
@@ -103,7 +100,7 @@ def loaded(tape: Structure, place: str) -> int:
 
 @cache
 def compiler() -> tuple[str, ...]:
-    """Return the command of the C compiler (CC, cc, gcc or clang), or raise LeavesError."""
+    """Return the command of the C compiler: CC, cc, gcc or clang."""
     import shlex
     from shutil import which
 

@@ -57,7 +57,7 @@ def place(slot: int, k: str) -> str:
 
 
 def with_slots(text: str, operation: Listed) -> str:
-    """Return C code with an operation's slots in place of letters."""
+    """Return C code with an operation's slots for letters."""
     slots = letters(operation)
 
     def name(match: re.Match[str]) -> str:

@@ -1,7 +1,7 @@
 """Compiled leaves: C code for values, series, Jacobian and rounding errors of recorded operations.
 
-They replace the interpreter, fortran/modern/tape_terms.c. They read coefficients from memory, so
-that tapes that differ only in coefficients share leaves.
+They replace the interpreter, fortran/modern/tape_terms.c. Tapes that differ only in coefficients
+share leaves, which read coefficients from memory.
 """
 
 import re
@@ -62,7 +62,7 @@ static void put(double *to, int nodes, double h, abreast a, abreast b, abreast c
 def source(tape: Structure, suffix: str = "") -> str:
     """Return the C source of the functions of tape.h for one body.
 
-    With a suffix, added to their names, the functions are static.
+    With a suffix, the functions are static.
     """
     parts = chain(_expand(tape), _set_jacobian(tape), _set_values(tape), _set_noise(tape))
     text = "\n".join([HEADER, *parts]) + "\n"

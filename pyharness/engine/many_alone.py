@@ -1,4 +1,4 @@
-"""Solution of bodies one by one: events, sensitivities, and scenes that the vector kernel refuses.
+"""Solution of bodies one by one: events, sensitivities, and scenes that the kernel refuses.
 
 It refuses a changing inertia, and torques that depend on the state or are about axes of space.
 """
@@ -56,10 +56,7 @@ NO_ATTITUDE = "the torque needs the initial attitude; give attitude, or scenes w
 
 
 def is_solved_alone(scene: Scene, arrays: Mapping[str, object]) -> bool:
-    """Return whether the kernel for bodies side by side refuses the scene.
-
-    Raise InputError if its torque depends on the state, and `arrays` has torques.
-    """
+    """Return whether the kernel for bodies side by side refuses the scene."""
     named = [name for name, each in arrays.items() if each is not None]
     if isinstance(scene.torque, StateTorque):
         for name in named:
@@ -79,8 +76,8 @@ def solve_one_by_one(
 ) -> Ensemble:  # fmt: skip
     """Return the final states of bodies by prepared solvers; invalid bodies are REFUSED.
 
-    Raise InputError if a needed attitude is missing, the method can't solve the scene, or a torque
-    in space acts on bodies given by coefficients.
+    Raise InputError for a missing attitude, an unsuitable method, or a torque in space with
+    coefficients.
     """
     by_coefficients = arrays["coefficients"] is not None or scene.coefficients is not None
     if by_coefficients and not isinstance(scene.torque, StateTorque):
@@ -154,8 +151,8 @@ def _lanes(
 ) -> tuple[tuple[Array, Array] | None, str | None]:  # fmt: skip
     """Return packed equations and parameters of bodies, and the text `Ensemble.leaves`.
 
-    Both are None if one kernel call can't solve all bodies. `settings` are the tolerance and the
-    effort. Parameters of an invalid body are NaN, which the kernel refuses.
+    Both are None if one kernel call can't solve all bodies. `settings` are tolerance and effort.
+    The kernel refuses an invalid body's parameters, NaN.
     """
     names = [name for name in rows if name.startswith(PARAMETER)]
     kind = next((name for name in ("moments", "coefficients") if name in rows), None)
@@ -196,7 +193,7 @@ def prepare_details(
 ) -> Callable[[Ensemble], Ensemble]:  # fmt: skip
     """Check the request; return a function that adds events and sensitivities to a result.
 
-    If `has_rows`, `t_end` has all bodies' common times (s). The arrays are copied.
+    If `has_rows`, `t_end` has all bodies' common times (s).
     """
     if method not in _METHODS:
         where = "sensitivities" if events is None else "events"
@@ -276,7 +273,7 @@ def solve_with_states(
 ) -> Ensemble:  # fmt: skip
     """Return the states of bodies with the user's own unknowns, at `t_end` or `times` (s).
 
-    Each body has one integration for all `times`. `refused` are arguments that must be None.
+    `refused` are arguments that must be None.
     """
     for name, value in refused.items():
         if value is not None:

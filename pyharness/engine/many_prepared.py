@@ -38,7 +38,7 @@ _SIDE_BY_SIDE = (Methods.CLOSED_FORM, Methods.CLOSED_FORM_OR_TAYLOR, Methods.TAY
 def many_starts(
     solver: "Solver[Any]", omega: Any, t_end: Any, *, threads: int = 1, out: Array | None = None
 ) -> tuple[Array, NDArray[np.int8]]:
-    """Return final omegas (rad/s), (n, 3), and statuses; raise InputError for wrong shapes."""
+    """Return final omegas (rad/s), (n, 3), and statuses."""
     starts, times = rows_of("omega", omega, 3), rows_of("t_end", t_end)
     n = len(starts)
     check_rows("t_end", times, n)
@@ -64,7 +64,7 @@ def many_starts(
 
 
 def times_within(scene: Scene, times: Array) -> Array:
-    """Return times (s); beyond a zero of a changing moment they are NaN, which kernels refuse."""
+    """Return times (s), NaN beyond a zero of a changing moment, which kernels refuse."""
     if scene.changing is None:
         return times
     first, last = scene.changing.span
@@ -104,8 +104,8 @@ def solve_each(
 ) -> None:  # fmt: skip
     """Solve the bodies in `piece` side by side or by single calls.
 
-    Single calls solve bodies whose error can't be measured side by side. They solve all bodies if
-    the inertia matrix is full, or the torque is neither recorded nor about the axes of space.
+    Single calls solve bodies whose error can't be measured side by side, or all if the inertia
+    matrix is full, or the torque neither recorded nor about the axes of space.
     """
     left = list(range(piece.start, piece.stop))
     if solver.packed[Places.METHOD] == Methods.TAPE and not uses_principal_axes(solver.scene):
@@ -145,8 +145,8 @@ def solve_lanes(
 ) -> list[int]:  # fmt: skip
     """Solve bodies side by side into `found`, and return the indices of unsolved ones.
 
-    `packed` has their equations as recorded operations with `parameters`, (n, k) or (1, k). `turns`
-    are the initial quaternions, if any.
+    `packed` has their recorded equations with `parameters`, (n, k) or (1, k). `turns` are the
+    initial quaternions, if any.
     """
     n = piece.stop - piece.start
     sets = parameters if len(parameters) < 2 else parameters[piece]

@@ -51,9 +51,9 @@ _SHAPES: dict[str, tuple[int, ...]] = {
 def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Array, Array | None]:
     """Return the arrays of bodies with inertia matrices about principal axes, and these axes.
 
-    The arrays have coefficients A, B, C, because rounded moments are less accurate; they are NaN
-    for a matrix that is not symmetric and positive definite. The axes are columns of matrices, (n,
-    3, 3), and, with attitudes, also quaternions, (n, 4).
+    The arrays have coefficients A, B, C, more accurate than rounded moments; NaN for a matrix that
+    is not symmetric and positive definite. The axes are columns of matrices, (n, 3, 3), and, with
+    attitudes, also quaternions, (n, 4).
     """
     rows = checked_rows({name: given[name] for name in given if name not in BODIES})
     own = {"inertia": rows_of("inertia", given["inertia"], 3, 3)}
@@ -145,7 +145,7 @@ def keep_with(scene: Scene, key: tuple[Any, ...], make: Callable[[], Any]) -> An
 def rows_of_scene(scene: Scene) -> dict[str, Any]:
     """Return the read-only arrays of a scene, and its torque with `merged` waves.
 
-    Both are cached, because conversion takes longer than solving few bodies.
+    Both are cached: conversion takes longer than solving few bodies.
     """
 
     def convert() -> dict[str, Any]:
@@ -157,7 +157,7 @@ def rows_of_scene(scene: Scene) -> dict[str, Any]:
 
 
 def checked_rows(given: Mapping[str, Any]) -> dict[str, Array]:
-    """Return float arrays, one row per body or for all; raise InputError for wrong shapes."""
+    """Return float arrays, one row per body or for all, of checked shapes."""
     rows = {}
     for name in (*_SHAPES, *(each for each in given if each.startswith(PARAMETER))):
         values = given.get(name)
@@ -217,7 +217,7 @@ def checked_copies(arrays: dict[str, Any], *, as_given: bool = False) -> dict[st
 
 
 def scene_of_row(scene: Scene, rows: Mapping[str, Array], i: int) -> Scene:
-    """Return `scene` with the values of row `i`; raise InputError if one is invalid."""
+    """Return `scene` with the values of row `i`."""
     own = {name: row_of(each, i) for name, each in rows.items()}
     values = {name: own.pop(name) for name in rows if name.startswith(PARAMETER)}
     torque: dict[str, Any] = {

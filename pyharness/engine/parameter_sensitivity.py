@@ -1,7 +1,7 @@
 """Derivatives of a solution with respect to parameters (sensitivities), by Taylor series.
 
-If the torque jumps at a switch, or the scene has own unknowns (`Scene.states`), central differences
-are extrapolated (Ridders 1982): linearised equations ignore that a parameter moves a switch.
+If the torque jumps at a switch, which a parameter may move, or the scene has own unknowns
+(`Scene.states`), central differences are extrapolated (Ridders 1982).
 """
 
 import itertools
@@ -60,7 +60,7 @@ States = Callable[[Scene], Array]
 def checked_names(
     scene: Scene, names: Iterable[str], method: str, attitude: bool
 ) -> tuple[str, ...]:
-    """Return distinct parameter names; raise InputError if one is unknown or not allowed."""
+    """Return distinct parameter names, all known and allowed."""
     place = "sensitivities"
     if method not in _METHODS:
         raise InputError(f"{place}: the method is {method}; allowed: {', '.join(_METHODS)}")
@@ -101,8 +101,7 @@ def sensitivities_at(
     """Return, by parameter name, derivatives of k unknowns at n times, (n, k, m) for m values.
 
     `states` returns the unknowns of a changed scene. The tolerance is relative to the largest
-    derivative with respect to the same value so far. Raise InputError if the work limit is
-    exceeded, or a derivative overflows.
+    derivative by the same value so far.
     """
     if not names:
         return {}

@@ -36,8 +36,8 @@ class VariedEquations(NamedTuple):
     """The equations of motion of a scene, and their parameter derivatives.
 
     The outputs of `tape` are the derivatives of the n rates, then the rates. `forcings`, (n, m),
-    has the numbers, from 1, of the outputs d(rate i)/d(value j), or 0 where this derivative is 0.
-    `columns` has the columns j of each parameter.
+    has the output numbers, from 1, of d(rate i)/d(value j), or 0 where it is 0. `columns` has the
+    columns j of each parameter.
     """
 
     tape: Tape
@@ -115,7 +115,7 @@ def tape_of_bodies(
     torque: StateTorque | TorqueLaw, body: tuple[Triple, Triple] | None, names: tuple[str, ...],
     attitude: bool,
 ) -> Tape:  # fmt: skip
-    """Return one tape (recorded equations of motion) of bodies that differ in parameters.
+    """Return one tape of bodies that differ in parameters.
 
     Further inputs are A, B, C and the reciprocal moments, unless in `body`, and the torque's
     parameters `names`.

@@ -23,7 +23,7 @@ _FEW_DIGITS = 1e-9
 
 
 class Decision(NamedTuple):
-    """The decision whether a part of the solution, such as ``torque``, is computed."""
+    """The decision whether a part, such as ``torque``, is computed."""
 
     part: str
     kept: bool
@@ -59,10 +59,7 @@ def plan(
     velocity: bool = False,
     rows: bool = False,
 ) -> Plan:
-    """Return the plan for a scene; `rows` requests intermediate output.
-
-    Raise InputError if the method can't solve the scene, or the tolerance is out of range.
-    """
+    """Return the plan for a scene; `rows` requests intermediate output."""
     tolerance = requested_tolerance(method, tolerance)
     finest = REGISTRY["quick"].finest if method == "quick" else FINEST
     if not finest <= tolerance <= 1.0:

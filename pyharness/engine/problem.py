@@ -27,7 +27,7 @@ _NOT_FINITE = (
 
 
 def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
-    """Return A, B, C, and the torque divided by moments; raise InputError if not finite."""
+    """Return A, B, C, and the torque divided by moments, all finite."""
     law, moments = scene.body_torque, np.array(scene.moments or (1.0, 1.0, 1.0))
     # A wave of amplitude 0 would only take time.
     sines, cosines = (
@@ -46,7 +46,7 @@ def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
 def remainders(scene: Scene) -> Triple:
     """Return the exact coefficients A, B, C minus their values in binary64.
 
-    Without the remainders, a closed form has an error of 1e-10 rad at a phase of 1e6 rad.
+    Without them, a closed form has an error of 1e-10 rad at a phase of 1e6 rad.
     """
     found, moments = scene.euler_coefficients, scene.exact_moments
     # Under a torque, no kernel uses the remainders.

@@ -68,8 +68,7 @@ def system_of(scene: Scene, attitude: bool | None = None) -> Tape:
     """Return the recorded equations of motion of a scene with principal axes.
 
     The outputs are the derivatives of omega (equations 16-18 of Jacobs 1982), of the quaternion if
-    `attitude` is true (q' = q (0, omega)/2), and of `Scene.states`. Raise InputError for an opaque
-    torque.
+    `attitude` is true (q' = q (0, omega)/2), and of `Scene.states`.
     """
     torque = scene.torque
     if not isinstance(torque, StateTorque) or torque.tape is None:
@@ -136,9 +135,9 @@ def slopes_of(scene: Scene) -> Callable[[float, Sequence[float]], list[float]]:
 class Listing(NamedTuple):
     """A tape as lists, with slots and combinations numbered from 1.
 
-    A slot is an input or a result of an operation. An operation is a kind of `Operations`, two
-    operands and a result. A linear combination is a constant and pairs of slot and coefficient. The
-    last `n_unknowns` combinations are the derivatives of the unknowns.
+    A slot is an input or a result. An operation is a kind of `Operations`, two operands and a
+    result; a combination is a constant and pairs of slot and coefficient. The last `n_unknowns`
+    combinations are the unknowns' derivatives.
     """
 
     n_unknowns: int
@@ -156,7 +155,7 @@ _LEAVES = 7
 def listing(tape: Tape, n_unknowns: int | None = None) -> Listing:
     """Return a tape as lists; the last `n_unknowns` outputs (default: all) are derivatives.
 
-    Sine and cosine of an angle become one operation, because each recurrence needs the other.
+    Sine and cosine of an angle become one operation.
     """
     places = {slot: slot + 1 for slot in range(tape.n_inputs)}
     n_slots = tape.n_inputs
@@ -257,7 +256,7 @@ def packed_scene(
 ) -> Array:
     """Return a scene and its method's settings as one array, in the order of `Places`.
 
-    `leaves` is the address of code compiled for a tape; 0 if built with the package, or none.
+    `leaves` is the address of a tape's compiled code; 0 if built with the package, or none.
     """
     if code == Methods.TAPE:
         tape = system_of(with_constant_body(scene))
@@ -301,8 +300,7 @@ class Step(NamedTuple):
     """A Taylor step of length `h`, 0 if no step is short enough.
 
     `terms`, shape (order + 1, n), are Taylor coefficients times powers of `h`; `state`, shape (n,),
-    is their sum. `expansions` counts the computed series. `is_switched` says whether the step ended
-    where a switch changes.
+    is their sum. `expansions` counts series; `is_switched` means an end at a switch.
     """
 
     h: float
@@ -327,7 +325,6 @@ def taylor_step(
     `tolerances`, shape (n,), are the components' largest errors; `relative`, a relative tolerance,
     determines the order. `trial` is a guess of the step, with the sign of `longest`. With
     `is_beyond`, a step ends a few rounding errors beyond a switch.
-    Raise InputError where a switch would change back and forth without end.
     """
     h, terms, end, order, expansions, is_switched, status = extension().tape_step(
         tape, t, state, tolerances, relative, trial, longest, is_beyond, Storage.PERTURBATION_LENGTH

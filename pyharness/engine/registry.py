@@ -213,10 +213,7 @@ def requested_tolerance(method: str, tolerance: Number | None) -> float:
 
 
 def computes_attitude(scene: Scene, method: str, requested: bool | None) -> bool:
-    """Return `requested`; if None, whether the scene has or needs an attitude, if computable.
-
-    Raise InputError if a requested attitude can't be propagated.
-    """
+    """Return `requested`; if None, whether the scene has or needs an attitude, if computable."""
     if requested is None:
         able = REGISTRY[method].attitude
         if method == "closed-form":

@@ -54,8 +54,8 @@ def trajectory_report(
 ) -> Report:
     """Return the report of a trajectory, with a table and a picture.
 
-    The attitude's `form` is ``quaternion``, ``3-1-3``, ``3-2-1`` or ``matrix``. `word` is the
-    arithmetic of a thesis program; None is binary64.
+    The attitude's `form` is ``quaternion``, ``3-1-3``, ``3-2-1`` or ``matrix``. `word` is a thesis
+    program's arithmetic; None is binary64.
     """
     times = np.column_stack([trajectory.time, trajectory.recorded_time])
     blocks: list[tuple[tuple[Column, ...], Array]] = [(_TIMES, times), (_OMEGA, trajectory.omega)]

@@ -1,8 +1,8 @@
 """Conversion of scenes and trajectories to another unit of time.
 
 Products of two components of omega underflow below 1e-154 rad/s and overflow above 1e154 rad/s.
-Methods that form products receive scenes with omega near 1, in a unit of time that is a power of
-two, so that no number is rounded.
+Methods that form products receive omega near 1, in a unit of time that is a power of two, so that
+no number is rounded.
 """
 
 import math
@@ -40,7 +40,7 @@ _NEGLIGIBLE = 2.0**-60
 def scaled(scene: Scene, factor: float) -> Scene:
     """Return the scene whose solution is factor * omega(factor * t).
 
-    Raise InputError if the torque can't be rescaled, or the inertia changes with time.
+    Raise InputError if the torque, or a changing inertia, does not permit this.
     """
     torque = scene.torque
     tape = _tape(torque, factor) if isinstance(torque, StateTorque) else None
@@ -100,8 +100,8 @@ def integrate(
 def rescaling_factor(scene: Scene, time: float) -> float:
     """Return the power of 2 that brings omega near 1 rad/s; 1 if unnecessary or impossible.
 
-    This omega is the larger of the initial omega and a bound, or under a torque that depends on the
-    state an estimate, of the omega that the torque causes until `time` (s).
+    This omega is the larger of the initial one and a bound (an estimate, if the torque depends on
+    the state) of the omega that the torque causes until `time` (s).
     """
     if is_ordinary(scene.omega):
         return 1.0
@@ -192,8 +192,8 @@ def _tape(torque: StateTorque, factor: float) -> Tape | None:
 def scaled_tape(tape: Tape, exponent: int) -> Tape | None:
     """Return a torque's recorded operations in the unit of time 2**exponent s.
 
-    Each slot (input or result) has its own power of two as factor, the outputs 2**(2 * exponent),
-    so that none overflows or underflows. Return None if a number would be rounded.
+    Each slot (input or result) has its own power of two as factor, the outputs 2**(2 * exponent).
+    Return None if a number would be rounded.
     """
     # Slot n becomes slot `places[n]`, times 2**`exponents[n]`.
     operations: list[Operation] = []

@@ -19,7 +19,7 @@ def rotated(scene: Scene, turn: Callable[[Triple], Triple], body: bool) -> Scene
     """Return the scene with `turn` applied to omega, torque vectors and, if `body`, moments.
 
     Attitudes, and torques about the axes of space, are kept. If the torque depends on the state,
-    `turn` must be a rotation. Raise InputError if the inertia changes with time.
+    `turn` must be a rotation.
     """
 
     def waves(each: tuple[Wave, ...]) -> tuple[Wave, ...]:
@@ -45,7 +45,7 @@ def axes_of(turn: Callable[[Triple], Triple]) -> Array:
 
 
 def later(torque: StateTorque, by: float) -> StateTorque:
-    """Return the torque of t + `by` (s) as a function of t; raise InputError if opaque."""
+    """Return the torque of t + `by` (s) as a function of t."""
     if torque.tape is None:
         raise InputError(
             "an opaque torque can't be shifted in time; allowed: a torque that can be recorded"
@@ -74,8 +74,7 @@ def restarted_at(
 ) -> Scene:
     """Return the scene whose time 0 is the time `by` (s) of `scene`.
 
-    `omega` (rad/s) and `attitude` are the state then. Raise InputError if the torque is opaque, or
-    needs an attitude and `attitude` is None.
+    `omega` (rad/s) and `attitude` are the state then; the torque must not be opaque.
     """
     first, second, third = (float(w) for w in omega)
     torque = scene.torque

@@ -74,7 +74,7 @@ def scene_of_file(content: bytes, default_name: str, where: str) -> Scene:
 
 
 def scene_of(data: dict[str, Any], default_name: str) -> Scene:
-    """Return the scene of a file's data, or raise InputError."""
+    """Return the scene of a file's data."""
     check_written_schema(data, "scene file")
     every: dict[str, Sequence[str]] = {**SCENE_TABLES, "states": ()}
     check_keys(data, ("schema", "name", *every), "top level")

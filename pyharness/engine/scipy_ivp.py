@@ -1,8 +1,8 @@
 """The methods of `scipy.integrate.solve_ivp`.
 
-SciPy controls the local error of a step, but our tolerance limits the error at the requested times,
-which grows with the phase. The local tolerance follows from the largest |omega|, error
-amplification and phase of a preliminary integration with few digits.
+SciPy controls a step's local error, but our tolerance limits the error at the requested times,
+which grows with the phase. The local tolerance follows from |omega|, error amplification and phase
+of a preliminary integration with few digits.
 """
 
 import math

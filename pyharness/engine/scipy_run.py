@@ -1,7 +1,7 @@
 """Integrations by SciPy's `solve_ivp` under one work limit, and their check by Taylor series.
 
 SciPy may step over a short change of a recorded torque. If its results differ from the series, the
-series limits SciPy's steps.
+series limits its steps.
 """
 
 import contextlib
@@ -78,7 +78,7 @@ class Run:
         self.unit = 1.0 if abs(end) >= _SHORTEST_SPAN else math.ldexp(1.0, math.frexp(end)[1])
 
     def after_step(self, time: float, state: Sequence[float]) -> None:
-        """Do nothing, unless overridden; called at time 0, after each step, and within the last."""
+        """Do nothing, unless overridden, at time 0, after each step, and within the last."""
 
     def solved(
         self,
@@ -93,8 +93,8 @@ class Run:
     ) -> Any:
         """Return SciPy's result by its method `name`, with times in units of `self.unit` s.
 
-        It has dense output if `with_steps` is true or `times` is None. Raise NoNumberError if
-        Radau's linear algebra refuses a number, or the time is NaN.
+        It has dense output with `with_steps` or without `times`. Raise NoNumberError if Radau's
+        linear algebra refuses a number, or the time is NaN.
         """
         from scipy.integrate import solve_ivp
 
@@ -189,10 +189,7 @@ class Beside(NamedTuple):
 
 
 def bounds_of(scene: Scene, end: float) -> list[float]:
-    """Return `end`, and times (s) until `end` at which a table or switch of the torque changes.
-
-    Raise InputError where a switch would change back and forth without end.
-    """
+    """Return `end`, and times (s) until `end` at which a table or switch of the torque changes."""
     torque = scene.torque
     assert isinstance(torque, StateTorque)
     breaks = [] if torque.tape is None else torque.tape.breaks

@@ -1,7 +1,7 @@
 """SciPy's methods for torques that depend on the state, recorded or opaque.
 
-The error amplification is unknown. The local tolerance is therefore reduced until two integrations
-show that the second meets the tolerance.
+The error amplification is unknown; the local tolerance is reduced until two integrations show that
+the second meets the tolerance.
 """
 
 from collections.abc import Sequence
@@ -44,13 +44,12 @@ def solve_state(
     """Return the trajectory under a torque that depends on the state, by SciPy's method `name`.
 
     The estimated error at `times` (s) is at most `tolerance`. `most` is the work limit, in
-    right-hand sides of a body without torque. If the torque is opaque and `with_steps` is true,
-    `sol` has SciPy's interpolants.
+    torque-free right-hand sides. With `with_steps`, `sol` has SciPy's interpolants if the torque is
+    opaque.
 
     The ending is ``overflow`` if omega grows without bound or the torque is singular, ``unchecked``
     if the Taylor series that checks a recorded torque ends early. Raise InputError if an opaque
-    function fails, the attitude is missing, the tolerance can't be met, or the work limit is
-    exceeded.
+    function fails, the tolerance can't be met, or the work limit is exceeded.
     """
     run = StateRun(scene, times[-1], name, effort, most)
     run.with_steps = with_steps and not run.is_smooth

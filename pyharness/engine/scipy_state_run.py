@@ -191,7 +191,7 @@ class StateRun(Run):
         return omega if 0.0 < omega < math.inf else 1.0
 
     def rows(self, times: Sequence[float], local: float, scale: float) -> StateRows:
-        """Return the states at `times` (s); the local tolerance is relative to `scale` (rad/s)."""
+        """Return the states at `times` (s); `local` is relative to `scale` (rad/s)."""
         self._integrations += 1
         sizes = [local * scale] * 3 + [local] * (len(self.start) - 3)
         longest = abs(self.end) / (_FEWEST_STEPS + _MORE_STEPS * self._integrations)

@@ -35,7 +35,7 @@ _LITTLE_WORK = 5e-3
 def is_sensitive(growth: float | None, tolerance: float, noise: float = 0.0) -> bool:
     """Return whether amplified rounding errors exceed 0.3 times the tolerance.
 
-    `growth` is the error amplification, `noise` the result of `torque_noise`.
+    `growth` is the error amplification, `noise` `torque_noise`'s result.
     """
     return growth is not None and ROUNDING * growth * (1.0 + noise) > _SHARE * tolerance
 
@@ -46,8 +46,8 @@ def torque_noise(
     """Return the rounding error of torque terms that nearly cancel, in units of omega's.
 
     It is the |omega| that the terms cause one by one until `t_end` (s), rounded in each of `steps`
-    steps, over `scale` (rad/s). The default scale is the larger of the initial |omega| and the
-    omega that the whole torque causes. The result is 0 if no terms nearly cancel.
+    steps, over `scale` (rad/s), by default the larger of the initial |omega| and the omega that the
+    whole torque causes. The result is 0 if no terms nearly cancel.
     """
     if isinstance(scene.torque, StateTorque) or not (scene.law.sines or scene.law.cosines):
         return 0.0
@@ -59,7 +59,7 @@ def torque_noise(
 
 
 def growth_of_rounding(scene: Scene, growth: float | None) -> float | None:
-    """Return a closed form's amplification of rounding errors, from the motion's `growth`."""
+    """Return a closed form's amplification of rounding errors, from `growth`."""
     if growth is None or growth >= _NEGLIGIBLE_TO or isinstance(scene, PrincipalScene):
         return growth
     return 1.0
@@ -71,7 +71,7 @@ def closed_form_estimate(
     """Return a closed form's estimated error at `t_end` (s), and the error amplification.
 
     The error is the larger of omega's, relative to the largest |omega| so far, and the attitude's
-    (rad). None means unknown.
+    (rad).
     """
     growth: float | None = 1.0
     # A sphere does not amplify perturbations.

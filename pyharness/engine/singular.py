@@ -37,8 +37,8 @@ def undefined_operation(
 ) -> str | None:
     """Return a text about the operation undefined at the end of an integration, and a remedy.
 
-    `begin`, `before` and `end` are the tape's inputs at the beginnings of the integration and its
-    last step, and at its end. Return None if omega or a quotient becomes infinite.
+    `begin`, `before` and `end` are the tape's inputs at the beginnings of integration and last
+    step, and at the end. Return None if omega or a quotient becomes infinite.
     """
     first, last = (max(abs(inputs[slot]) for slot in OMEGA) for inputs in (begin, end))
     if last > _UNBOUNDED * (first or 1.0):

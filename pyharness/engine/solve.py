@@ -1,6 +1,6 @@
 """The function `solve`, which computes the trajectory of a scene by any method.
 
-It integrates from time 0 in both directions, in a unit of time that avoids overflow and underflow.
+It integrates both ways from time 0, in a unit of time that avoids overflow and underflow.
 """
 
 import itertools
@@ -310,7 +310,7 @@ def _states_of_changed(times: Array, effort: float, attitude: bool, scene: Scene
 def finest(method: str, scene: Scene, time: float) -> float:
     """Return the smallest tolerance that a method can meet from 0 to `time` (s).
 
-    For SciPy's methods, with local errors of at least 2e-14, it grows with phase and error
+    For SciPy's methods (local errors of at least 2e-14) it grows with phase and error
     amplification.
     """
     claimed = METHODS[method].finest
@@ -322,7 +322,7 @@ def finest(method: str, scene: Scene, time: float) -> float:
 
 
 def ascending_times(times: object) -> tuple[list[float], bool]:
-    """Return ascending times (s), and whether they were descending; or raise InputError."""
+    """Return ascending times (s), and whether they were descending."""
     if unit_of(times):
         number("times", times)
     most = most_steps()

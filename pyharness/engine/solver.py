@@ -118,7 +118,7 @@ class Solver(BoundKernel[Result]):
         cls, scene: Scene, chosen: Plan, tolerance: float, asked: str, effort: float,
         with_attitude: bool, compiled: bool = False,
     ) -> Self:  # fmt: skip
-        """Create a solver; users call `prepare` instead."""
+        """Create a solver, for `prepare`."""
         entry = extension()
         kernel = entry.solve_packed_attitude if with_attitude else entry.solve_packed
         code = _code(chosen, with_attitude)
@@ -161,10 +161,10 @@ class Solver(BoundKernel[Result]):
 
         ``solver.many(omega, t_end, threads=1, out=None)`` takes `omega` (rad/s) of shape (n, 3),
         and `t_end` (s), a number or of shape (n,). It returns omega (rad/s), shape (n, 3), in the
-        array `out` if given, and the statuses of `Ensemble`, int8, shape (n,). A row does not
-        depend on the other rows or on `threads`, but may differ by rounding from the result of a
-        single call. Invalid arguments raise an InputError; a body with a moment that reaches 0
-        before `t_end` has the status `refused`.
+        array `out` if given, and the statuses of `Ensemble`, int8, shape (n,). A row depends on no
+        other row, nor on `threads`, but may differ by rounding from a single call's result. Invalid
+        arguments raise an InputError; a body with a moment that reaches 0 before `t_end` has the
+        status `refused`.
 
         For a solver with attitude, it is ``solver.many(omega, t_end, attitude=None, threads=1,
         out=None)`` with quaternions of shape (n, 4) or (4,), and returns omega, attitudes and
@@ -185,7 +185,7 @@ class Solver(BoundKernel[Result]):
         return compiled_call(self)
 
     def trajectory(self, omega: Numbers, times: Number | Numbers) -> Trajectory:
-        """Return the trajectory from `omega` (rad/s) at `times` (s), as `solve` computes it."""
+        """Return the trajectory from `omega` (rad/s) at `times` (s) by `solve`."""
         from pyharness.engine.registry import METHODS
         from pyharness.engine.solve import solve
 

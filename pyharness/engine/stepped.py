@@ -20,7 +20,7 @@ def steps_to(
 ) -> Iterator[tuple[float, Stepper]]:
     """Yield the beginning (s) of each step from 0 to `end` (s), and the stepper after it.
 
-    The steps end at a singularity, or after `most` steps.
+    They end at a singularity, or after `most`.
     """
     stepper = Stepper(with_constant_body(scene), max(tolerance, FINEST), attitude=attitude)
     with suppress(SingularError):

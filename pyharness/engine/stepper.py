@@ -126,7 +126,7 @@ class Stepper:
 
     @property
     def scene(self) -> Scene:
-        """The scene, whose omega and attitude are those at time 0."""
+        """The scene, with the state at time 0."""
         return self._scene
 
     @scene.setter
@@ -199,9 +199,9 @@ class Stepper:
     def step(self, longest: float = math.inf) -> float:
         """Take the longest step that the tolerance allows, and return the new time (s).
 
-        `longest` limits the step (s); it is negative for a step to an earlier time. A step ends
-        where a table of the torque changes. Raise InputError if `longest` is no number or too small
-        to change the time, or if the motion or its torque is singular.
+        `longest` limits the step (s), negative for a step back in time. A step ends where a table
+        of the torque changes. Raise InputError if `longest` is no number or too small to change the
+        time, or if the motion or its torque is singular.
         """
         longest = number("longest", longest)
         end = self._time + longest

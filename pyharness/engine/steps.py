@@ -21,10 +21,7 @@ MOST_STEPS = 20_000  # that `sol` has; it limits the memory
 
 
 def rates(scene: Scene, times: Array, state: Array) -> Array:
-    """Return time derivatives of n states, shape (n, m); not finite at a singular torque.
-
-    A state is omega, the quaternion, and `Scene.states`.
-    """
+    """Return time derivatives of n states, shape (n, m); not finite at a singular torque."""
     axes = principal(scene)[1] if uses_principal_axes(scene) else None
     bare = with_constant_body(integrated(scene))
     torque = bare.torque

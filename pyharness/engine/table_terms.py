@@ -1,6 +1,6 @@
 """Torque terms given by tables over time, and pulses, about the body axes.
 
-Taylor series begin a step where a table changes, and are as accurate as for a smooth torque.
+Taylor series begin a step where a table changes, and remain accurate.
 """
 
 import math

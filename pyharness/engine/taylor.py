@@ -30,8 +30,8 @@ def taylor(
     """Return the trajectory of a scene at `times` (s) by Taylor series.
 
     The integration is repeated if inaccurate; `evaluations` counts all series. With `with_steps`,
-    `sol` has the steps up to the last row, unless there are over 20 000 steps. Raise InputError
-    for an opaque torque, and if the work limit is exceeded.
+    `sol` has the steps up to the last row, unless there are over 20 000. Raise InputError for an
+    opaque torque, and at the work limit.
     """
     # The kernel reads the initial attitude in the first column, and writes a column for each time.
     n_attitudes = 0 if scene.attitude is None else len(times)

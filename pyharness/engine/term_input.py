@@ -39,7 +39,7 @@ def is_diagonal(matrix: Array) -> bool:
 
 
 def matrix_of(where: str, value: object) -> Array:
-    """Return a matrix, (3, 3), from a number, a diagonal or rows, or raise InputError."""
+    """Return a matrix, (3, 3), from a number, a diagonal or rows."""
     if isinstance(converted(value), float):
         return np.diag([finite(where, value)] * 3)
     allowed = "allowed: a number, three numbers for the axes, or three rows of three numbers"
@@ -54,10 +54,7 @@ def matrix_of(where: str, value: object) -> Array:
 
 
 def inertia_of(where: str, value: object) -> Array:
-    """Return an inertia matrix (kg m2), shape (3, 3), from three moments or three rows.
-
-    Raise InputError unless it is symmetric and positive definite.
-    """
+    """Return an inertia matrix (kg m2), shape (3, 3), from three moments or three rows."""
     if isinstance(converted(value), float):
         raise InputError(f"{where}: {kind_of(value)}; allowed: three moments, or three rows, kg m2")
     matrix = matrix_of(where, value)

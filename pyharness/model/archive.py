@@ -1,8 +1,8 @@
 """Archives of trajectories and ensembles, in the format of `numpy.savez`.
 
 The array `header` is JSON with the kind of content and the schema number; `sha256` is a digest of
-the other arrays. Nothing is executed or unpickled, and no array may exceed the file's size, because
-files are not trusted.
+the other arrays. Files are not trusted: nothing is unpickled, and no array may exceed the file's
+size.
 """
 
 import hashlib
@@ -26,7 +26,7 @@ _OTHERS = (".csv", ".json", ".md", ".toml", ".tsv", ".txt", ".xlsx", ".xml")
 
 
 def checked_path(where: str, path: object) -> str:
-    """Return a path as text, or raise InputError; a new file without ending gets .npz."""
+    """Return a path as text; a new file without ending gets .npz."""
     if not isinstance(path, (str, os.PathLike)):
         raise InputError(f"{where}: {kind_of(path)}; allowed: a path, as text or a Path")
     name = os.fsdecode(path)
@@ -71,10 +71,10 @@ def add_entry(digest: Any, name: str, data: bytes | memoryview) -> None:
 def read_archive(
     where: str, name: str, kinds: tuple[str, str], known: Iterable[str], written: str
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the arrays and the header of an archive, or raise InputError.
+    """Return the arrays and the header of an archive.
 
-    `kinds` has the kind of file in the header and in messages, `known` the names of allowed arrays.
-    `written` describes a valid file.
+    `kinds` has the kind of file in header and messages, `known` the allowed arrays. `written`
+    describes a valid file.
     """
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     content = read_input(name, where, memory // 4, written)

@@ -70,7 +70,7 @@ def numbers_of(where: str, values: object) -> Array:
 
 
 def count_bodies(rows: Mapping[str, Array]) -> int:
-    """Return the number of bodies; raise InputError if arrays disagree."""
+    """Return the number of bodies, on which the arrays must agree."""
     counts = {len(each) for each in rows.values()}
     n = 0 if 0 in counts else max(counts, default=1)
     if not counts <= {1, n}:
@@ -98,7 +98,7 @@ def row_of(array: Array, i: int) -> Any:
 
 
 def only_one(given: Mapping[str, object]) -> str:
-    """Return the name of the argument other than None, or ""; raise InputError for several."""
+    """Return the name of the only argument other than None, or ""."""
     names = [name for name, value in given.items() if value is not None]
     if len(names) > 1:
         raise InputError(f"{' and '.join(names)} are both given; give one of them")
@@ -106,7 +106,7 @@ def only_one(given: Mapping[str, object]) -> str:
 
 
 def threads_of(threads: object) -> int:
-    """Return a user's number of threads, or raise InputError."""
+    """Return a user's number of threads."""
     found = integer("threads", threads)
     if not 1 <= found <= _MOST_THREADS:
         raise InputError(f"threads is {found}; allowed: 1 to {_MOST_THREADS}")
@@ -114,7 +114,7 @@ def threads_of(threads: object) -> int:
 
 
 def buffer_of(where: str, array: Any, shape: tuple[int, ...], kind: str) -> Any:
-    """Return the user's output array for a kernel, or raise InputError.
+    """Return the user's output array for a kernel.
 
     `kind` is the required type character, such as "d".
     """

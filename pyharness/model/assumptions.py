@@ -31,7 +31,7 @@ def open_starts() -> dict[int, str]:
 def assumed(scene: Scene, listings: Iterable[Listing] = ()) -> list[dict[str, Any]]:
     """Return the assumptions on which a scene and its runs of `listings` (program versions) depend.
 
-    There are none for scenes outside the thesis, or values that a user changed.
+    Scenes outside the thesis, and values that a user changed, have none.
     """
     among = list(listings)
     return [each for each in assumptions() if _is_made(each, scene, among)]

@@ -40,7 +40,7 @@ def scalar_first(values: object) -> Any:
 def unit_quaternion(where: str, values: object) -> tuple[Quaternion, float]:
     """Return the unit quaternion of four numbers or a `Rotation`, and their norm.
 
-    Raise InputError unless they are finite and not all 0.
+    They must be finite and not all 0.
     """
     allowed = "allowed: four finite numbers, scalar first, not all 0"
     given = [finite(where, each) for each in number_list(where, scalar_first(values), allowed)]
@@ -59,10 +59,7 @@ def unit_quaternion(where: str, values: object) -> tuple[Quaternion, float]:
 
 
 def of_angles(where: str, angles_deg: object, sequence: object) -> Quaternion:
-    """Return the attitude after three rotations (degrees) about the body axes in `sequence`.
-
-    Raise InputError for an unknown sequence or invalid angles.
-    """
+    """Return the attitude after three rotations (degrees) about the body axes in `sequence`."""
     if not isinstance(sequence, str) or sequence not in SEQUENCES:
         name = sequence if isinstance(sequence, str) else kind_of(sequence)
         raise unknown("sequence", name, SEQUENCES, where)
@@ -100,8 +97,8 @@ def quaternion_rates(omega: Iterable[Any], q: Iterable[Any]) -> list[Any]:
 def angles(attitude: Array, sequence: str) -> Array:
     """Return n attitudes, (n, 4), as angles (degrees) of three successive rotations, (n, 3).
 
-    If the first and last axes are parallel, only the sum or difference of their angles is
-    determined; the last is then 0.
+    If first and last axes are parallel, only their angles' sum or difference is determined; the
+    last is then 0.
     """
     q0, q1, q2, q3 = attitude.T
     if sequence == "3-1-3":

@@ -14,8 +14,8 @@ MARKS = {
 class Basis:
     """The basis of a check's limit: proved, derived or measured.
 
-    `mark`, a key of `MARKS`, classifies its weakest part; `source` names the theorem, derivation or
-    command, in Markdown.
+    `mark`, a key of `MARKS`, classifies its weakest part; `source`, in Markdown, names theorem,
+    derivation or command.
     """
 
     mark: str
@@ -23,6 +23,6 @@ class Basis:
     source: str
 
     def __post_init__(self) -> None:
-        """Raise ValueError for an unknown mark or empty text."""
+        """Check the mark and the texts."""
         if self.mark not in MARKS or not self.limit or not self.source:
             raise ValueError(f"not a basis of a limit: {self}")

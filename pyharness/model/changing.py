@@ -22,7 +22,7 @@ _MATRICES = f"allowed: a list of 1 to {_MOST} matrices, each of three rows of th
 
 
 class Changing:
-    """The base class of inertias that change with time; its methods are for polynomials."""
+    """The base class of changing inertias; its methods are for polynomials."""
 
     if TYPE_CHECKING:
 

@@ -36,7 +36,7 @@ class Methods:
 
 
 class Places:
-    """Indices of the array that a prepared solver's kernel reads."""
+    """Indices of the array that a prepared kernel reads."""
 
     METHOD = 0
     TOLERANCE = 1  # relative; for methods that have a tolerance

@@ -48,7 +48,7 @@ def _rates(tape: Tape, own: tuple[str, ...], inertia: Matrix) -> StateTorque:
 def with_constant_body(scene: Scene) -> Scene:
     """Return a scene of the same solution with a constant inertia and a torque about the body axes.
 
-    For a changing inertia I and torque N, the new coefficients are 0. The new torque is omega' from
+    For a changing inertia I and torque N, the new coefficients are 0, and the torque is omega' from
     I omega' = N - I' omega - omega x (I omega).
     """
     changing, torque = scene.changing, scene.torque

@@ -52,7 +52,7 @@ _ROUNDED = 4.0  # units in the last place by which a time such as n*dt may excee
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """A function of time: a polynomial on each of p intervals between ascending `edges` (s).
+    """A function of time: polynomials on p intervals between ascending `edges` (s).
 
     `values`, (p, NODES, m), are its m components at the Chebyshev points of the intervals.
     """
@@ -80,7 +80,7 @@ def sizes_of(largest: Array, n_own: int) -> Array:
     """Return the sizes, (..., m), to which errors are relative, from the unknowns' largest values.
 
     The size is the largest component for omega, 1 for the quaternion, and the value itself for the
-    last `n_own` unknowns, the user's.
+    user's last `n_own` unknowns.
     """
     sizes = np.ones_like(largest)
     sizes[..., :3] = largest[..., :3].max(axis=-1, keepdims=True)

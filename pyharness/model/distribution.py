@@ -34,7 +34,7 @@ def check_package(name: str, what: str, command: str) -> None:
 
 
 def checked_axes(ax: object) -> "Axes":
-    """Return `ax`, or a new diagram if None; raise InputError unless it is an Axes."""
+    """Return `ax`, an Axes, or a new diagram if None."""
     check_package("matplotlib", "plot", install_command("plots"))
     from matplotlib.axes import Axes
 

@@ -62,7 +62,7 @@ def waves(scene: Scene) -> int:
 def check_steps(scene: Scene, program: str, implementation: str, effort: float) -> None:
     """Raise InputError if a program exceeds the work limit of an `implementation`.
 
-    The work is steps times (1 + c w) for w sines and cosines in the torque, with c from `_LIMITS`.
+    The work is steps times (1 + c w) for w waves in the torque, with c from `_LIMITS`.
     """
     if implementation not in _LIMITS:
         raise unknown("implementation", implementation, _LIMITS)

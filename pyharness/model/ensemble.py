@@ -317,10 +317,7 @@ _NO_ESTIMATES = np.empty((2, 0), order="F")
 def place_for(
     out: "Ensemble | Array | None", n: int, with_attitude: bool, with_estimates: bool = False
 ) -> Ensemble:
-    """Return an Ensemble for n bodies: `out`, one around the array `out`, or a new one.
-
-    Raise InputError if `out` does not fit.
-    """
+    """Return an Ensemble for n bodies: `out`, one around the array `out`, or a new one."""
     shape = (n, 3)
     if out is None or isinstance(out, np.ndarray):
         omega = np.empty(shape) if out is None else buffer_of("out", out, shape, "d")

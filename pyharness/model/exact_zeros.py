@@ -30,7 +30,7 @@ def determinant(elements: Sequence[Sequence[Sequence[float]]]) -> list[Fraction]
 def first_zeros(polynomial: Iterable[float | Fraction]) -> tuple[float, float]:
     """Return a polynomial's zeros (s) nearest to time 0, before and after it.
 
-    The polynomial must be above 0 at time 0. A missing zero is -inf or inf.
+    It must be above 0 at time 0. A missing zero is -inf or inf.
     """
     exact = [Fraction(c) for c in polynomial]
     backward = [-c if n % 2 else c for n, c in enumerate(exact)]

@@ -1,6 +1,6 @@
 """Torques as three arithmetic expressions of time, omega and attitude, as in scene files.
 
-Only allowed nodes of the syntax tree are evaluated; no text is run as Python code.
+Only allowed nodes of the syntax tree are evaluated.
 """
 
 import ast
@@ -62,8 +62,8 @@ def parsed(
     """Return the torque of three expressions about the body axes, as a torque law if possible.
 
     They may contain t (s), w1 to w3 (rad/s), the quaternion q0 to q3, pi, names in `constants`, and
-    own states (`Scene.states`), whose time derivatives are the expressions in `rates`. Units are N
-    m, or rad/s2 for a body with coefficients. Raise InputError for an invalid expression.
+    own states (`Scene.states`) with the time derivatives `rates`. Units are N m, or rad/s2 for a
+    body with coefficients.
     """
     values = _checked_constants(constants)
     texts = _three_texts(expressions)

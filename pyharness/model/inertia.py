@@ -1,8 +1,8 @@
 """Principal moments and axes of inertia matrices, diagonalised in integers.
 
-In binary64, a small eigenvalue would have few correct digits. The elements are integer multiples of
-a power of 2, u; a regular matrix has an absolute determinant of at least u**3. This bounds the
-smallest absolute eigenvalue from below, and determines how many bits are enough.
+In binary64, a small eigenvalue would have few correct digits. Elements are integer multiples of a
+power of 2, u; a regular matrix has an absolute determinant of at least u**3. This bounds the
+smallest eigenvalue, and determines how many bits are enough.
 """
 
 import math
@@ -33,8 +33,8 @@ _MOST_ROTATIONS = 500  # about ten suffice, because the convergence is quadratic
 class PrincipalFrame:
     """Principal moments (kg m2) and axes, as floats and as fractions of 30 or more digits.
 
-    The columns of `axes` form a right-handed frame, each nearest to the body axis of the same
-    number. `moments_low` is `exact_moments` minus `moments`.
+    The columns of `axes` form a right-handed frame, each nearest to its body axis. `moments_low` is
+    `exact_moments` minus `moments`.
     """
 
     moments: Triple
@@ -52,7 +52,7 @@ class PrincipalFrame:
 
 
 def checked_inertia(where: str, values: object) -> Matrix:
-    """Return a user's inertia matrix (kg m2), made exactly symmetric, or raise InputError."""
+    """Return a user's inertia matrix (kg m2), made exactly symmetric."""
     matrix = symmetric_matrix(where, values)
     least = min(principal_frame(matrix).exact_moments)
     if not least > 0:
@@ -64,7 +64,7 @@ def checked_inertia(where: str, values: object) -> Matrix:
 
 
 def symmetric_matrix(where: str, values: object) -> Matrix:
-    """Return a user's symmetric matrix, perhaps not positive definite, or raise InputError."""
+    """Return a user's symmetric matrix, perhaps not positive definite."""
     allowed = "allowed: three rows of three finite numbers, kg m2"
     rows = list(number_list(where, values, allowed))
     if any(isinstance(converted(row), float) for row in rows):

@@ -29,8 +29,8 @@ _CONTINUOUS = 1e-9  # largest relative jump of an element that counts as roundin
 class InertiaFunction(Changing):
     """An inertia that is a continuous function of time.
 
-    The recorded operations `tape` give three moments, or nine matrix elements by rows. `written`
-    has a scene file's expressions and numbers, or a table's items.
+    `tape` gives three moments, or nine matrix elements by rows. `written` has a scene file's
+    expressions and numbers, or a table's items.
     """
 
     place: str
@@ -121,8 +121,7 @@ def _outputs(tape: Tape, time: Any) -> list[Any]:
 def inertia_function(place: str, function: Callable[[Any], Any]) -> InertiaFunction:
     """Return the moments or inertia matrix of a user's function of time.
 
-    Raise InputError if the function can't be recorded, depends on more than time, jumps, or gives
-    no inertia at time 0.
+    It must be recordable, continuous, and depend on time alone.
     """
     where, allowed = f"[body] {place}", f"a function of t that returns {_RETURNS[place]}, in kg m2"
 

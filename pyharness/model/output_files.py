@@ -49,8 +49,8 @@ def check_writable(path: str, option: str) -> None:
 def write_files(contents: dict[str, bytes], option: str) -> None:
     """Write all files or none; raise InputError, naming `option`, on failure.
 
-    Files get temporary names, then are renamed. After a failure or Ctrl-C, the old files are
-    restored. Devices and pipes are written first.
+    Files are written under temporary names, then renamed; after a failure or Ctrl-C, the old ones
+    are restored. Devices and pipes are written first.
     """
     path = ""
     try:

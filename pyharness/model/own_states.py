@@ -28,7 +28,7 @@ class OwnState(NamedTuple):
 
 
 def checked_states(value: object) -> tuple[OwnState, ...]:
-    """Return the argument `states` of a scene, or raise InputError."""
+    """Return the argument `states` of a scene."""
     if isinstance(value, tuple) and all(isinstance(each, OwnState) for each in value):
         names = [each.name for each in value]
         if len(set(names)) < len(names):

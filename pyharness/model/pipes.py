@@ -15,8 +15,8 @@ _PIECE = 1 << 20
 def read_input(path: str | os.PathLike[str], where: str, limit: int, what: str) -> bytes:
     """Return the content of a user's file or pipe.
 
-    Raise InputError, beginning with `where`, for an unreadable path, a folder, a device, more
-    than `limit` bytes, or a pipe without data for 10 s. `what` names the expected content.
+    Raise InputError for an unreadable path, a folder, a device, more than `limit` bytes, or a pipe
+    without data for 10 s. Messages begin with `where`; `what` names the expected content.
     """
     try:
         content = _read(os.fspath(path), limit)

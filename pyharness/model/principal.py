@@ -116,7 +116,7 @@ def in_scene_axes(found: Trajectory, axes: Array) -> Trajectory:
 def states_in_scene_axes(states: Array, axes: Array, own: int) -> Array:
     """Return rows of states, transformed from principal `axes` (columns) to the body axes.
 
-    The user's own states, columns from `own` on, are unchanged.
+    Columns from `own` on are unchanged.
     """
     turned, rest = states[:, 3:own], states[:, own:]
     if own > 3:

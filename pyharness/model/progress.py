@@ -59,7 +59,7 @@ def count_done(n: int) -> None:
 
 @contextmanager
 def progress_of(choice: bool | Progress, what: str) -> Iterator[Progress]:
-    """Yield the function `choice`, or one that updates a bar (True) or does nothing (False)."""
+    """Yield `choice`, or a function that updates a bar (True) or nothing (False)."""
     if callable(choice):
         yield choice
     elif not boolean("progress", choice):
@@ -84,8 +84,7 @@ def for_each_piece(
 ) -> None:
     """Call ``work(piece, given_up)`` in threads for each of `pieces`, by default equal slices of n.
 
-    With several threads, an exception (such as Ctrl-C) sets `given_up[0]` to 1; kernels poll it
-    and return.
+    With several threads, an exception (such as Ctrl-C) sets `given_up[0]` to 1, which ends kernels.
     """
     if not n:
         return

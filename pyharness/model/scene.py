@@ -325,8 +325,8 @@ class Scene:
     def is_impossible(self) -> bool:
         """Whether no rigid body has the moments of inertia at time 0.
 
-        True if the largest moment exceeds the sum of the others by more than 2**-50 of itself. A
-        smaller excess may be a rounding error.
+        True if the largest moment exceeds the sum of the others by more than 2**-50 of itself,
+        beyond rounding errors.
         """
         moments, inertia = self.moments, self.inertia
         if self.changing is not None:
@@ -383,7 +383,7 @@ Scene.__init__ = with_hints(Scene.__init__)  # type: ignore[method-assign]
 
 
 def breaks_triangle(moments: Iterable[Any]) -> bool:
-    """Return whether the largest moment exceeds the others' sum by more than 2**-50 of itself."""
+    """Return whether the largest moment exceeds the others' sum by over 2**-50 of itself."""
     low, middle, high = sorted(moments)
     return bool((high - middle - low) * _ROUNDED > high)
 

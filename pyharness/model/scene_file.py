@@ -72,7 +72,7 @@ def case_scene(number: SupportsIndex) -> Scene:
 
 
 def read_toml(path: str | os.PathLike[str], where: str) -> dict[str, Any]:
-    """Return the data of a user's TOML file, or raise InputError."""
+    """Return the data of a user's TOML file."""
     return toml_of(read_file(path, where), where)
 
 
@@ -82,7 +82,7 @@ def read_file(path: str | os.PathLike[str], where: str) -> bytes:
 
 
 def toml_of(content: bytes, where: str) -> dict[str, Any]:
-    """Return the data of a TOML text; raise InputError if invalid."""
+    """Return the data of a TOML text."""
     try:
         return tomllib.loads(content.decode("utf-8-sig"))
     except UnicodeDecodeError:
@@ -103,8 +103,8 @@ def toml_of(content: bytes, where: str) -> dict[str, Any]:
 def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
     """Return the text of a scene file, from which `read_scene` restores the scene bit for bit.
 
-    Masses, forces and case are not written. Raise InputError for a torque or inertia given as a
-    Python function, more than 50 [[torque.terms]], or more than 1 000 000 bytes.
+    Masses, forces and case are not written. Raise InputError for a Python function, more than 50
+    [[torque.terms]], or more than 1 000 000 bytes.
     """
     import json
 

@@ -183,7 +183,7 @@ def of_law(law: TorqueLaw) -> StateTorque:
 def turned_law(law: TorqueLaw, time: Symbol, attitude: Any) -> Array:
     """Return the body components of a law about the axes of space.
 
-    Laws with equally many frequencies have the same operations, and share compiled code.
+    Laws with equally many frequencies share compiled code.
     """
     angles = [frequency * time for _, frequency in (*law.sines, *law.cosines)]
     terms = [time, *(wave(each) for each in angles for wave in (np.sin, np.cos))]
@@ -343,7 +343,7 @@ def has_switches(torque: object) -> bool:
 
 
 def checked_torque(value: object, states: tuple[str, ...] = ()) -> TorqueLaw | StateTorque:
-    """Return a user's torque, with functions recorded, or raise InputError."""
+    """Return a user's torque, with functions recorded."""
     found: TorqueLaw | StateTorque
     if isinstance(value, (TorqueLaw, StateTorque)):
         found = value

@@ -1,8 +1,8 @@
-"""Symbols: function arguments that record arithmetic on a tape (a list of operations).
+"""Symbols: function arguments that record arithmetic on a tape.
 
 A symbol is a linear combination of slots, the places of inputs and results on the tape. Sums, and
-products with numbers, only change coefficients. Each other operation has a slot for its result; a
-repeated operation has the same slot.
+products with numbers, only change coefficients; any other operation has a slot for its result, the
+same if repeated.
 """
 
 import math

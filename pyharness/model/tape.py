@@ -1,7 +1,7 @@
 """The tape: a function of time, omega and attitude, recorded as a list of operations.
 
-It is recorded with symbols (`pyharness.model.symbols`), and evaluated with floats, decimal numbers,
-Taylor series or symbols. A slot is the place of an input or result.
+It is recorded with `pyharness.model.symbols`, and evaluated with floats, decimal numbers, Taylor
+series or symbols. A slot is the place of an input or result.
 """
 
 import math
@@ -41,8 +41,7 @@ class Table:
     """A piecewise cubic function of time.
 
     Row k of `pieces`, shape (n, 4), has the coefficients of a cubic in the time (s) after
-    breaks[k], constant first. It applies until the next break, the first row also before, and
-    the last row to all later times.
+    breaks[k], constant first. It applies until the next break, the first row also before.
     """
 
     def __init__(self, breaks: Any, pieces: Any) -> None:
@@ -65,9 +64,9 @@ class Table:
 class Operation(NamedTuple):
     """An operation of a tape: "linear", "table", or another kind on one to three slots.
 
-    The second operand of "log", "atan" and "asin" is the slot of the derivative. "switch" is 1
-    where its operand is positive, else 0. "select" is its second operand where the first is 1,
-    else its third.
+    The second operand of "log", "atan" and "asin" is the derivative. "switch" is 1 where its
+    operand is positive, else 0; "select" is its second operand where the first is 1, else its
+    third.
     """
 
     kind: str
@@ -204,8 +203,8 @@ def live_slots(
     """Compute the operations that the outputs need, operands first, and return their slots.
 
     Of a "select" only the chosen operand is computed; the other may be singular. `compute` is
-    called for each slot, `is_true` for a computed condition. Derivatives (`WITH_DERIVATIVE`)
-    are computed only if `for_series`.
+    called for each slot, `is_true` for a condition. Derivatives (`WITH_DERIVATIVE`) are computed
+    only if `for_series`.
     """
     known = set(range(tape.n_inputs))
     wanted = [slot for output in tape.outputs for slot, _ in output.terms]
@@ -294,8 +293,8 @@ _UNSEEN = 2.0**-150
 def float_outputs(tape: Tape, inputs: Sequence[float]) -> list[float]:
     """Return the outputs of a tape in floats; division by 0 raises ZeroDivisionError.
 
-    An exponential that overflows, as in sinh(x)/cosh(x), is replaced by another large number,
-    unless the outputs depend on this number.
+    An exponential that overflows, as in sinh(x)/cosh(x), becomes a large number, unless the outputs
+    depend on it.
     """
     found: list[float] = []
     try:

@@ -193,7 +193,7 @@ def law_derivative(law: TorqueLaw) -> TorqueLaw:
 def to_body(vector: Any, attitude: Any) -> Array:
     """Return the body components of a vector about the axes of space.
 
-    Terms of a recorded torque share the products of the rotation matrix.
+    Recorded terms share the products of the rotation matrix.
     """
     u, v, w = vector
     rows = rows_to_body(attitude)

@@ -294,8 +294,8 @@ def digits_left(error: float | None) -> float | None:
 class BatchResult:
     """The angular velocities of n bodies, and how the computation of each ended.
 
-    `omega` (rad/s), shape (n, ..., 3), is NaN where there is no result. `status`, shape (n,),
-    has codes of `pyharness.model.codes.Statuses`.
+    `omega` (rad/s), shape (n, ..., 3), is NaN without a result. `status`, shape (n,), has codes of
+    `pyharness.model.codes.Statuses`.
     """
 
     omega: Array

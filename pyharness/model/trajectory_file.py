@@ -1,9 +1,9 @@
 """Writing of trajectory files, which `pyharness.engine.trajectory_reader` reads.
 
 The archive has an array for each attribute, the text `scene` of a scene file, and the JSON text
-`header` with the rest, such as a tape (recorded torque). A linear combination is a list of its
-constant and of pairs of slot (input or result) and coefficient. An operation is a list of its kind
-and its operands, its linear combination, or the breaks and pieces of its table.
+`header` with the rest, such as a tape. A linear combination is a list of its constant and of pairs
+of slot and coefficient; an operation, of its kind and its operands, linear combination, or breaks
+and pieces of its table.
 """
 
 import json

@@ -51,7 +51,7 @@ def unit_of(value: object) -> str:
 
 
 def converted(value: object) -> float | str:
-    """Return a real number as a float; for other values, or beyond binary64, a description."""
+    """Return a real number as a float; else, or beyond binary64, a description."""
     if type(value) is float:
         return value
     if is_no_number(value):
@@ -67,7 +67,7 @@ def converted(value: object) -> float | str:
 
 
 def is_no_number(value: object) -> bool:
-    """Return whether a value is text, boolean or an array, which float() might accept."""
+    """Return whether a value is text, boolean or array, which float() might take."""
     if isinstance(value, (bool, str, bytes, bytearray, memoryview)):
         return True
     kind = getattr(getattr(value, "dtype", None), "kind", _REAL[0])
@@ -80,7 +80,7 @@ def parsed_float(text: str) -> float:
 
 
 def parsed_whole(text: str) -> int:
-    """Return the whole number in `text`, or raise ValueError."""
+    """Return the whole number in `text`."""
     return int(_read_text(text))
 
 
@@ -153,7 +153,7 @@ def boolean(where: str, value: object) -> bool:
 
 
 def tolerance_of(value: object, finest: float) -> float:
-    """Return a tolerance as a float, without a check of its range, or raise InputError."""
+    """Return a tolerance as a float, without a check of its range."""
     found = converted(value)
     if isinstance(found, float):
         return found
@@ -161,7 +161,7 @@ def tolerance_of(value: object, finest: float) -> float:
 
 
 def checked_effort(effort: Number) -> float:
-    """Return `effort` as a float above 0, or raise InputError."""
+    """Return `effort` as a float above 0."""
     value = number("effort", effort)
     if not 0.0 < value < math.inf:
         raise InputError(f"effort: {value:g}; allowed: a finite number above 0")

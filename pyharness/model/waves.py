@@ -1,8 +1,8 @@
 """Exact sums of the waves of a torque law that have the same frequency.
 
-A solver rounds each quotient of amplitude and moment. If two amplitudes cancel to 1e-10 of their
-size, the sum of the rounded quotients has only six correct digits. A merged law has at most one
-sine and one cosine of each frequency, none of frequency 0.
+A solver rounds each quotient of amplitude and moment: if two amplitudes cancel to 1e-10 of their
+size, the sum has only six correct digits. A merged law has at most one sine and one cosine of each
+frequency, none of frequency 0.
 """
 
 import math
@@ -42,10 +42,7 @@ def is_mergeable(law: TorqueLaw) -> bool:
 
 
 def exact_law(law: TorqueLaw, turn: Callable[[Exact], Exact] | None = None) -> TorqueLaw:
-    """Return a law with waves summed by frequency, vectors rotated by `turn`, then rounded.
-
-    Raise InputError if an amplitude overflows.
-    """
+    """Return a law with waves summed by frequency, vectors rotated by `turn`, then rounded."""
     constant, rate = (triple(map(Fraction, each)) for each in (law.constant, law.rate))
     sines, cosines = _summed(law.sines, even=False), _summed(law.cosines, even=True)
     # A cosine of frequency 0 is 1 at all times, whereas a sine is 0.
@@ -93,8 +90,8 @@ def with_merged_waves(scene: Scene) -> Scene:
 def with_merged_rows(constant: Array, sines: Array, cosines: Array) -> tuple[Array, Array, Array]:
     """Return constants, sines and cosines of m torque laws, summed by frequency if finite.
 
-    Shapes are (m, 3), (m, k, 4) and (m, l, 4), or one row for all; a wave is three amplitudes
-    and a frequency (rad/s). Shorter rows are padded with zeros.
+    Shapes are (m, 3), (m, k, 4) and (m, l, 4), or one row for all; a wave is three amplitudes and a
+    frequency (rad/s). Rows are padded with zeros.
     """
     concerned = _mergeable_rows(sines, cosines)
     if not concerned.any():

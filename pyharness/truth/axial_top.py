@@ -16,10 +16,7 @@ DIGITS = 50
 
 
 def axial_top(scene: Scene, times: Sequence[float]) -> list[Row]:
-    """Return omega (rad/s) at `times` (s) of a body with I1 = I2 and its torque along axis 3.
-
-    Raise InputError for another body or torque.
-    """
+    """Return omega (rad/s) at `times` (s) of a body with I1 = I2 and its torque along axis 3."""
     law, moments = scene.body_torque, scene.moments
     vectors = [law.constant, law.rate, *(a for a, _ in law.sines + law.cosines)]
     if moments is None or moments[0] != moments[1] or any(v[0] or v[1] for v in vectors):

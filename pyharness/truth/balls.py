@@ -1,7 +1,7 @@
-"""Functions of balls, complex balls and power series of balls, for proved enclosures.
+"""Functions of balls, complex balls and their power series, for proved enclosures.
 
-A ball is an interval, stored as middle and radius. Each operation of python-flint returns a ball
-that contains the exact results for all numbers in the operands.
+A ball is an interval, stored as middle and radius. python-flint's operations return balls that
+contain the exact results for all numbers in the operands.
 """
 
 from bisect import bisect_left, bisect_right

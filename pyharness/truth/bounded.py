@@ -1,7 +1,7 @@
 """Error of the reference solution: a proved bound where a proof is cheap, else the estimate.
 
-A proof encloses the solution in balls (intervals, given by middle and radius). The largest distance
-of the reference from any point of a ball bounds the error.
+A proof encloses the solution in balls (intervals with middle and radius). The largest distance of
+the reference from any point of a ball bounds the error.
 """
 
 import math
@@ -36,8 +36,7 @@ class ErrorBound(NamedTuple):
     """Bounds on the error of the reference at all its times.
 
     `value` is for any component of omega (rad/s), `angle` for the attitude (rad). Each has a basis,
-    "proved" or "estimated". `warning` is a sentence if the proof shows an error above the estimate,
-    else empty.
+    "proved" or "estimated". `warning` is not empty if the proof shows an error above the estimate.
     """
 
     value: float
@@ -94,8 +93,8 @@ def bound_of(
 ) -> ErrorBound:
     """Return the error bound of a scene's reference, `known`.
 
-    With `before_rounding`, the bound is for omega plus `known.remainder`, if there is one. Other
-    options are those of `error_bound`.
+    With `before_rounding`, it is for omega plus any `known.remainder`. Other options are
+    `error_bound`'s.
     """
     exact = before_rounding and known.remainder is not None
     largest = float(np.abs(known.omega).max(initial=0.0))
@@ -127,7 +126,7 @@ def error_bound(
     """Return the error bound of the reference at `times` (s).
 
     `omega` (rad/s) and `remainder`, which is added to it, have shape (n, 3), `attitude` (n, 4).
-    `claimed` (rad/s) and `claimed_angle` (rad) are the estimates, returned where nothing is proved.
+    `claimed` (rad/s) and `claimed_angle` (rad) are estimates, returned where nothing is proved.
 
     The bound of omega is proved if the scene can have a certificate. With python-flint, both bounds
     are proved in torque-free motion and, with `any_torque`, under any recorded torque at up to 30

@@ -76,8 +76,8 @@ def prove(
     """Return balls that contain omega at `times` (s), and their certificate.
 
     A radius is at most 10**-digits times the larger of 1 rad/s and the largest component of omega.
-    `effort` is a factor on the work limit. Raise InputError if the scene can't have a certificate,
-    omega grows without bound, or the limit is exceeded.
+    `effort` is a factor on the work limit. Raise InputError for an unsuitable scene, if omega grows
+    without bound, or beyond the limit.
     """
     if not has_certificate(scene):
         raise InputError(

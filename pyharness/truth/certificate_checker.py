@@ -1,17 +1,17 @@
 """Check a certificate: a proof that balls contain the solution of Euler's equations.
 
-The program imports only Python's standard library, and computes with integers. Its arguments are
-files of certificates; it prints what they prove. The exit status is 1 unless all certificates hold.
+The program needs only Python's standard library, and computes with integers. Its arguments are
+files of certificates; it prints what they prove. The exit status is 1 unless all hold.
 
 The equations are y' = f(t, y) for the angular velocity omega, and for the sines and cosines of the
 torque. In a step h, a polynomial p(s), s from 0 to 1, approximates the solution: the Taylor series
-with coefficients rounded down. Any polynomial is allowed, because the proof bounds its residual d =
-p' - h f(p).
+with coefficients rounded down. Any polynomial is allowed, as the proof bounds its residual d = p' -
+h f(p).
 
 The error e = y - p obeys |e|' <= h mu |e| + |d| (Dahlquist 1958), where mu bounds the logarithmic
 norm of the Jacobian of f in a tube around p. The resulting bound on |e|, the radius of the step,
-holds while |e| is less than the tube's radius. If the bound is less too, it holds on the whole
-step, because |e| is continuous.
+holds while |e| is less than the tube's radius; if the bound is less too, on the whole step, because
+|e| is continuous.
 
 A number y is stored as the integer y 2**bits, a time t (s) as t 2**clock. The norm of an error of
 omega is sqrt(sum (e_i / scale_i)**2), with scales in units of 2**-20.
@@ -81,7 +81,7 @@ class System:
         self.factors = [abs(parts[i] + parts[j]) * scales[i] * scales[j] / 2 for i, j in pairs]
 
     def expand(self, state: Sequence[int], time: int, h: int, order: int) -> Expansion:
-        """Return a step's Taylor series, and residual bounds of omega and of sines and cosines."""
+        """Return a step's Taylor series, and residual bounds of omega and waves."""
         series, bits, clock, wave_residual = [[x] for x in state], self.bits, self.clock, 0
         # Coefficient k is rounded down by less than 1, which changes the residual by less than k.
         rounding = order * (order + 1) // 2
@@ -141,7 +141,7 @@ class System:
     def radii(
         self, radius: int, wave_radius: int, expansion: Expansion, tube: int, h: int
     ) -> tuple[int, int]:
-        """Return error bounds of omega and of sines and cosines, or raise NotProvedError."""
+        """Return error bounds of omega and waves, or raise NotProvedError."""
         series, residuals, wave_residual = expansion
         growth = self.growth(series, tube, h)
         if growth > 2 * UNIT:

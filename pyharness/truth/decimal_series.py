@@ -47,10 +47,10 @@ def taylor_series(
     """Return a row of omega (rad/s), velocity (m/s) and attitude at each of `times` (s).
 
     The rows end where omega grows without bound or the torque is singular. Quaternions keep the
-    norm of the scene's quaternion. `coefficients` are A, B and C; `order` is the degree of the
-    series, which high powers in the torque may increase; `tolerance` is local and relative.
-    `effort` is a factor on a work limit of some ten seconds; None means 100 000 steps, fewer if the
-    torque depends on the state. `start` replaces the initial state.
+    scene's norm. `coefficients` are A, B and C; high powers in the torque may increase the `order`
+    of the series; `tolerance` is local and relative. `effort` is a factor on a work limit of some
+    ten seconds; None means 100 000 steps, fewer if the torque depends on the state. `start`
+    replaces the initial state.
     """
     equations, limit = _Equations(scene, coefficients, velocity), _Limit(scene, effort)
     tape = equations.tape
@@ -270,7 +270,7 @@ class _Equations:
     """The equations of one scene as recurrences of Taylor coefficients.
 
     `velocity` adds dV/dt = F/m - omega x V, with force F and mass m; an attitude adds dq/dt = q (0,
-    omega)/2. A changing inertia I and torque N give (I omega)' = N - omega x (I omega); otherwise
+    omega)/2. With a changing inertia I and torque N, (I omega)' = N - omega x (I omega); else
     `coefficients` are A, B, C. `TapeSeries` explains `change` and `results`.
     """
 

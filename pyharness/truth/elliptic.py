@@ -1,7 +1,7 @@
 """Torque-free motion by Jacobi's elliptic functions in decimals.
 
-Unlike Taylor series, these functions lose no digits with time, and flips (sign changes of omega
-near the separatrix) take no more work. No code is shared with the closed form that is checked.
+Unlike Taylor series, they lose no digits with time, and flips (sign changes of omega near the
+separatrix) take no more work. No code is shared with the checked closed form.
 """
 
 import decimal
@@ -21,9 +21,8 @@ _DIGITS = 90
 def torque_free(scene: Scene, time: float | Decimal, rounded: bool = False) -> Row:
     """Return omega (rad/s) of a scene without torque at `time` (s).
 
-    If `rounded`, A, B and C are rounded to binary64. Raise InputError if the torque depends on the
-    state, or an unsteady motion may be unbounded. Without moments, at least one of A, B, C must
-    then be above 0 and one below.
+    If `rounded`, A, B and C are rounded to binary64. Raise InputError if an unsteady motion may be
+    unbounded: without moments, at least one of A, B, C must be above 0 and one below.
     """
     i = checked_scene(scene).exact_moments
     a, w = [Fraction(x) for x in scene.euler_coefficients], [Fraction(x) for x in scene.omega]

@@ -20,7 +20,7 @@ class Balls(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Enclosure:
-    """Balls that contain the solution of one scene; quantities that were not requested are None.
+    """Balls that contain the solution of one scene; quantities not requested are None.
 
     The attitude is a unit quaternion, scalar first. The state-transition matrix has, row by row,
     the derivatives of omega and of the unnormalised quaternion with respect to omega at time 0.
@@ -41,10 +41,7 @@ class Enclosure:
         return max((rounded_up(each.radius) for each in self.omega), default=0.0)
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return a dictionary for JSON for each time.
-
-        Middles are decimal strings; radii include their rounding errors.
-        """
+        """Return a dictionary for JSON for each time."""
         rows = []
         for n, time in enumerate(self.time):
             row = row_of(time, self.omega[n])
@@ -95,7 +92,7 @@ def rounded_up(x: Fraction) -> float:
 def largest_radius(omega: Sequence[Balls], digits: int) -> Fraction:
     """Return the largest ratio of a ball's radius to the allowed radius.
 
-    The allowed radius is 10**-digits times the larger of 1 rad/s and the ball's largest component.
+    The latter is 10**-digits times the larger of 1 rad/s and the ball's largest component.
     """
     largest = Fraction(0)
     for middle, radius in omega:
@@ -122,8 +119,8 @@ def scales_of(coefficients: Sequence[Fraction]) -> list[float]:
     """Return the units in which proofs measure errors of the components of omega.
 
     They are the square roots of abs(A), abs(B), abs(C) over the largest of these, but at least
-    0.01. If all are above 0.01, the logarithmic norm of the Jacobian is 0 for rotations about the
-    axes of the largest and the smallest moment.
+    0.01. If all are above 0.01, the Jacobian's logarithmic norm is 0 for rotations about the axes
+    of largest and smallest moment.
     """
     sizes = [abs(x) for x in coefficients]
     largest = max(sizes) or Fraction(1)

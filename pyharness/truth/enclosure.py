@@ -1,4 +1,4 @@
-"""Proved enclosures: balls (intervals, given by middle and radius) that contain the solution.
+"""Proved enclosures: balls (intervals with middle and radius) that contain the solution.
 
 Torque-free motion is enclosed in closed form (`enclosure_free`), motion under torques of time alone
 by Taylor steps in integers (`certificate`), other motion by Taylor steps in balls
@@ -41,11 +41,11 @@ def enclose(
     `times` (s) lead away from 0 on one side. A radius of omega is at most 10**-digits times the
     larger of 1 rad/s and the largest component of omega (initial omega, in closed form). `velocity`
     adds the translational velocity (m/s), `transition` the state-transition matrix. The attitude,
-    and the energy of a body with moments, are included. `progress` receives the completed
-    percentage, 100, and the time as text. `effort` is a factor on the work limit.
+    and the energy of a body with moments, are included. `progress` receives the percentage, 100,
+    and the time as text. `effort` is a factor on the work limit.
 
-    Raise InputError if `digits` is not from 1 to 1000, the times are not in order, python-flint is
-    missing, the torque isn't recorded, or no enclosure is found within the limit.
+    Raise InputError if `digits` is not from 1 to 1000, times are not in order, python-flint is
+    missing, the torque isn't recorded, or the limit is exceeded.
     """
     checked_scene(scene, True, True, True, True)
     if not 1 <= integer("digits", digits) <= MOST_DIGITS:

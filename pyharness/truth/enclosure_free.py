@@ -2,7 +2,7 @@
 
 Omega is given by Jacobi's elliptic functions, the attitude by a theta function (Jacobi 1850;
 Whittaker, Analytical Dynamics, section 69). Formulas are chosen by exact comparison of fractions,
-not of balls (intervals).
+not of balls.
 """
 
 import math
@@ -31,7 +31,6 @@ def enclose_free(
     With `attitude`, four more balls contain the unit quaternion from body to space, scalar first
     and continuous in time. Each radius is at most 10**-`digits`, for omega times the larger of 1
     rad/s and the largest initial component. The motion must be bounded; an attitude needs moments.
-    Raise InputError if 20 000 bits do not suffice.
     """
     scale = max(Fraction(1), *(abs(Fraction(w)) for w in scene.omega))
     bits = min(64 + math.ceil(digits * math.log2(10)), _MOST_BITS)
@@ -162,9 +161,9 @@ def carlson(x: Fraction, y: Fraction, z: Fraction) -> arb:
 class _Attitude:
     """The attitude along an orbit.
 
-    In the body, let n be the direction of the angular momentum L, and e that of the axis of dn.
-    Then n e = c dn(u) with c > 0. The attitude is the product of a constant rotation, the rotation
-    by psi about e, and the smallest rotation from n to e.
+    In the body, let n be the direction of the angular momentum L, and e the axis of dn. Then n e =
+    c dn(u) with c > 0. The attitude is the product of a constant rotation, the rotation by psi
+    about e, and the smallest rotation from n to e.
 
     Euler's equations give psi' = (2 T/|L| + omega e)/(1 + n e), with the kinetic energy T. Like dn,
     psi' has the periods 2K and 4iK' in complex u. Its poles, where dn(u) = -1/c, are at u = 2iK' +

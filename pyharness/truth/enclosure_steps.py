@@ -1,6 +1,6 @@
 """Proved enclosures of the solution of any scene with a recorded torque, by Taylor steps.
 
-In each step a polynomial p approximates the solution of y' = f(t, y). Any p is allowed, because its
+In each step a polynomial p approximates the solution of y' = f(t, y). Any p is allowed, as its
 residual p' - f(t, p) is bounded on the whole step in ball (interval) arithmetic.
 
 The unknowns form blocks, such as omega and attitude. The norms of the blocks of y - p form the
@@ -62,7 +62,7 @@ def enclose_steps(
     """Return balls that contain the solution of a scene at `times` (s).
 
     The arguments are those of `enclosure.enclose`. Raise InputError if the torque isn't recorded,
-    or no enclosure is found within the limit of steps.
+    or too many steps are needed.
     """
     limit = _MOST_STEPS * checked_effort(effort)
     wanted = float(digits + 2)

@@ -1,9 +1,9 @@
 """Attitude of a torque-free body at any time in decimals.
 
 In each period of omega the body rotates about the angular momentum by the same angle, so that
-Taylor series integrate only one period. Near the separatrix, errors of omega grow exponentially;
-each segment of the period therefore starts from the omega of `elliptic.py`. No code is shared with
-the closed form that is checked.
+Taylor series integrate only one. Near the separatrix, errors of omega grow exponentially; each
+segment therefore starts from the omega of `elliptic.py`. No code is shared with the checked closed
+form.
 """
 
 import decimal
@@ -31,8 +31,8 @@ def free_attitude(scene: Scene, time: float) -> Row:
     """Return the attitude of a scene without torque at `time` (s), as a unit quaternion.
 
     Its sign is continuous in time. The scene must have moments and an attitude. On the separatrix,
-    where omega has no period, the motion is integrated until omega is constant to all digits. Raise
-    InputError if the integration is too long, or the torque depends on the state.
+    without a period, the motion is integrated until omega is constant to all digits. Raise
+    InputError if this takes too long.
     """
     checked_scene(scene)
     assert scene.attitude is not None

@@ -2,7 +2,7 @@
 
 It shares no code with `truth/reference.py`. Numbers are integers over 2**BITS, in units in which
 the last time is 1 and the largest omega about 1. The torque's sines and cosines are further
-unknowns, so that no library function is needed.
+unknowns, without library functions.
 """
 
 from collections.abc import Sequence

@@ -1,8 +1,8 @@
 """Reference solutions of scenes, with estimates of their errors.
 
-A sphere, and a symmetric body without torque, have a closed form. Any other scene is solved by
-Taylor series of equations 13-15 of the thesis in decimals, with exact Euler coefficients. No code
-is shared with the methods that are checked.
+A sphere, and a symmetric body without torque, have a closed form. Other scenes are solved by Taylor
+series of equations 13-15 of the thesis in decimals, with exact Euler coefficients. No code is
+shared with the checked methods.
 """
 
 import decimal
@@ -72,7 +72,7 @@ def reference(
 
     The estimated error is the largest difference of two integrations with different orders and
     steps, times four if `precise`. A `precise` series has an error of at most 1e-25 before
-    rounding, unless errors are amplified too much. Attitudes are always computed by the series.
+    rounding, unless errors are amplified too much. Attitudes always come from the series.
 
     `effort` is a factor on a work limit of some ten seconds; None means 100 000 steps. A torque
     that depends on the state must be recorded; the rows end before it becomes singular. Raise
@@ -121,7 +121,7 @@ def reference(
 def check_order(times: Sequence[float], who: str) -> None:
     """Raise InputError unless times are finite, of one sign, and lead away from 0.
 
-    The first time may be 0. `who` names the computation in the message.
+    The first may be 0. `who` names the computation.
     """
     if not all(map(math.isfinite, times)):
         raise InputError(f"{who}: a time is not finite; allowed: finite numbers, in seconds")
@@ -151,7 +151,7 @@ def _check_torque(scene: Scene) -> None:
 def known_solution(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
     """Return omega (rad/s) of a sphere or torque-free symmetric body in closed form, else None.
 
-    Omega has as many decimals as the precision of the decimal context.
+    It has as many decimals as the decimal context.
     """
     if isinstance(scene.torque, StateTorque) or scene.changing is not None:
         return None

@@ -1,4 +1,4 @@
-"""Taylor coefficients, in decimal arithmetic, of a torque that is recorded on a tape.
+"""Taylor coefficients, in decimal arithmetic, of a recorded torque.
 
 A tape is a list of operations, whose results are in numbered slots. The coefficients are computed
 order by order with those of the solution (Jorba and Zou 2005, Experimental Mathematics 14).
@@ -58,8 +58,8 @@ class TapeSeries:
 
     `begin` starts an expansion, and each `next` adds a coefficient to all series. Terms of sums are
     multiplied by 1 plus or minus `change`, which shows the effect of rounding. The caller sets
-    `results`, the results of switches by slot. `least_order` is the lowest order that loses no
-    product whose factors are 0 at that time.
+    `results`, those of switches by slot. `least_order` is the lowest order that loses no product
+    whose factors are 0 at that time.
     """
 
     def __init__(
@@ -108,8 +108,7 @@ class TapeSeries:
     def next(self) -> Row:
         """Return the next Taylor coefficient, from number 0, of each of the three outputs.
 
-        The unknowns must have the coefficient of the same number. Raise ArithmeticError if an
-        operation is singular.
+        The unknowns must already have this coefficient. Raise ArithmeticError at a singularity.
         """
         k = self._order
         if k > 0:
@@ -213,8 +212,8 @@ class TapeSeries:
         An exponential, or the derivative of a hyperbolic tangent, may be negligible at the
         beginning of a step and large a little later. Its argument may therefore change by at most
         half the order, unless the function remains negligible. The mean order of a product's terms,
-        weighted by magnitude, is limited likewise. The step must be shorter than the distance to
-        any zero of a divisor.
+        weighted by magnitude, is limited likewise, and the step to the distance of any zero of a
+        divisor.
         """
         for _, operation in self._live_operations():
             most = self._largest_change(operation)
@@ -231,7 +230,7 @@ class TapeSeries:
         return length
 
     def _is_hidden(self, power: _Power, length: Decimal) -> bool:
-        """Return whether a product may matter in a step, although its computed terms do not."""
+        """Return whether a product may matter in a step although its terms do not."""
         # The mean order of the product's terms, weighted by magnitude, is the sum of those of its
         # factors.
         (factors, size, slots), order = power, Decimal(0)
@@ -259,14 +258,14 @@ class TapeSeries:
         return max(Decimal(self._order) / 2, 2 * abs(x) - _INVISIBLE) / 2
 
     def next_change(self, time: Decimal, forward: bool) -> Decimal | None:
-        """Return the time (s) at which a table changes next, or changed last unless `forward`."""
+        """Return the time (s) of a table's next change or, unless `forward`, its last."""
         place = (bisect_right if forward else bisect_left)(self._changes, time) - (not forward)
         return self._changes[place] if 0 <= place < len(self._changes) else None
 
     def crosses_a_branch(self, offset: Decimal) -> bool:
         """Return whether a square root reaches 0 within `offset` (s) of the expansion's time.
 
-        Beyond a double zero, the series is the negative of the root, as for sqrt(x**2).
+        Beyond it the series may be the root's negative, as for sqrt(x**2).
         """
         for slot, operation in self._live_operations():
             if operation.kind == "sqrt":

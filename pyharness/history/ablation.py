@@ -39,8 +39,8 @@ for _a in "abcd":
 class Effect:
     """The outcome of one program version (`listing`) on one scene.
 
-    `omega` (rad/s) and `velocity` (m/s) are the largest errors over the completed `steps`, and
-    `common` both errors over the steps that all compared listings completed.
+    `omega` (rad/s) and `velocity` (m/s) are the largest errors over the completed `steps`, `common`
+    those over the steps that all compared listings completed.
     """
 
     listing: Listing
@@ -69,7 +69,7 @@ class CaseEffects:
 
 
 def entries(kind: str | None = None) -> list[dict[str, Any]]:
-    """Return the apparatus entries of one kind, or all; raise InputError for an unknown kind."""
+    """Return the apparatus entries of one kind, or all."""
     everything: list[dict[str, Any]] = facts("apparatus")["entry"]
     kinds = sorted({entry["kind"] for entry in everything})
     if kind is not None and kind not in kinds:
@@ -78,7 +78,7 @@ def entries(kind: str | None = None) -> list[dict[str, Any]]:
 
 
 def entry(name: str) -> dict[str, Any]:
-    """Return the apparatus entry `name`; raise InputError if there is none."""
+    """Return the apparatus entry `name`."""
     by_name = {each["id"]: each for each in entries()}
     if name not in by_name:
         raise unknown("entry", name, list(by_name))
@@ -106,7 +106,7 @@ def case_truth(case: int) -> Reference:
 def effects_of(name: str) -> Iterator[CaseEffects]:
     """Yield the effects of an apparatus entry in each of its programs and every case.
 
-    The version `original` has the entry, even if the original listing lacks it.
+    `original` always has the entry.
     """
     known = entry(name)
     for program in known["programs"]:
@@ -123,8 +123,8 @@ def lattice(
 ) -> list[Effect]:
     """Return the outcomes with every subset of a program's defects, largest `common` error first.
 
-    The `readings` of doubtful lines and, under varying torque, conjectures on missing lines vary
-    too. A reading has no effect if a defect in the same statement is corrected.
+    `readings` and, under varying torque, conjectures vary too. A reading has no effect if a defect
+    in the same statement is corrected.
     """
     check_steps(scene, program, "fortran", effort)
     truth = reference(scene, scene.times(), velocity=True, effort=effort)
@@ -141,7 +141,7 @@ def lattice(
 
 
 def switched(scene: Scene, program: str) -> tuple[str, ...]:
-    """Return a program's defects and, under varying torque, conjectures on missing lines."""
+    """Return a program's defects and, under varying torque, conjectures."""
     return switches(program) if scene.torque.varies else names_of("defect", program)
 
 

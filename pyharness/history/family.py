@@ -1,9 +1,9 @@
-"""The weighted residual methods in sections III.1 and IV.2 of the thesis, and their orders.
+"""The thesis's weighted residual methods (sections III.1 and IV.2), and their orders.
 
 One step of length h solves omega' = f(t, omega) (eq. 16-18) with a polynomial trial function
-omega(0) + c1 t + ... + cn t**n. The first estimate assumes constant f. Each correction evaluates f
-along the previous estimate, and chooses c1, ..., cn so that the integrals of W (omega' - f) over
-the step vanish for n weight functions W (eq. 26). The thesis makes one correction.
+omega(0) + c1 t + ... + cn t**n. The first estimate assumes constant f. Each correction (the thesis
+makes one) evaluates f along the previous estimate, and chooses c1, ..., cn so that the integrals of
+W (omega' - f) over the step vanish for n weight functions W (eq. 26).
 """
 
 import math
@@ -57,7 +57,7 @@ class Member:
 
     Least squares has the weight functions i t**(i-1), the derivatives of the residual by ci for
     constant f (eq. 25). `points`, for collocation only, are fractions of the step: "thesis" for
-    k/(n+1), k = 1 to n; "gauss" for the Gauss-Legendre points; or n different numbers from 0 to 1.
+    k/(n+1), k = 1 to n; "gauss" for Gauss-Legendre; or n different numbers from 0 to 1.
     """
 
     weighting: str = "collocation"
@@ -66,7 +66,7 @@ class Member:
     corrections: int = 1
 
     def __post_init__(self) -> None:
-        """Raise InputError for wrong fields; set the default points."""
+        """Check the fields; set the default points."""
         if self.weighting not in WEIGHTINGS:
             raise unknown("weighting", self.weighting, WEIGHTINGS)
         if not 1 <= self.terms <= MOST_TERMS:
@@ -133,10 +133,10 @@ def predicted_order(member: Member) -> int:
 
 
 def run(scene: Scene, member: Member) -> Trajectory:
-    """Integrate a scene by a weighted residual method (Jacobs 1982, III.1, eq. 20-27, and IV.2).
+    """Integrate a scene by a weighted residual method (Jacobs 1982, eq. 20-27, and IV.2).
 
-    The first estimate uses the torque at the beginning of the step, corrections that at their
-    nodes. The rounding error of a step is about one unit in the last place of omega.
+    The first estimate uses the torque at the beginning of the step, corrections at their nodes. A
+    step's rounding error is about one unit in the last place of omega.
     """
     omega = integrate(scene, [member])[0]
     rows = int(np.logical_and.accumulate(np.isfinite(omega).all(axis=1)).sum())
@@ -151,7 +151,7 @@ def run(scene: Scene, member: Member) -> Trajectory:
 def integrate(scene: Scene, members: Sequence[Member]) -> Array:
     """Return omega (rad/s) by each method, shape (members, steps, 3).
 
-    Values after an overflow are not finite.
+    They are not finite after an overflow.
     """
     # The members are sorted, so that those that need another correction are contiguous in memory.
     order = sorted(range(len(members)), key=lambda i: -members[i].corrections)
@@ -233,9 +233,8 @@ def _torque(scene: Scene, times: Array) -> Array:
 class OrderFinding:
     """A method's derived and measured order of convergence in a scene, and its error.
 
-    `measured` is None if too many errors are too large or only rounding. It is `settled` if the
-    last two measurements differ by at most 0.1. `error` (rad/s) is that of omega with the scene's
-    step size.
+    `measured` is None if too many errors are too large or only rounding, and `settled` if the last
+    two measurements differ by at most 0.1. `error` (rad/s) is omega's with the scene's step size.
     """
 
     member: Member
@@ -265,7 +264,7 @@ def order_table(
 ) -> list[OrderFinding]:
     """Return order of convergence and error of each method, by default of `family_members`.
 
-    Raise InputError if the solution is unbounded or the scene has more than `MOST_STEPS` steps.
+    The solution must be bounded, and the scene have at most `MOST_STEPS` steps.
     """
     if scene.steps > MOST_STEPS:
         raise InputError(f"steps is {scene.steps}; allowed for orders: 1 to {MOST_STEPS}")
@@ -362,7 +361,7 @@ def _finding(found: Sequence[OrderFinding]) -> list[str]:
 
 
 def verdict(found: Sequence[OrderFinding]) -> list[str]:
-    """Return a sentence for each order below the derived one, or one sentence for all orders."""
+    """Return a sentence for each order below the derived one, or one for all."""
     unexpected = _unexpected(found)
     if unexpected:
         return [f"UNEXPECTED: {each}" for each in unexpected]

@@ -51,7 +51,7 @@ _END: dict[str, Any] = {
 class FigurePlan:
     """The plan of a redrawn figure of the thesis.
 
-    `source` is the passage of the thesis that supports the choice of programs; `caption` is ours.
+    `source` is the passage that supports the choice of programs; `caption` is ours.
     """
 
     number: int
@@ -218,8 +218,8 @@ def figure_picture(finding: FigureFinding) -> Picture:
 def together_picture(first: FigureFinding, second: FigureFinding) -> Picture:
     """Return one picture of omega1 in an original and a corrected figure.
 
-    The limit in `first` continues a run that ended early. Of `second`, whose curves coincide, only
-    the last is drawn.
+    The limit in `first` continues a run that ended early. Of `second`'s coincident curves, only the
+    last is drawn.
     """
     from matplotlib.figure import Figure
 

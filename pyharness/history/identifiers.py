@@ -1,7 +1,7 @@
 """Software Heritage identifiers (SWHIDs) of the edition, and a digest of its text.
 
-A SWHID (ISO/IEC 18670) contains git's SHA-1 hash of a file or folder. The archive Software Heritage
-finds its copies by SWHID.
+A SWHID (ISO/IEC 18670) contains git's SHA-1 hash of a file or folder, by which the archive Software
+Heritage finds its copies.
 """
 
 import json
@@ -35,10 +35,7 @@ def directory_identifier(files: Mapping[str, bytes]) -> str:
 
 @cache
 def source_files() -> dict[str, bytes]:
-    """Return the files of the edition's data and of the Fortran port, by repository path.
-
-    An installed package has some of them elsewhere.
-    """
+    """Return the files of the edition's data and of the Fortran port, by repository path."""
     folder = facts_folder()
     found = {
         f"{DATA}/{file.relative_to(folder).as_posix()}": file.read_bytes()
@@ -94,7 +91,7 @@ def _tree(files: Mapping[str, bytes]) -> bytes:
 
 
 def text_digest(table: Callable[[str], Mapping[str, Any]] = facts) -> str:
-    """Return the text's digest for citations: 12 hexadecimal digits of the SHA-256 of `TABLES`."""
+    """Return the text's digest: 12 hexadecimal digits of the SHA-256 of `TABLES`."""
     told = {name: table(name) for name in TABLES}
     text = json.dumps(told, ensure_ascii=False, sort_keys=True, separators=(",", ":"))
     return sha256(text.encode()).hexdigest()[:12]

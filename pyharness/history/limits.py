@@ -1,8 +1,8 @@
 """The limits of the original programs as the step size goes to zero.
 
-An original program may converge to the solution of Euler's equations, to another function of time,
-or to no function (docs/article/article.md). Each limit is computed independently of the program,
-and compared with runs at halved step sizes. `effort` multiplies the work limit.
+An original program may converge to the solution of Euler's equations, to another function, or to
+none (docs/article/article.md). Each limit is computed independently of the program, and compared
+with runs at halved step sizes. `effort` multiplies the work limit.
 """
 
 import math
@@ -63,8 +63,8 @@ class Halving:
 class Limit:
     """The convergence of an original program to its limit as the step size goes to zero.
 
-    `order` is measured with the last two step sizes. It is None after an overflow, with mere
-    rounding errors, without a limit, or if the limit is unbounded at the time `blow_up` (s).
+    `order`, from the last two step sizes, is None after an overflow, with mere rounding errors,
+    without a limit, or if the limit is unbounded at the time `blow_up` (s).
     """
 
     program: str
@@ -87,8 +87,7 @@ class Limit:
 def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) -> Limit:
     """Return the convergence of an original program, run without stop test, to its limit.
 
-    Under varying torque only the Runge-Kutta program has a limit. Raise InputError if the work
-    limit is exceeded.
+    Under varying torque only the Runge-Kutta program has a limit.
     """
     times = scene.times()
     truth = reference(scene, times, effort=effort)
@@ -208,7 +207,7 @@ def _solved(
 
 
 def invisible(scene: Scene) -> dict[str, tuple[str, ...]]:
-    """Return, by program, the defects whose correction alone changes omega only by rounding."""
+    """Return, by program, defects whose correction alone changes omega only by rounding."""
     found = {}
     for program in PROGRAMS:
         before = run_program(scene, Listing.original(program))

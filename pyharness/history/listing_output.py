@@ -20,7 +20,7 @@ _LARGEST = 1 << 24  # bytes of a page's file
 
 
 def read_page(path: str) -> list[list[str]]:
-    """Return a page's lines of numbers; raise InputError if no line has at least six numbers."""
+    """Return a page's lines of numbers, of which one must have at least six."""
     where = f"--listing-output '{path}'"
     content = read_input(path, where, _LARGEST, "what a program printed to TAPE6")
     found = printed_numbers(content.decode("ascii", "replace"))
@@ -39,9 +39,8 @@ def fits(
 ) -> list[Fit]:
     """Return the comparisons of a page with our pages of the same form, nearest first.
 
-    Pages have the same form if moments and torques in the heading, and the number of columns,
-    agree. Our runs have the steps of the thesis's text or, if the page is longer, of the cards.
-    Raise InputError if none of our pages has the form.
+    Pages of the same form agree in moments, torques and number of columns. Our runs have the steps
+    of the thesis's text or, if the page is longer, of the cards.
     """
     found: list[Fit] = []
     listings = {program: listings_of(program) for program in programs}

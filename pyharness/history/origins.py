@@ -16,10 +16,9 @@ from pyharness.thesis.collation import names_a_card, rows
 class Disagreement(NamedTuple):
     """A disagreement of the decks with each other or with the thesis, and its supposed origin.
 
-    `steps` are operations in `data/cards/collation.toml`, `equations` formulas of the thesis,
-    `where` the place that `says` quotes. `cards` quotes cards by program and number. `known`
-    follows from the sources; `suggests` and `origin` are our inferences. `unnoticed` tells why the
-    test cases do not show the fault.
+    `steps` are operations in `data/cards/collation.toml`, `where` is the place that `says` quotes.
+    `cards` quotes cards by program and number. `known` follows from the sources; `suggests` and
+    `origin` are our inferences. `unnoticed` tells why the test cases do not show the fault.
     """
 
     id: str

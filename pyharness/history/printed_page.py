@@ -1,8 +1,8 @@
 """Compare a page that a machine printed with the pages of our programs.
 
-The module, which needs only Python's standard library, is also the script `machine/judge.py` in the
-data package. The exit status of ``python judge.py FILE`` is 0 if one of our pages is equal, 1 if
-all differ, and 2 if FILE is unreadable or has no page of this form.
+The module needs only Python's standard library, and is also the data package's `machine/judge.py`.
+``python judge.py FILE`` has the exit status 0 if one of our pages is equal, 1 if all differ, and 2
+if FILE is unreadable or has no page of this form.
 """
 
 import csv
@@ -121,7 +121,7 @@ def stored_fits(lines: Sequence[Sequence[str]], folder: Path) -> list[Fit]:
 
 
 def verdict(path: str, found: Sequence[Fit]) -> list[str]:
-    """Return lines that name our pages equal to that in file `path`, or the nearest page."""
+    """Return lines that name our pages equal to file `path`, or the nearest."""
     whole = [each for each in found if each.is_whole]
     said = "printed so by" if whole else "by none; the nearest is"
     return [f"{path}: {said} {each.name}" for each in whole or found[:1]]

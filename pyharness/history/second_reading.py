@@ -1,8 +1,8 @@
 """An estimate of the remaining transcription errors, by capture and recapture.
 
-The first reading of the scan is our text of the cards, the second that of a random sample
-(`data/cards/second-reading.toml`). A misreading is an error of the scanned text. The numbers of
-misreadings that each reading corrects, and that both correct, give an estimate of the others.
+The first reading of the scan is our text of the cards, the second is of a random sample
+(`data/cards/second-reading.toml`). The numbers of errors of the scanned text that each corrects,
+and that both correct, give an estimate of the others.
 """
 
 from collections.abc import Iterator
@@ -33,17 +33,16 @@ class ReadCard(NamedTuple):
 
 
 def chapman(first: int, second: int, both: int) -> float:
-    """Return Chapman's estimate of a population's size from two samples and their overlap."""
+    """Return Chapman's estimate of a population's size."""
     return (first + 1) * (second + 1) / (both + 1) - 1
 
 
 def recapture_interval(first: int, second: int, both: int) -> tuple[int, int]:
     """Return the limits of the 95 % confidence interval of a population's size.
 
-    `first` and `second` are the sizes of two independent samples, `both` is the number of common
-    members. A size is in the interval if the probabilities of at most and of at least `both` common
-    members, by the hypergeometric distribution, are 0.025 or more. Raise ValueError if `both` is 0:
-    there is no upper limit.
+    `first` and `second` are the sizes of two independent samples with `both` common members, at
+    least 1. A size is in the interval if the hypergeometric probabilities of at most and of at
+    least `both` common members are 0.025 or more.
     """
     if both < 1:
         raise ValueError("both must be positive")
@@ -97,7 +96,7 @@ def misread_places(scan: str, reading: str) -> dict[int, str]:
 def recaptures() -> Table:
     """Return the table of estimates, with characters and with whole cards as units.
 
-    Only cards are independent units, because a machine repeats its misreading of a letter.
+    Only cards are independent, because a machine repeats its misreading of a letter.
     """
     places: tuple[set[tuple[str, int]], ...] = (set(), set())
     for each in read_cards():
@@ -113,7 +112,7 @@ def recaptures() -> Table:
 
 
 def disagreeing() -> list[ReadCard]:
-    """Return the cards of the sample that the two readings read differently."""
+    """Return the cards on which the readings differ."""
     return [each for each in read_cards() if each.first != each.second]
 
 

@@ -7,8 +7,8 @@ Its elements are:
 - `fw`: a heading added by an editor;
 - `surplus`: text that belongs to no card.
 
-Cards are in the order of their numbers. To restore the scan's text, take the pages in the order of
-`n`, with their cards, `fw` and `surplus`, and each `rdg` instead of its `lem`.
+Cards are in the order of their numbers. The scan's text is the pages in the order of `n`, with
+their cards, `fw` and `surplus`, and each `rdg` for its `lem`.
 """
 
 from collections.abc import Iterable, Iterator

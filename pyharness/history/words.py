@@ -1,7 +1,6 @@
 """The effect of word length: runs with p significand bits, compared with binary64.
 
-An emulated arithmetic has p bits and a rounding rule. Printed pages are compared with those in
-binary64, omega with the reference solution.
+Printed pages are compared with those in binary64, omega with the reference solution.
 """
 
 from collections.abc import Iterator, Sequence
@@ -60,10 +59,9 @@ class WordRun(NamedTuple):
     """A run in one arithmetic, compared with binary64.
 
     `rule` is ``nearest-even``, ``chop`` (towards zero), or the CDC 6600's ``FX`` (unrounded) or
-    ``RX`` (rounded). `stop` has reason and step of an early end, as in ``V2 at 25``. The longer
-    printed page has `fields` numbers, of which `different` differ from the other page. `error` is
-    the largest error of omega (rad/s). `singular` counts the steps with a singular matrix (IER =
-    129).
+    ``RX`` (rounded). `stop` has reason and step of an early end, as in ``V2 at 25``. Of the longer
+    page's `fields` numbers, `different` differ. `error` is omega's largest error (rad/s).
+    `singular` counts the steps with a singular matrix (IER = 129).
     """
 
     case: int

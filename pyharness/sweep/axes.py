@@ -31,9 +31,9 @@ CHOICES = {
 class Field:
     """A number of a scene or solver that an axis may vary.
 
-    `allowed` describes what `takes` accepts. If `looped`, all scenes of a batch (solved in one
-    call) share the value; programs of the thesis may vary step size and Lipschitz constant. If
-    `whole`, values are rounded to integers.
+    `allowed` describes what `takes` accepts. If `looped`, all scenes of a batch (one call) share
+    the value; the thesis's programs may vary step size and Lipschitz constant. If `whole`, values
+    are rounded to integers.
     """
 
     units: str
@@ -149,9 +149,9 @@ _SAMPLE = "sample"
 class Axis:
     """One axis of a sweep's grid, which varies a `field` such as ``omega.1``.
 
-    Axes of the same `dimension` vary together. `values` has all values if `how` is `listed`,
-    the first and last for a spacing of `SPACINGS`, or the parameters of a distribution of
-    `DRAWS`, of which `seed` determines the values.
+    Axes of the same `dimension` vary together. `values` has all values if `how` is `listed`, the
+    first and last for a spacing of `SPACINGS`, or the parameters of a distribution of `DRAWS` with
+    the `seed`.
     """
 
     field: str
@@ -227,7 +227,7 @@ def check_name(what: str, name: object, allowed: Iterable[str], where: str = "")
 
 
 def axis_of(table: object, number: int) -> Axis:
-    """Return the axis of a file's table [[axis]] `number` (from 1); raise InputError if invalid."""
+    """Return the axis of a file's table [[axis]] `number` (from 1)."""
     where = f"[[axis]] {number}"
     if not isinstance(table, dict):
         raise InputError(f"{where} is {kind_of(table)}; it must be a table [[axis]]")

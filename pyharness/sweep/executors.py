@@ -39,7 +39,7 @@ _ADDRESS = re.compile(r"(?:(?:tcp|tls)://)?(?P<host>[\w.-]+|\[[\da-fA-F:.]+\]):(
 class Engine(NamedTuple):
     """A started executor.
 
-    `computed` takes a sweep and numbers of chunks. It yields each number, and an array for each
+    `computed` takes a sweep and numbers of chunks. It yields each number, with an array for each
     stored quantity.
     """
 
@@ -54,9 +54,9 @@ def engine(
 ) -> Iterator[Engine]:
     """Start the executor ``here``, ``processes`` or ``dask``, and yield it as an Engine.
 
-    ``dask`` uses the scheduler at `address`, as in ``tcp://host:8786``, or starts a local
-    cluster. Raise InputError if no scheduler with a worker answers; `computed` raises it if
-    workers die repeatedly.
+    ``dask`` uses the scheduler at `address`, as in ``tcp://host:8786``, or a local cluster. Raise
+    InputError if no scheduler with a worker answers; `computed` raises it if workers die
+    repeatedly.
     """
     if executor == "here":
         yield Engine(1, _solve_here, is_here=True)
@@ -127,7 +127,7 @@ def _by_pool(sweep: Sweep, chunks: list[int], workers: int) -> Results:
 def deaf_children() -> Iterator[None]:
     """Block Ctrl-C in this thread, and in processes and threads started within this context.
 
-    A terminal sends SIGINT to all its processes, but only the parent should react.
+    Only the parent should react to a terminal's SIGINT.
     """
     # Children inherit a blocked signal. Python would start the resource tracker with the first
     # child, and then unblock the signal.

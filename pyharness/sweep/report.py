@@ -36,8 +36,7 @@ _FLAGS = (*words("reduction value"), Column("scenes"))
 class Found(NamedTuple):
     """Statistics of one component of a stored quantity, in `units`.
 
-    `scenes` counts scenes with a value, `none` the others. Without values, `least`, `mean` and
-    `largest` are None.
+    `scenes` counts scenes with a value, `none` the others.
     """
 
     name: str
@@ -147,7 +146,7 @@ Scale = tuple[float, float, bool]
 def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
     """Return the stored quantity `name`, by default the first whose values are numbers.
 
-    If all have outcome codes, the default is the first. Raise InputError for an unknown name.
+    If all have outcome codes, the default is the first.
     """
     names = [asked.name for asked in sweep.reductions]
     if name is not None and name not in names:
@@ -159,8 +158,8 @@ def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
 def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
     """Return the picture of a stored quantity over dimensions with several numbers.
 
-    Over the last two dimensions that are not random, it is a map. Over only one, it is a line,
-    or dots at listed values. Over a random one, it is dots.
+    It is a map over the last two dimensions that are not random; over only one, a line, or dots at
+    listed values; over a random one, dots.
     """
     from matplotlib.figure import Figure
 

@@ -43,7 +43,7 @@ class Estimate(NamedTuple):
 def forecast(sweep: Sweep, path: str, n_missing: int, own: Engine) -> float:
     """Return the time (s) to solve and write missing chunks, and to read all.
 
-    If other processes solve, only the longer of solving and writing counts.
+    If other processes solve, the longer of solving and writing counts.
     """
     write, read = seconds_of_files(sweep, path)
     solve = n_missing * seconds_per_chunk(sweep) / own.workers
@@ -78,7 +78,7 @@ def seconds_of_files(sweep: Sweep, path: str) -> tuple[float, float]:
 
 
 def _pattern(sweep: Sweep, chunk: int) -> Arrays:
-    """Return random results of a chunk; equal values would be written too fast."""
+    """Return random results of a chunk; equal ones would be written too fast."""
     draw = np.random.default_rng(chunk)
     shape = tuple(part.stop - part.start for part in sweep.box(chunk))
     found = {}
@@ -130,9 +130,8 @@ def seconds_per_scene(sweep: Sweep) -> float:
 def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
     """Return sample indices, changed so that many scenes share a batch (one call).
 
-    The scenes of a batch have equal indices along some dimensions. Along these, only five
-    distinct indices remain, or more if a chunk has small batches. Batches are then about as
-    large as in a chunk.
+    Along dimensions in which a batch has equal indices, five distinct ones remain, or more if a
+    chunk has small batches, so that batches are about as large as in a chunk.
     """
     shared = {axis.dimension for axis in sweep.axes if axis.field in looped_fields(sweep)}
     found, scenes = [], math.prod(sweep.chunk_shape)
@@ -157,8 +156,8 @@ _MOST_CHUNKS = 1_000_000
 class Outcome:
     """The outcome of one run of a sweep, whose computation took `seconds` (s).
 
-    `before` counts chunks of earlier runs, `computed` those of this run, and `repaired` those
-    of this run that had been damaged. `estimate` is None if no chunk was missing.
+    `before` counts chunks of earlier runs, `computed` those of this run, `repaired` those that had
+    been damaged. `estimate` is None if no chunk was missing.
     """
 
     estimate: Estimate | None
@@ -169,10 +168,7 @@ class Outcome:
 
 
 def check_size(sweep: Sweep, path: str, workers: int, missing: int) -> tuple[int, int]:
-    """Return the sizes (bytes) of the missing chunks on disk, and of all workers in memory.
-
-    Raise InputError if the disk or half of the memory is too small, or for too many chunks.
-    """
+    """Return the sizes (bytes) of the missing chunks on disk, and of all workers in memory."""
     disk = os.statvfs(Path(path).absolute().parent)
     scenes = math.prod(sweep.chunk_shape)
     sizes = [scenes * empty(asked, 1).nbytes for asked in sweep.reductions]
@@ -230,13 +226,13 @@ def swept(
 ) -> Iterator[tuple[Store, Outcome]]:
     """Compute the chunks that a sweep's store lacks; yield the open store and the outcome.
 
-    The store's folder `path` is made if missing, and locked until the context ends. `executor`,
-    `workers` and `address` are as in `executors.engine`. `before` receives the forecast.
-    `progress` is True for a bar, or a function called after each chunk. With `repair`, damaged
-    chunks and metadata are made again.
+    The folder `path` is made if missing, and locked until the context ends. `executor`, `workers`
+    and `address` are as in `executors.engine`. `before` receives the forecast. `progress` is True
+    for a bar, or a function called after each chunk. With `repair`, damaged chunks and metadata are
+    made again.
 
-    Raise InputError if the store belongs to another sweep or is damaged, if no cluster answers,
-    or if disk or memory is too small. Computed chunks remain in the store.
+    Raise InputError if the store is damaged or another sweep's, no cluster answers, or disk or
+    memory is too small. Computed chunks remain.
     """
     is_there = check_store(sweep, path)
     check_size(sweep, path, workers or 1, 0 if is_there else sweep.n_chunks)

@@ -1,7 +1,7 @@
 """The store of a sweep: a Zarr group in a folder, with one array for each reduction.
 
 A chunk of the grid has a file for each array, and one of their checksums. Each is written under a
-temporary name and then renamed, the checksums last; so a chunk with checksums is complete.
+temporary name and then renamed, the checksums last.
 """
 
 import contextlib
@@ -94,7 +94,7 @@ class Store:
     def write(self, chunk: int, found: Arrays) -> None:
         """Write a chunk's results and checksums.
 
-        Raise OSError if a file can't be written; the chunk then remains incomplete.
+        After an OSError the chunk remains incomplete.
         """
         for name, array in self._arrays.items():
             array[self.sweep.box(chunk)] = found[name]
@@ -140,7 +140,7 @@ def opened(sweep: Sweep, path: str, repair: bool = False) -> Iterator[Store]:
     """Make or open a sweep's store, lock it, check it, and yield it.
 
     Raise InputError, without changing files, if `path` is locked, damaged, or another sweep's
-    store. With `repair`, instead remove damaged chunks and rewrite damaged metadata.
+    store. With `repair`, remove damaged chunks and rewrite damaged metadata.
     """
     check_zarr()
     folder = Path(path)
@@ -172,10 +172,7 @@ def opened(sweep: Sweep, path: str, repair: bool = False) -> Iterator[Store]:
 
 
 def check_store(sweep: Sweep, path: str) -> bool:
-    """Return whether `path` is this sweep's store; False for a missing or empty folder.
-
-    Raise InputError for any other file or folder, or if the folder can't be made.
-    """
+    """Return whether `path` is this sweep's store; False for a missing or empty folder."""
     folder = Path(path)
     if not path or "\0" in path:
         raise InputError(f"--out '{path}': give a folder, which is made if it is missing")

@@ -1,8 +1,7 @@
 """Layout of a sweep's store: arrays, metadata, identity, and checksums of files.
 
-`sha256sum --check` can read a file of checksums. Its first line names the version of pyharness, the
-sweep and the part of the store, so that a foreign file is detected. The argument `folder` is the
-store's folder, and `name` a path in it.
+`sha256sum --check` can read a file of checksums. Its first line names version, sweep and part of
+the store, to detect a foreign file. `folder` is the store's folder, `name` a path in it.
 """
 
 import contextlib
@@ -48,7 +47,7 @@ def checksum_text(label: Label, part: str, folder: Path, names: Sequence[str], l
     """Return the content of a checksum file for the files `names`.
 
     `part` is their part of the store, as "chunk 0/1". Raise DamageError for a file that is
-    unreadable, not regular, or above `limit` bytes.
+    unreadable or above `limit` bytes.
     """
     identity = f"schema {label.schema}, version {label.version}, sweep {label.fingerprint}"
     lines = [f"# pyharness sweep store, {identity}, {part}"]

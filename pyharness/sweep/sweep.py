@@ -1,4 +1,4 @@
-"""The data of a sweep, a grid of scenes: scene, axes, solver, reductions, and chunks.
+"""The data of a sweep: scene, axes of the grid, solver, reductions and chunks.
 
 A reduction is a quantity stored for each scene. A chunk, numbered from 0, is a block of the grid
 that is solved and stored at once.
@@ -38,8 +38,7 @@ class Sweep:
     """A sweep as a sweep file describes it.
 
     `scene` supplies what no axis varies. `chunk` is the largest number of scenes in a chunk.
-    `text` is the content of the sweep file; `fingerprint` is the SHA-256 of `text` and of its
-    scene file.
+    `fingerprint` is the SHA-256 of the sweep file's `text` and its scene file.
     """
 
     name: str
@@ -70,9 +69,8 @@ class Sweep:
     def chunk_shape(self) -> tuple[int, ...]:
         """Return the number of scenes of a chunk along each dimension.
 
-        A chunk covers as many of the last dimensions as fit, and part of the dimension
-        before them. It has length 1 along programs, methods, listings and readings, so that
-        its scenes share a solver.
+        A chunk covers as many of the last dimensions as fit, and part of the one before. It has
+        length 1 along programs, methods, listings and readings, so that its scenes share a solver.
         """
         single = {axis.dimension for axis in self.axes if axis.is_choice}
         room = self.chunk
@@ -129,7 +127,7 @@ def spread(sweep: Sweep, count: int) -> list[Indices]:
 
 
 def value_columns(sweep: Sweep, where: list[Indices]) -> dict[str, NDArray[Any]]:
-    """Return the values of each varied field, such as ``omega.1``, in the scenes of `where`."""
+    """Return each varied field's values, as of ``omega.1``, in the scenes of `where`."""
     at = dict(zip(sweep.dimensions, where, strict=True))
     return {axis.field: axis.coordinates()[at[axis.dimension]] for axis in sweep.axes}
 
@@ -137,7 +135,7 @@ def value_columns(sweep: Sweep, where: list[Indices]) -> dict[str, NDArray[Any]]
 def groups(columns: list[NDArray[Any]], n: int) -> list[tuple[Indices, tuple[Any, ...]]]:
     """Return the groups of indices 0 to n - 1 with equal values in all columns.
 
-    Each group has its indices, ascending, and its values. Without columns there is one group.
+    Each has its ascending indices and its values.
     """
     if not columns:
         return [(np.arange(n), ())]

@@ -1,9 +1,9 @@
 """The cards of the three programs, in our text and in the scan of the thesis.
 
 A card is a line of a printed program, a deck the cards of one program. `data/cards` has the decks,
-the scan's pages, and each card's lines in the Python port (the twin). Comments in the Fortran port
+the scan's pages, and each card's lines in the Python port (the twin); comments in the Fortran port
 name the cards of each line. A line of the scan has card number, dash and text; blanks are ignored.
-`data/apparatus.toml`, the critical apparatus, explains deviations of the scan from our text.
+`data/apparatus.toml`, the critical apparatus, explains deviations of the scan.
 """
 
 import re
@@ -26,7 +26,7 @@ PORT = "fortran/original"
 class Difference(NamedTuple):
     """A passage of a card, without blanks, that differs between our text and the scan.
 
-    The apparatus entry `entry` explains the difference.
+    `entry` in the apparatus explains it.
     """
 
     ours: str
@@ -46,8 +46,8 @@ class Card(NamedTuple):
     """A card of a printed program, and its appearance in the scan.
 
     `text` is our text of columns 1 to 72. `differences` are ordered from left to right. `printed`
-    is the scan's card number if it differs, with the apparatus entry that explains it. `lost` is
-    the apparatus entry of a card that the scan lacks.
+    is the scan's card number if it differs, with its apparatus entry; `lost` is the entry of a card
+    that the scan lacks.
     """
 
     program: str
@@ -89,8 +89,7 @@ class Card(NamedTuple):
     def passages(self) -> Iterator[tuple[str, Difference | None]]:
         """Yield each passage of the text, with its difference from the scan or None.
 
-        A difference begins where its characters first occur after the previous difference. Raise
-        ValueError if there is no such place.
+        A difference begins where its characters first occur after the previous one.
         """
         places = [n for n, letter in enumerate(self.text) if not letter.isspace()]
         letters = tight(self.text)
@@ -124,7 +123,7 @@ class Card(NamedTuple):
 
     @property
     def entries(self) -> tuple[str, ...]:
-        """Return the identifiers of the apparatus entries that name the card."""
+        """Return the identifiers of the card's apparatus entries."""
         return tuple(
             each["id"]
             for each in facts("apparatus")["entry"]
@@ -223,8 +222,8 @@ def numbers(ranges: str) -> list[int]:
 def chosen(asked: Iterable[str]) -> list[Card]:
     """Return the cards that `asked` names, or all if it is empty.
 
-    Each item is a program (``two-term``), a card (``two-term:1660``), or a number or range in any
-    program (``1660``, ``1040-1090``). Raise InputError for other items.
+    An item is a program (``two-term``), a card (``two-term:1660``), or a number or range in any
+    program (``1660``, ``1040-1090``).
     """
     every = (card for each in list(asked) or PROGRAMS for card in _cards_of(each))
     return list(dict.fromkeys(every))
@@ -294,8 +293,8 @@ def port_file(program: str) -> str:
 def switch_at(place: Place) -> tuple[str, bool] | None:
     """Return the switch on which a Fortran line depends, and whether the line needs it active.
 
-    A switch is the flag of a defect or reading. The innermost ``if`` around the line that tests a
-    single switch counts; without one, return None.
+    A switch is the flag of a defect or reading, tested by the innermost ``if`` around the line that
+    tests only one.
     """
     lines = _lines(shipped(PORT) / place.file)
     depth = _indentation(lines[place.line - 1])
@@ -311,7 +310,7 @@ def switch_at(place: Place) -> tuple[str, bool] | None:
 
 
 def twin_line(file: str, text: str) -> Place:
-    """Return the only line of a Python port with this text; raise ValueError if not exactly one."""
+    """Return the only line of a Python port with this text."""
     where = [n for n, line in enumerate(_lines(_TWINS / file), 1) if line.strip() == text]
     if len(where) != 1:
         raise ValueError(f"{text!r} occurs {len(where)} times in {file}")

@@ -1,7 +1,6 @@
 """Pairs of a listing and a case (cells), in which the Fortran and Python ports are compared.
 
-A listing is a program with chosen defects, readings of doubtful cards, and conjectures; a case is a
-scene of the thesis's Table 1.
+A listing is a program with chosen defects, readings and conjectures; a case is a scene of Table 1.
 """
 
 from collections.abc import Iterator
@@ -28,7 +27,7 @@ def all_listings(program: str) -> Iterator[Listing]:
 def all_cells() -> Iterator[tuple[Listing, int]]:
     """Yield every pair of a listing and a case number.
 
-    In a case with an initial torque, each listing also occurs with the conjecture `initial-torque`.
+    In a case with an initial torque, each listing also occurs with that conjecture.
     """
     cases = {case: initial_torque(case_scene(case)) is not None for case in case_numbers()}
     for program in PROGRAMS:

@@ -1,7 +1,7 @@
 """Comparisons of the scan with our text of the cards, and of the three decks with the thesis.
 
-`data/cards/collation.toml` has the cards of each operation of the programs, and the statement of
-sections II to V about it. Whether the decks agree is computed.
+`data/cards/collation.toml` has each operation's cards, and the statement of sections II to V about
+it. Whether the decks agree is computed.
 """
 
 import difflib
@@ -21,7 +21,7 @@ _OF_THE_SCAN = ("misreading", "missing text", "normalization")
 
 
 def expected_lines() -> list[tuple[str, str]]:
-    """Return the expected lines of the scanned appendix, as pairs (text without blanks, name).
+    """Return the expected lines of the scanned appendix: text without blanks, and name.
 
     The name is a card's, such as ``two-term:1660``, ``furniture`` for an editor's line, or
     ``phantom`` for text of no card at its place.
@@ -43,7 +43,7 @@ def expected_lines() -> list[tuple[str, str]]:
 def witness_lines() -> dict[str, str]:
     """Return each card's line in the scan, by the card's name.
 
-    Blanks are from `data/cards/blanks.toml`. Callers must not change the dictionary.
+    Blanks are from `data/cards/blanks.toml`. Callers must not change it.
     """
     blanks = facts("cards/blanks")
     found = {}
@@ -56,10 +56,7 @@ def witness_lines() -> dict[str, str]:
 
 
 def unexplained(scan: str) -> list[str]:
-    """Return a sentence for each line of a scan's text that disagrees with `expected_lines`.
-
-    Raise InputError if the text has no appendix.
-    """
+    """Return a sentence for each line of a scan's text that disagrees with `expected_lines`."""
     _, heading, appendix = scan.rpartition(HEADING)
     if not heading or not re.search(r"^\s*\d+-", appendix, re.MULTILINE):
         raise InputError(
@@ -89,8 +86,8 @@ def unexplained(scan: str) -> list[str]:
 def undeclared() -> list[str]:
     """Return a sentence for each disagreement between the cards and the apparatus.
 
-    An apparatus entry must declare each deviation of the scan; each declared deviation must occur.
-    A lost card needs an entry of the kind ``missing text``.
+    An entry must declare each deviation of the scan; each declared deviation must occur. A lost
+    card needs an entry of the kind ``missing text``.
     """
     used: set[tuple[Any, ...]] = set()
     for card in chosen(()):
@@ -130,9 +127,9 @@ class Row(NamedTuple):
 
     `cards` has the card numbers by program, as in ``750-770, 800``. `decks` is ``agree`` if all
     decks with the operation have the same statements, ``names`` if only names differ, ``order`` if
-    only names and order differ, ``-`` if no deck has the operation, else ``differ``. `thesis` is
-    ``agrees``, ``differs`` or ``silent``; `text` is the place in the thesis, `says` its statement.
-    `entries` of the apparatus, or `reason`, explain a disagreement.
+    only names and order differ, ``-`` if no deck has it, else ``differ``. `thesis` is ``agrees``,
+    ``differs`` or ``silent``; `text` is the place in the thesis, `says` its statement. `entries` of
+    the apparatus, or `reason`, explain a disagreement.
     """
 
     what: str
@@ -169,8 +166,8 @@ def faults(found: list[Row]) -> list[str]:
     """Return a sentence for each mistake or unexplained disagreement in the rows `found`.
 
     Each entry in a row must be in the apparatus, and name a card of the row. Each card except
-    comments must be in one row. Each apparatus entry with cards must be in a row, unless it
-    concerns only the scan.
+    comments must be in one row, each apparatus entry with cards in any, unless it concerns only the
+    scan.
     """
     told = [f"{row.what}: no entry or reason" for row in found if not row.is_explained]
     known = {entry["id"]: entry for entry in facts("apparatus")["entry"]}

@@ -1,9 +1,8 @@
-"""Collocation with up to five terms, as in section IV.2 of the thesis: one step, and a run.
+"""Collocation with up to five terms (section IV.2 of the thesis): one step, and a run.
 
 In a step, each unknown is a polynomial x(0) + c1 t + c2 t**2 + ... (eq. 34). With n terms after
 x(0), its derivative equals the right-hand side at n collocation points (eq. 36). A first estimate
-assumes a constant right-hand side; one correction uses the estimate's right-hand sides at the
-points.
+assumes a constant right-hand side; one correction uses the estimate's.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,8 +30,8 @@ def integrate(
     """Run a collocation program on a scene, and return its trajectory.
 
     `points_of` returns the collocation points (s) for the program's step size DT (s). `rates`
-    returns the right-hand sides at point k (0 for the start) from torques over moments (rad/s2) at
-    the start and all points, k, and the six unknowns.
+    returns the right-hand sides at point k (0 for the start) from all points' torques over moments
+    (rad/s2), k, and the six unknowns.
     """
     h = scene.step_size
     dt = h
@@ -66,8 +65,8 @@ def interval(
 ) -> tuple[list[float], int]:
     """Return all unknowns after one step, and the correction's error code IER.
 
-    `points` and `end` are times (s) after the start. `rates` returns the right-hand sides from the
-    point's number k (0 for the start) and the unknowns.
+    `points` and `end` are times (s) after the start. `rates` takes the point's number (0 for the
+    start) and the unknowns.
     """
     constant = rates(0, start)
     estimate, _ = fit(points, [constant] * len(points))

@@ -22,7 +22,7 @@ def run(
 ) -> Trajectory:
     """Run the compiled program of a listing on a scene, and return its trajectory.
 
-    The arguments are those of `programs.run_program`, unchecked.
+    The arguments are `programs.run_program`'s, unchecked.
     """
     given = program_arguments(scene, listing, lipschitz, may_stop, velocity)
     rows, ier, n_rows, *ended = extension().run_program(*given)
@@ -38,8 +38,7 @@ def read_rows(
 
     `rows` has shape (n, 8): true time and TIME (s), omega (rad/s) and velocity (m/s). The first n
     values of `ier` are used. `stop_variable` is the number in `STOP_VARIABLES`, from 1, of the
-    variable that failed the stop test, or 0. `stop_quotient` (1/s) is the change of its right-hand
-    side over its own.
+    variable that failed the stop test, or 0; `stop_quotient` (1/s) is its quotient.
     """
     n = len(rows)
     return trajectory_of(

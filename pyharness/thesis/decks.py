@@ -1,7 +1,7 @@
 """Cards as fixed-form FORTRAN programs (decks), their compilation and their runs.
 
-A compiled deck checks the Fortran and Python ports independently: it has the author's statements
-and a separate LEQT1F (`data/cards/leqt1f.f`).
+A compiled deck checks the ports independently, with the author's statements and a separate LEQT1F
+(`data/cards/leqt1f.f`).
 """
 
 import re
@@ -40,8 +40,8 @@ _MARK = "+"
 class Run(NamedTuple):
     """The output of a compiled deck.
 
-    `tape5` has shape (n, 7): TIME (s), U1 to U3 (rad/s), V1 to V3 (m/s). `page` is the file TAPE6,
-    without carriage control and trailing blanks.
+    `tape5` has shape (n, 7): TIME (s), U1 to U3 (rad/s), V1 to V3 (m/s). `page` is TAPE6 without
+    carriage control and trailing blanks.
     """
 
     tape5: np.ndarray
@@ -55,9 +55,9 @@ def deck_text(
 
     The published cards have the data of Case 2 with 300 steps (collocation) or Case 5 with 100
     steps (Runge-Kutta); a `scene` of Table 1 replaces these data. The `dialect` "1982" adds
-    nothing, "ftn" adds cards for the torque of Case 7, and "gfortran" also adapts cards to a modern
+    nothing, "ftn" cards for the torque of Case 7; "gfortran" also adapts cards to a modern
     compiler. Column 73 marks added and adapted cards. `terms`, 3 or 5, requests the deck of
-    `model_cards`. Raise InputError for an unknown dialect, or a request that cards can't express.
+    `model_cards`.
     """
     if dialect not in DIALECTS:
         raise unknown("dialect", dialect, DIALECTS, "--dialect")
@@ -114,7 +114,7 @@ def job_text(deck: str, system: str = "nos", rounds: bool = False) -> str:
     """Return a batch job that compiles and runs a deck of the dialect `ftn` with CDC's FTN.
 
     The job includes our LEQT1F if the deck calls it. `rounds` sets FTN's option ROUND for sums,
-    products and quotients. Raise InputError unless the operating `system` is "nos" or "nosbe".
+    products and quotients. The operating `system` is "nos" or "nosbe".
     """
     if system not in SYSTEMS:
         raise unknown("system", system, SYSTEMS, "--system")
@@ -158,7 +158,7 @@ def model_cards(terms: int) -> dict[int, str]:
     """Return the cards of a collocation deck with `terms` terms, by their new numbers.
 
     The deck is a conjecture: section V.2 of the thesis uses three and five terms in Case 6, but
-    prints no cards. The collocation points are at the fractions k/(terms + 1) of the step.
+    prints no cards. Collocation points are at k/(terms + 1) of the step.
     """
     text = [card.text for card in deck("four-term").cards.values()]
     terms_range = range(1, terms + 1)
@@ -245,8 +245,7 @@ def compiler() -> str | None:
 def run_deck(text: str, folder: Path | None = None) -> Run:
     """Compile and run a deck of the dialect `gfortran`, and return its output.
 
-    `folder` keeps the compiled solver for later calls. Raise RuntimeError if the compiler or the
-    program fails.
+    `folder` keeps the compiled solver for later calls.
     """
     with TemporaryDirectory() as place:
         here = Path(place)

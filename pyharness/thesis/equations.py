@@ -82,7 +82,7 @@ class Record:
     ) -> Trajectory:
         """Return the trajectory of all rows, with the solver's IER if `prints_ier`.
 
-        A step that overflowed has no row, but its evaluations are counted.
+        An overflow has no row, but counts as evaluations.
         """
         given = np.array(self._rows).reshape(-1, 8)
         rows = given.astype(np.float64)

@@ -1,7 +1,7 @@
 """Runs of the programs in a floating-point format of `word.py`, such as the CDC's.
 
-Python ports run in every format, compiled programs only in those of IEEE 754. The extension module
-exchanges numbers as bytes in native order.
+Python ports run in every format, compiled programs only in those of IEEE 754. The extension takes
+numbers as bytes in native order.
 """
 
 import copy
@@ -74,7 +74,7 @@ def run_compiled(
     """Run a listing's compiled program in the arithmetic `word`; the result is that of `run`.
 
     Raise InputError if the compiler lacks this arithmetic, or an angle in the torque is too large
-    for its sine, and NotBuiltError if the extension is not built.
+    for its sine.
     """
     if word.p > 53:
         _check_angles(scene)
@@ -136,7 +136,7 @@ def n_bytes(word: Word) -> int:
 def to_bytes(numbers: Iterable[Any], word: Word, *shape: int) -> Bytes:
     """Return numbers of the format `word` as bytes, in an array of shape (n_bytes(word), *shape).
 
-    `numbers` and the result are in column-major order.
+    Both are in column-major order.
     """
     size = n_bytes(word)
     written = b"".join(_pattern(each).to_bytes(size, sys.byteorder) for each in numbers)

@@ -11,8 +11,7 @@ def leqt1f(
 ) -> tuple[list[list[float]], int]:
     """Return the solution of A x = b for each right-hand side b, and the error code IER.
 
-    If A is singular within rounding, IER is 129 and each b is returned unsolved; otherwise IER is
-    0.
+    If A is singular within rounding, IER is 129 and each b is returned unsolved; else IER is 0.
     """
     factors = [list(row) for row in matrix]
     pivots = _factor(factors)

@@ -202,7 +202,7 @@ def _run(
     scene: Scene, listing: Listing, by_moments: bool, inputs: dict[str, Array], n: int,
     wanted: NDArray[np.int32], may_stop: bool, velocity: bool, threads: int,
 ) -> ProgramEnsemble:  # fmt: skip
-    """Run a program; `inputs` has arrays by name, with "body" for moments or coefficients."""
+    """Run a program; `inputs` are arrays by name, "body" for moments or coefficients."""
     program = extension().run_programs
     one_step_size = bool((inputs["step_size"] == inputs["step_size"].flat[:1]).all())
     rows = (spread(each, n) for each in inputs.values())

@@ -1,8 +1,7 @@
 """Counts of the floating-point operations in a step of a program.
 
-The author's statements and our LEQT1F are executed with numbers that count operations. `T**2`
-counts as one multiplication, `T**3` and `T**4` as two each. Subscripts, jumps, ABS and WRITE do not
-count.
+The author's statements and our LEQT1F run with numbers that count operations. `T**2` is one
+multiplication, `T**3` and `T**4` are two each. Subscripts, jumps, ABS and WRITE do not count.
 """
 
 import operator
@@ -31,7 +30,7 @@ ALIKE = dict.fromkeys(_OPERATIONS, 1)
 class Count(NamedTuple):
     """The number, or time, of additions, subtractions, multiplications and divisions in a step.
 
-    `written` counts every operation on the cards; `once` omits repetitions with the same operands.
+    `written` counts every operation on the cards; `once` omits repetitions.
     """
 
     written: int
@@ -89,7 +88,7 @@ class _Array(defaultdict[tuple[int, ...], Any]):
 def operations_per_step(listing: Listing, times: Mapping[str, int] = ALIKE) -> Count:
     """Return the operations in a listing's first step, for the data on the published cards.
 
-    `times` has the weight of each operation, such as its time on a machine.
+    `times` has each operation's weight, such as its time.
     """
     statements = statements_of(deck_text(listing).splitlines())
     begin = next(n for n, (_, text) in enumerate(statements) if _DO.match(text))

@@ -1,8 +1,8 @@
 """The printed page and the file TAPE5 of a program, made from its trajectory.
 
-The page omits each record's carriage control, a blank. `data/printer.toml` has the FORMATs, and
-marks their conjectural parts. The package `fortranformat` writes all values except negative zeros
-and values that are not finite.
+The page omits each record's carriage control, a blank. `data/printer.toml` has the FORMATs, with
+conjectural parts marked. `fortranformat` writes all values except negative zeros and those not
+finite.
 """
 
 import math
@@ -31,9 +31,8 @@ _PLACES = re.compile(r"F\d+\.(\d+)")
 def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
     """Return the text that `program` prints for its run.
 
-    The moments and torques of `scene`, which must have moments, precede a line for each step. If
-    the stop test ended the run, the last line is the step that failed it. Lines have no trailing
-    blanks.
+    The moments and torques of `scene`, which must have moments, precede a line for each step, the
+    last of which may have failed the stop test. Lines have no trailing blanks.
     """
     formats = formats_of(program)
     assert scene.moments is not None
@@ -71,10 +70,7 @@ def _to_places(x: Any, places: int) -> float:
 
 
 def formats_of(program: str) -> dict[str, Any]:
-    """Return a program's FORMATs: ``header`` (moments, torques), ``heads`` and ``rows``.
-
-    Other keys name the FORMATs' cards, and mark characters as certain or conjectural.
-    """
+    """Return a program's FORMATs: ``header`` (moments, torques), ``heads`` and ``rows``."""
     programs: list[dict[str, Any]] = facts("printer")["program"]
     return next(each for each in programs if each["name"] == program)
 

@@ -1,7 +1,7 @@
 """Runge-Kutta: the third program of the appendix, Jacobs 1982, eq. 31 and IV.3.
 
-The stop test (Lipschitz condition, eq. 19) ends a run if the right-hand sides change in a step by
-more than a constant times the change of the unknowns.
+The stop test (Lipschitz condition, eq. 19) ends a run if the right-hand sides' change in a step
+exceeds a constant times the unknowns'.
 """
 
 import math
@@ -104,9 +104,9 @@ def lipschitz_test(
     """Return a variable that violates eq. 19, and its quotient of changes (1/s), or None.
 
     `change_k` and `change_u` are absolute changes of the six right-hand sides and unknowns in a
-    step. The test compares norms or, with the defect `lipschitz-per-component`, components. Only
-    the defect `lipschitz-tests-velocity` includes the velocity. The quotient is infinite if the
-    unknown does not change.
+    step. Norms or, with the defect `lipschitz-per-component`, components are compared. Only the
+    defect `lipschitz-tests-velocity` includes the velocity. The quotient is infinite if the unknown
+    does not change.
     """
     velocity_counts = listing.has("lipschitz-tests-velocity")
     last = 6 if velocity_counts else 3

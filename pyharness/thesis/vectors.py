@@ -5,9 +5,8 @@ negative number are complemented. The exponent is the field minus 2000 (octal), 
 field is below 2000.
 
 The test vectors in `data/words/cdc.json` follow from the CYBER 170 hardware reference, CDC
-60463560; a public emulator agrees. A file of test vectors is a JSON object with `schema` and
-`vectors`. Each vector has `name`, `op` (an instruction of `operated`), and `x`, `y` and `result` in
-octal.
+60463560; a public emulator agrees. Such a file is a JSON object with `schema` and `vectors`, each
+with `name`, `op` (an instruction of `operated`), and `x`, `y` and `result` in octal.
 """
 
 import json
@@ -58,7 +57,7 @@ class Answer(NamedTuple):
 
 
 def answers(path: str | Path = OURS) -> list[Answer]:
-    """Return a JSON file's vectors with our results; raise InputError if it is invalid."""
+    """Return a JSON file's vectors with our results."""
     content = read_input(path, f"vectors '{path}'", _LARGEST, "a JSON file")
     try:
         data = json.loads(content)
@@ -92,8 +91,8 @@ def _answer(where: str, entry: Any) -> Answer:
 def from_octal(text: str) -> Pair:
     """Return the pair (m, e) of the number m 2**e in a CDC word of 20 octal digits.
 
-    For zero (all bits 0 or all 1), infinity and nan, m is 0 and e is the value as a float. Raise
-    InputError if `text` is no such word, or its coefficient is not normalised.
+    For zero (all bits 0 or all 1), infinity and nan, m is 0 and e is the value as a float. The
+    coefficient must be normalised.
     """
     digits = "".join(text.split()) if isinstance(text, str) else ""
     if not _WORD.fullmatch(digits):
@@ -130,7 +129,7 @@ def operated(name: str, x: str, y: str) -> str:
     """Return the result of a CDC instruction on the words `x` and `y`, all in octal.
 
     `name` is FX (truncating) or RX (rounding) with +, -, * or /. A sum or difference is normalised
-    only if NX follows, as in ``RX+ NX``. Raise InputError for other names.
+    only if NX follows, as in ``RX+ NX``.
     """
     if name not in _INSTRUCTIONS:
         raise unknown("instruction", name, _INSTRUCTIONS)

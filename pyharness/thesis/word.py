@@ -1,13 +1,11 @@
 """Floating-point formats of p bits with a rounding rule (words), for runs of the Python ports.
 
 A number has the operators of a float. The other operand may be an integer, a number of the same
-format, or a float, converted like a literal in a source text: from its shortest decimal
-representation.
+format, or a float, converted from its shortest decimal representation, like a literal.
 
-Arithmetic functions take integers m, e for a number m 2**e; m has p bits, fewer if the number is
-subnormal. In results, m may be 0; then e is the value as a float: 0.0, -0.0, inf, -inf or nan. No
-library has the CDC's rules: gmpy2, SoftFloat and numpy round only as IEEE 754, and mpmath does not
-limit exponents.
+Arithmetic functions take integers m, e for a number m 2**e; m has p bits, fewer if subnormal. In
+results, m may be 0; then e is the value as a float: 0.0, -0.0, inf, -inf or nan. No library has the
+CDC's rules: gmpy2, SoftFloat and numpy round only as IEEE 754, and mpmath does not limit exponents.
 """
 
 import math
@@ -49,7 +47,7 @@ def rounding(p: int, least: int, most: int, cut: bool, gradual: bool) -> Roundin
     """Return a function that rounds m 2**e to p bits and an exponent from `least` to `most`.
 
     Rounding is towards zero if `cut`, else to nearest, ties to even. A larger exponent gives
-    infinity; a smaller one gives zero or, if `gradual`, a subnormal number or zero as in IEEE 754.
+    infinity, a smaller one zero or, if `gradual`, a subnormal number or zero as in IEEE 754.
     """
     shortened = _cut if cut else _to_even
 
@@ -89,8 +87,8 @@ def _to_even(m: int, shift: int) -> int:
 def ieee(p: int, largest: int, cut: bool) -> Rules:
     """Return the rules of IEEE 754 for p-bit coefficients and numbers below 2**(largest + 1).
 
-    If `cut`, sums, products and quotients are truncated towards zero. Too large results become
-    infinite, as on machines that truncated; IEEE 754 requires the largest number.
+    If `cut`, sums, products and quotients are truncated towards zero; too large results are then
+    infinite, though IEEE 754 requires the largest number.
     """
     least, most = 2 - largest - p, largest - p + 1
     fit = rounding(p, least, most, cut, gradual=True)
@@ -153,8 +151,8 @@ def framed(p: int, rounds: bool, xm: int, xe: int, ym: int, ye: int) -> tuple[in
     """Return the sum of xm 2**xe and ym 2**ye before normalisation, as a pair (frame, e).
 
     The frame, a register of 2 p bits, is in units of 2**(e - p), where e is the larger exponent.
-    The other operand is shifted and truncated. If `rounds`, half a unit in the last place is first
-    added to each operand, as RX does.
+    The other operand is shifted and truncated. If `rounds`, RX first adds half a unit in the last
+    place to each operand.
     """
     if xe <= ye:
         xm, xe, ym, ye = ym, ye, xm, xe
@@ -197,8 +195,8 @@ def _comparison(compare: Callable[[float, float], bool]) -> Callable[["Number", 
 class Number:
     """A number of a floating-point format, the integer `m` times 2**`e`.
 
-    If `m` is 0, `e` is the value as a float. `Word` makes a subclass for each format. The operators
-    round their results; x/0 is infinite, 0/0 is nan.
+    If `m` is 0, `e` is the value as a float. `Word` makes a subclass for each format. Operators
+    round; x/0 is infinite, 0/0 is nan.
     """
 
     __slots__ = ("e", "m")
@@ -236,7 +234,7 @@ class Number:
     def __eq__(self, other: object) -> bool:
         """Return whether the difference, computed in this format, is zero.
 
-        The difference of two neighbouring CDC numbers may be zero.
+        That of two neighbouring CDC numbers may be.
         """
         x, y = self, self.word(other)
         if x.m and y.m:
@@ -337,8 +335,7 @@ class Word:
     `rule` is "nearest-even", "chop" (towards zero), or the CDC's "FX" (truncating) or "RX"
     (rounding). Except for FX and RX, numbers are below 2**(largest + 1), and the smallest exponent
     is that of IEEE 754. By default `largest` is that of binary64 if p is at most 53, else of
-    binary128. `cut_literals` truncates converted values towards zero. Raise InputError for an
-    unknown rule, or p below 4.
+    binary128. `cut_literals` truncates converted values towards zero. p is at least 4.
     """
 
     def __init__(

@@ -1,7 +1,7 @@
 """The atlas of claims: which claims of the thesis hold for which initial omega (start).
 
-The starts cover the sphere of directions at several magnitudes. A claim scores 1 point if it is
-reproduced, 1/2 if in part. Verdict codes are those of `over_starts`.
+The starts cover all directions at several magnitudes. A claim scores 1 point if reproduced, 1/2 if
+in part. Verdict codes are those of `over_starts`.
 """
 
 import math
@@ -46,8 +46,8 @@ _OMEGA = tuple(Column(f"omega{k}", digits(".3g"), unit="rad/s") for k in (1, 2, 
 class Atlas:
     """The verdict codes of claims over a grid.
 
-    The axes of `codes` are reading of doubtful lines, number of steps, magnitude of omega(0)
-    (rad/s), height (omega3 over the magnitude) and longitude (rad).
+    The axes of `codes` are reading, number of steps, magnitude of omega(0) (rad/s), height (omega3
+    over the magnitude) and longitude (rad).
     """
 
     codes: Mapping[str, Codes]
@@ -75,7 +75,7 @@ class Atlas:
 
 
 def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Array]) -> Atlas:
-    """Return the atlas of a sweep; raise InputError if it is incomplete or has other axes."""
+    """Return the atlas of a sweep, which must be complete and have its axes."""
     if tuple(axes) != (*CHOSEN, *WHERE) or not codes:
         allowed = ", ".join((*CHOSEN, *WHERE))
         raise InputError(

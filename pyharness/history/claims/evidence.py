@@ -1,9 +1,8 @@
 """Evidence on the choices that the thesis leaves open: a score for every combination.
 
 A combination fixes omega(0), readings, conjectures and number of steps. Its omega(0) is one value
-for all cases in which the thesis gives none, or the value that we adopt for each case. The score
-is the number of testable claims about the original programs that are reproduced; those reproduced
-in part count 1/2.
+for all cases in which the thesis gives none, or our value for each case. The score is the number of
+testable claims that the original programs reproduce; in part counts 1/2.
 """
 
 from collections import Counter

@@ -26,9 +26,8 @@ class Assumptions:
     """One value for each choice that the thesis leaves open.
 
     `start` is omega(0) (rad/s) in the cases for which the thesis gives none; None selects the
-    values in `cases.toml`. `readings` are alternatives to our readings of doubtful lines.
-    `conjectures` on missing lines are by default those of the original listing. `word` is the
-    floating-point arithmetic.
+    values in `cases.toml`. `readings` are alternatives to those that we adopt. `conjectures` are by
+    default those of the original listing. `word` is the arithmetic.
     """
 
     start: Triple | None = None
@@ -43,11 +42,11 @@ class Laboratory:
     """The three programs, original or corrected, run on the cases under assumptions.
 
     `parts` divides the step size of a run; `runs` and `error` have results only at the undivided
-    steps. `may_stop` switches the stop test of the Runge-Kutta program. The defects in `fixed` are
-    corrected in the original programs. Errors are against the reference solution.
+    steps. `may_stop` switches the Runge-Kutta program's stop test. Original programs lack the
+    defects in `fixed`. Errors are against the reference solution.
 
-    The collocation model has n points at the times k DT/(n+1) in the step, k = 1 ... n. In the
-    original programs DT grows by the step size in every step; the torque must then be constant.
+    The collocation model has n points at k DT/(n+1) in the step, k = 1 ... n. In the original
+    programs DT grows by the step size in every step; the torque must then be constant.
     """
 
     is_original: bool
@@ -193,8 +192,8 @@ def by_literals(
     """Return omega (rad/s) of an original collocation program with changed step sizes.
 
     The literals in `changed`, elements of `LITERALS`, are divided by `parts`. The torque must be
-    constant. The result is at the steps of the unchanged program, shape (scenes, steps, 3), and not
-    finite after an overflow.
+    constant. The result, shape (scenes, steps, 3), is at the undivided steps, and not finite after
+    an overflow.
     """
     h, steps = scenes[0].step_size, scenes[0].steps
     dt, end, growth = (h / parts if name in changed else h for name in LITERALS)
@@ -212,10 +211,10 @@ def integrate_models(
 ) -> Array:  # fmt: skip
     """Return omega (rad/s) of the collocation model for n bodies at once, shape (n, steps, 3).
 
-    `omega` (rad/s) has the shape (n, 3); the last axis of `coefficients` is A, B and C. The
-    constant `torque` is divided by the moments (rad/s2). The points divide the interval (0, dt)
-    evenly; `dt` (s) grows by `growth` (s) in every step of length `end` (s). Results equal those of
-    the programs except for rounding, and are not finite after an overflow.
+    `omega` (rad/s) has the shape (n, 3); the last axis of `coefficients` is A, B and C. `torque` is
+    constant, over the moments (rad/s2). The points divide (0, dt) evenly; `dt` (s) grows by
+    `growth` (s) in every step of length `end` (s). Results equal the programs' except for rounding,
+    and are not finite after an overflow.
     """
     a, b, c = coefficients.T
 

@@ -22,7 +22,7 @@ from pyharness.thesis.programs import BINARY64
 
 @dataclass(frozen=True)
 class Survival:
-    """The verdicts on a claim with one assumption changed; `survives` if both are unchanged."""
+    """The verdicts with one assumption changed; `survives` if both are unchanged."""
 
     assumption: str
     original: str
@@ -32,7 +32,7 @@ class Survival:
 
 @dataclass(frozen=True)
 class Judgement:
-    """The verdicts on a claim, with the adopted assumptions and with each changed alone."""
+    """The verdicts on a claim, as adopted and with each assumption changed alone."""
 
     claim: dict[str, Any]
     original: Judged
@@ -45,7 +45,7 @@ class Assignment:
     """An initial omega (rad/s) for a case without one in the thesis, with verdicts by claim.
 
     It `holds` if the original programs reproduce, at least in part, all claims about this case
-    except those with the same verdict from every start.
+    whose verdicts depend on the start.
     """
 
     case: int
@@ -60,7 +60,7 @@ def claims() -> list[dict[str, Any]]:
 
 
 def claim(identity: str) -> dict[str, Any]:
-    """Return the claim `identity`; raise InputError if there is none."""
+    """Return the claim `identity`."""
     by_name = {each["id"]: each for each in claims()}
     if identity not in by_name:
         raise unknown("claim", identity, list(by_name))
@@ -125,8 +125,8 @@ def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:
 def assignments() -> list[Assignment]:
     """Return the verdicts from each start in each case for which the thesis gives no omega(0).
 
-    Claims about a case do not depend on the start of another. All claims can therefore hold at once
-    if each case has a start with which its claims hold.
+    As claims about a case do not depend on another's start, all can hold at once if each case has a
+    start with which its claims hold.
     """
     found = []
     for case in open_starts():
@@ -265,7 +265,7 @@ def _record(judgements: Sequence[Judgement]) -> dict[str, Any]:
 
 
 def _supplied(judgements: Sequence[Judgement]) -> list[dict[str, Any]]:
-    """Return the assumptions on which the claims may depend; units affect all claims."""
+    """Return the assumptions on which the claims may depend."""
     told = [each.claim for each in judgements]
     named = {name.rpartition(" ")[2] for each in told for name in each["assumptions"]}
     others = {name.partition(":")[0] for each in told for name in each.get("otherwise", {})}

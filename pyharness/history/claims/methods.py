@@ -1,7 +1,7 @@
-"""Tests of the thesis's claims about programs and methods over several cases.
+"""Tests of the thesis's claims about several cases.
 
 Arguments and verdicts are as in `verdicts`. The thesis prints no programs for weightings other than
-collocation; for the original programs, tests of these weightings return "not testable".
+collocation; for original programs, tests of them return "not testable".
 """
 
 import math
@@ -47,10 +47,9 @@ def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Jud
 def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
     """Judge whether eq. 19 of the thesis, the Lipschitz condition, ends unbounded runs.
 
-    A quotient is the change of a derivative between two stages, divided by the change of its
-    variable. For the differential equations it is at most the largest norm of the Jacobian. The
-    stop test applies eq. 19 only if its quotients do not exceed this norm along the reference
-    solution and the run.
+    A quotient is the change of a derivative between two stages over the change of its variable. For
+    the differential equations it is at most the Jacobian's largest norm. The stop test applies eq.
+    19 only if its quotients do not exceed this norm along reference solution and run.
     """
     numbers: dict[str, float] = {}
     for case in cases:
@@ -94,8 +93,8 @@ def larger_constant(lab: Laboratory, cases: Sequence[int]) -> Judged:
 def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
     """Judge whether the stop test ends all unbounded runs, and no other runs.
 
-    A run is unbounded if, without the stop test, it overflows or exceeds `bounded` times the
-    largest reference omega.
+    Without the test, an unbounded run overflows or exceeds `bounded` times the largest reference
+    omega.
     """
     alarms = unbounded = caught = 0
     for case in cases:
@@ -124,9 +123,9 @@ def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
 def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
     """Judge whether collocation improves if the step size is divided by ten.
 
-    The two-term program must not improve in case `exception`. The step size is a literal on several
-    cards. For the original programs, the numbers also count the cases of constant torque that
-    improve if only some literals change.
+    The two-term program must not improve in case `exception`. For the original programs, the
+    numbers count the cases of constant torque that improve if only some of the cards with the step
+    size change.
     """
     found = judged(rules.small_step(lab, cases, exception))
     if lab.is_original:
@@ -157,8 +156,8 @@ def suffices(
 ) -> Judged:
     """Judge whether three- or four-term collocation is "probably sufficient for most problems".
 
-    In `enough` cases, the errors of both models must be at most `share` of the largest omega. For
-    the original programs, the three-term model is omitted if the torque varies.
+    In `enough` cases, both errors must be at most `share` of the largest omega. For original
+    programs, the three-term model is omitted if the torque varies.
     """
     numbers, good = {}, 0
     for case in cases:
@@ -178,8 +177,8 @@ def execution_time(
 ) -> Judged:
     """Judge whether collocation takes about twice the time of Runge-Kutta.
 
-    Operations per step, on the cards and in our linear solver LEQT1F, are weighted by `unit_times`.
-    They are counted as written, and with repeated terms counted once.
+    Operations per step, on the cards and in our LEQT1F, are weighted by `unit_times`, and counted
+    as written and with repeated terms once.
     """
     listings = {program: lab.listing(program) for program in PROGRAMS}
     counts = {name: operations_per_step(each) for name, each in listings.items()}
@@ -200,10 +199,7 @@ def execution_time(
 
 
 def seconds(lab: Laboratory) -> Judged:
-    """Return "not testable" for claims on run times, with the operations in 100 steps.
-
-    A present computer's run times are no evidence on the original machine's.
-    """
+    """Return "not testable" for claims on run times, with the operations in 100 steps."""
     counts = {program: operations_per_step(lab.listing(program)).written for program in PROGRAMS}
     numbers = {f"{program}: operations in 100 steps": 100.0 * n for program, n in counts.items()}
     return Judged(NOT_TESTABLE, numbers)
@@ -213,7 +209,7 @@ def complexity(lab: Laboratory, factors: Sequence[float]) -> Judged:
     """Judge whether the three programs have about the same number of cards.
 
     The verdict is "undecided" if it depends on the threshold in `factors`, or on counting our
-    linear solver LEQT1F.
+    LEQT1F.
     """
     cards = {each: deck_text(lab.listing(each)).count("\n") for each in PROGRAMS}
     numbers = {f"{program}: cards": float(n) for program, n in cards.items()}
@@ -254,9 +250,9 @@ def computer_error(
 ) -> Judged:
     """Judge whether rounding error makes the weightings other than collocation fail.
 
-    Rounding error (rad/s) is measured in Case 1 with decreasing steps, because every method solves
-    this case exactly except for rounding. It is also the difference between the methods of section
-    IV.2 in binary64 and in the arithmetics `words`.
+    Rounding error (rad/s) is measured in Case 1, which every method solves exactly except for
+    rounding, with decreasing steps; and as the difference between the methods of section IV.2 in
+    binary64 and in the arithmetics `words`.
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
@@ -313,8 +309,7 @@ def all_succeed(
 def predict_correct(lab: Laboratory, cases: Sequence[int]) -> Judged:
     """Return "not testable" for the predict-correct technique, which the thesis only recommends.
 
-    The numbers compare the corrected programs with collocation that makes one correction, from the
-    right-hand sides along the first estimate.
+    The numbers compare the corrected programs with collocation that makes one correction.
     """
     best = Laboratory(False, lab.assumptions)
     numbers = {}

@@ -1,7 +1,7 @@
-"""Verdicts on claims from many initial omegas (starts) at once, by the functions in `rules`.
+"""Verdicts on claims from many initial omegas (starts) at once, by `rules`.
 
-A sweep supplies the starts, the listing with its readings, and the number of steps. A start is used
-in all cases for which the thesis gives none.
+A sweep supplies the starts, the listing, and the number of steps. A start is used in all cases for
+which the thesis gives none.
 """
 
 from dataclasses import replace

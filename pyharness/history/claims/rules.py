@@ -2,11 +2,11 @@
 
 A bench supplies runs and solutions: a `Laboratory` for one start, `Starts` for n starts. `parts`
 divides the step size; rows are at the undivided steps. Arrays of omega have the shape (steps, 3) or
-(n, steps, 3), values of a `Grade` the shape () or (n,). A claim's `rule` in `data/claims.toml`
-describes when it holds, and when in part.
+(n, steps, 3), values of a `Grade` () or (n,). A claim's `rule` in `data/claims.toml` says when it
+holds, and when in part.
 
-An error is the largest deviation of any omega component from the reference solution, over the steps
-that the program ran. The range of a component is its largest minus its smallest value.
+An error is the largest deviation of any omega component from the reference solution, over the
+completed steps. The range of a component is its largest minus its smallest value.
 """
 
 import functools
@@ -61,8 +61,8 @@ def no_deviation(bench: Bench, case: int, limit: float) -> Grade:
 def concur(bench: Bench, case: int, share: float) -> Grade:
     """Test whether the two-term and the four-term program agree in a case.
 
-    The omegas may differ by `share` times the largest omega and, in each component, a tenth of the
-    range. With only the first condition, the claim holds in part.
+    Omegas may differ by `share` times the largest omega and, by component, a tenth of the range;
+    the claim holds in part with the first condition alone.
     """
     truth = bench.solution(case)
     two, four = (bench.runs(program, case) for program in COLLOCATION)
@@ -84,7 +84,7 @@ def concur(bench: Bench, case: int, share: float) -> Grade:
 def fails(bench: Bench, case: int, share: float) -> Grade:
     """Test whether the Runge-Kutta program ends early and is wrong in a case.
 
-    A wrong omega deviates by over `share` of a component's range.
+    Omega must deviate by over `share` of a component's range.
     """
     runs = bench.runs("runge-kutta", case)
     error = share_of_range(runs.omega, bench.solution(case))
@@ -131,8 +131,8 @@ def dynamic(bench: Bench, case: int, factor: float) -> Grade:
 def small_step(bench: Bench, cases: Sequence[int], exception: int) -> Grade:
     """Test whether a tenth of the step size improves collocation, except for one run.
 
-    The exception is the two-term program in case `exception`. In four fifths of the other runs,
-    errors must be finite and at least halve; in half of them, for a grade in part.
+    This is the two-term program in case `exception`. In four fifths of the others, errors must be
+    finite and at least halve; in half, for a grade in part.
     """
     numbers, improved, excepted = {}, [], np.False_
     for program in COLLOCATION:
@@ -173,7 +173,7 @@ def largest_error(
 
 
 def share_of_range(omega: Array, truth: Array) -> Array:
-    """Return the largest ratio of error to range among varying components of omega."""
+    """Return omega's largest ratio of error to range among varying components."""
     spread = spread_of(truth)
     moving = spread > 1e-12 * largest_of(truth)[..., None]
     with np.errstate(all="ignore"):
@@ -192,7 +192,7 @@ def largest_of(omega: Array) -> Array:
 
 
 def _farthest(first: Array, second: Array) -> Array:
-    """Return the largest difference of each omega component (rad/s), ignoring missing steps."""
+    """Return the largest difference of each omega component (rad/s) over common steps."""
     with np.errstate(all="ignore"):
         apart = _by_component(first - second)
         np.abs(apart, out=apart)
@@ -200,7 +200,7 @@ def _farthest(first: Array, second: Array) -> Array:
 
 
 def _by_component(omega: Array) -> Array:
-    """Return omega as a contiguous array (3, ..., steps), which makes maxima ten times as fast."""
+    """Return omega as a contiguous array (3, ..., steps), for maxima ten times as fast."""
     return np.ascontiguousarray(np.moveaxis(omega, -1, 0))
 
 

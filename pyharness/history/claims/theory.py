@@ -102,8 +102,8 @@ def _hamilton(moments: Triple, state: Array) -> Array:
 def bounded_not_lipschitz(lab: Laboratory, decades: float, above: float) -> Judged:
     """Judge whether a bounded function satisfies a Lipschitz condition.
 
-    The claim is false if a quotient of the square root between x and 2 x exceeds `above`, for x
-    from .01 down to 10**-decades.
+    It is false if a quotient of the square root between x and 2 x exceeds `above`, x from .01 to
+    10**-decades.
     """
     points = 10.0 ** -np.arange(2.0, decades + 1.0, 2.0)
     quotients = (np.sqrt(2.0 * points) - np.sqrt(points)) / points
@@ -124,7 +124,7 @@ def local_error(
 def same_as_taylor(lab: Laboratory, cases: list[int], within: float) -> Judged:
     """Judge whether Runge-Kutta and the Taylor series up to h**4 are the same method.
 
-    The claim is reproduced in part if the results of one step differ by O(h**5).
+    It is reproduced in part if the results of one step differ by O(h**5).
     """
     numbers, same, near = {}, True, True
     for case in cases:
@@ -221,8 +221,8 @@ def _weighted(t: Array, weight: Array, factors: Weights, rate: float, by: Weight
 def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judged:
     """Judge whether the rates Q of eq. 32 of the thesis determine stability.
 
-    A relative perturbation of a steady rotation by 1e-8 should grow at the rate Re Q (1/s) or, if
-    Re Q is 0, remain within ten times its initial size for ten periods.
+    A relative perturbation of 1e-8 should grow at the rate Re Q (1/s) or, if Re Q is 0, remain
+    within ten times its initial size for ten periods.
     """
     numbers, told = {}, True
     for case in cases:
@@ -251,7 +251,7 @@ def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judge
 def trial_form_solves(lab: Laboratory, cases: list[int], limit: float) -> Judged:
     """Judge whether a trial solution of eq. 32 of the thesis solves some case exactly.
 
-    It is a steady rotation about axis 3 plus exponential functions of time.
+    This is a steady rotation about axis 3 plus exponentials of time.
     """
     numbers = {}
     for case in cases:

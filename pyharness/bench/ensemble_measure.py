@@ -1,8 +1,7 @@
-"""Measurements of many bodies at once: speed at a target error, time by number of bodies, memory.
+"""Measurements of many bodies: speed at a target error, time by number of bodies, memory.
 
-Each contender uses the coarsest setting whose error on a sample is at most the target. Calls are
-interleaved in several rounds; the shortest time counts. Calls on one core are timed in processor
-time.
+Each contender uses the coarsest setting that meets the target on a sample. Calls are interleaved in
+rounds; the shortest time counts. Calls on one core are timed in processor time.
 """
 
 import subprocess

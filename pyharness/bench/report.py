@@ -261,7 +261,7 @@ def _notes(finding: Finding) -> list[str]:
 
 
 def not_measured(finding: Finding) -> list[str]:
-    """Return a line for each reason of missing results, with examples."""
+    """Return a line for each reason for missing results, with examples."""
     # Reasons that differ only in the expected time or last step at their end share a line.
     came: list[tuple[Row | Refusal, str]] = [
         (each, each.reason.split(", a call would take")[0]) for each in finding.refused

@@ -1,4 +1,4 @@
-"""Time saved by omitting computations that a plan finds unnecessary."""
+"""Time saved by omitting unnecessary computations."""
 
 import subprocess
 import sys

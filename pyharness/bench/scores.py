@@ -1,4 +1,4 @@
-"""Scores: contenders' times to reach target errors, and a baseline's times divided by them."""
+"""Scores: times to reach target errors, and a baseline's times divided by them."""
 
 import math
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ YARDSTICKS = ("heyoka", "solve_ivp-dop853")
 
 @dataclass(frozen=True)
 class Score:
-    """The times in which a contender reaches target errors on a workload."""
+    """A contender's times to reach target errors on a workload."""
 
     method: str
     # For each target error, the time (s) of the fastest setting that reaches it, or None.

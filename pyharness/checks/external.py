@@ -1,7 +1,7 @@
 """Checks of every method against results published by others.
 
-The limit is the sum of the published number's accuracy, a bound on the method's error, and the
-effect of rounding the problem's numbers to binary64.
+The limit is the sum of the number's accuracy, a bound on the method's error, and the effect of
+rounding the problem's numbers to binary64.
 """
 
 import math

@@ -1,6 +1,6 @@
 """Results published by others, and the files that describe them.
 
-A file has a scene, the source of the results, and their printed digits, which set their accuracy.
+A file has a scene, the results' source, and their printed digits, which set the accuracy.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""The process of a port or an integrator, which answers requests line by line in limited time."""
+"""The process of a port or integrator, which answers line by line in limited time."""
 
 import contextlib
 import os

@@ -1,6 +1,6 @@
 """Stress trials of a user's scene, with any torque whose arithmetic can be recorded.
 
-Results are compared with the reference, and under transformations that must not change the motion.
+Results are compared with the reference, and under symmetries.
 """
 
 from collections.abc import Callable, Iterator

@@ -4,7 +4,7 @@ Fortran and Python could share a fault too small to change the order. Each step 
 programs is therefore recomputed from the previous state, to within rounding errors.
 
 The stop test of the Runge-Kutta program (equation 19 of the thesis) divides the change of K
-(right-hand side) in a step by the change of U (state); a quotient above the stop constant ends the
+(right-hand side) in a step by the change of U (state). A quotient above the stop constant ends the
 run. The quotients are recomputed, and the program is run with constants just below and above each
 new maximum.
 """

@@ -1,4 +1,4 @@
-"""The report of `stress`: for each trial a description, a table by method, and a picture."""
+"""The report of `stress`: for each trial a description, a table and a picture."""
 
 import re
 import textwrap

@@ -1,6 +1,6 @@
 """Tolerances at which the checks run each method.
 
-A work limit, in evaluations of the right-hand side, determines which tolerances are affordable.
+A limit of right-hand sides determines which tolerances are affordable.
 """
 
 import math

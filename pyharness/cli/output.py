@@ -1,6 +1,6 @@
-"""Functions that write output folders, completely or not at all.
+"""Writing of output folders, completely or not at all.
 
-Error messages name `option`, by which the user gave the path. Verbs call the checks before any
+Messages name `option`, by which the user gave the path. Verbs call the checks before any
 computation.
 """
 

@@ -1,4 +1,4 @@
-"""The data of the page that animates a torque-free body by its closed form.
+"""The data of the page that animates a torque-free body.
 
 Readers without JavaScript see a picture, and a Python program with its output.
 """

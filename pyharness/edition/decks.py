@@ -1,4 +1,4 @@
-"""The data of the pages that show the listings card by card, with scan and ports.
+"""The data of the pages on the listings, card by card, with scan and ports.
 
 A note is a numbered entry of the apparatus.
 """

@@ -1,4 +1,4 @@
-"""The data of the laboratory, the page that runs the programs in the browser.
+"""The data of the page that runs the programs in the browser.
 
 Readers without JavaScript see one run.
 """

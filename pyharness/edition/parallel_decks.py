@@ -1,4 +1,4 @@
-"""The data of the page that compares the cards of the three programs.
+"""The data of the page that compares the programs' cards.
 
 Within an operation of `data/cards/collation.toml`, cards are aligned by similarity.
 """

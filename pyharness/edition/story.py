@@ -1,6 +1,6 @@
-"""Charts and numbers of the home page, a story in seven scenes, from runs of the Python ports.
+"""Charts and numbers of the home page, a story, from runs of the Python ports.
 
-When a visitor changes a value, a script runs the programs.
+A script runs the programs with a visitor's values.
 """
 
 import math

@@ -103,8 +103,8 @@ def averaged(
     changes.
 
     Raise InputError for another torque, or one that is opaque, depends on the attitude, is not
-    weak, or may be in resonance with omega; also near the separatrix, for a sphere, and at the work
-    limit.
+    weak, or may be in resonance with omega. Raise it also near the separatrix, for a sphere, and at
+    the work limit.
     """
     # The next macro-step refuses a point that is not finite.
     with np.errstate(all="ignore"):
@@ -271,7 +271,7 @@ class _Run:
         )
 
     def _angles(self, modulus: float) -> int:
-        """Return how many angles psi a squared elliptic modulus needs; raise TimedError near 1."""
+        """Return how many angles a squared elliptic modulus needs; raise TimedError near 1."""
         # The oscillation is analytic up to this distance from the real axis of the angle.
         width = math.acosh(1.0 / math.sqrt(min(1.0, max(modulus, 1e-4))))
         if width * _MOST_ANGLES < _DIGITS:

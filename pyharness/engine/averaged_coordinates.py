@@ -35,7 +35,7 @@ Torque = Callable[[Array, list[Array]], list[Array] | Array]
 
 
 class Coordinates(NamedTuple):
-    """Constants that define coordinates of omega; a point is (p1, p2, p3, t), t in s.
+    """Constants of coordinates of omega; a point is (p1, p2, p3, t), t in s.
 
     At the angle psi, x + i y = (p1 + i p2) exp(i psi) and w_a^2 = p3 + k y^2.
     """
@@ -133,7 +133,7 @@ class Coordinates(NamedTuple):
 
 
 def torque_of(scene: Scene) -> tuple[Torque, bool]:
-    """Return the torque over the moments as a function, and whether it may depend on time."""
+    """Return torque over moments as a function, and whether it may depend on time."""
     given = scene.torque
     if isinstance(given, StateTorque):
         tape = given.tape

@@ -6,7 +6,7 @@ angle. The equation dv/dpsi = F(v, psi) becomes
 
     dv/dpsi + (1/length) dv/ds = F(v, psi).
 
-With V(s) for v at psi = 0 (the stroboscopic solution), W = v - V, and < > the mean over psi, an
+Let V(s) be v at psi = 0 (the stroboscopic solution), W = v - V, and < > the mean over psi. An
 equivalent form is
 
     V + <W> = V(0) + <W>(0) + length (integral of <F> over s from 0),
@@ -90,7 +90,7 @@ def fast_nodes(count: int) -> Fast:
 
 
 def between_nodes(count: int, at: Array) -> Array:
-    """Return the barycentric interpolation matrix from `count` nodes to points from 0 to 1."""
+    """Return the barycentric interpolation matrix from `count` nodes to points in [0, 1]."""
     slow = slow_nodes(count)
     distance = at[:, None] - slow.nodes
     hit = np.abs(distance) < 1e-17
@@ -114,7 +114,7 @@ def between_angles(count: int, at: Array) -> Array:
 
 
 class NotResolvedError(Exception):
-    """The exception for a macro-step that is too long or has no solution."""
+    """A macro-step is too long or has no solution."""
 
 
 class MacroStep:

@@ -1,4 +1,4 @@
-"""Calls of prepared solvers from compiled code; checks of arguments that C code refused."""
+"""Calls of prepared solvers from compiled code; checks of refused arguments."""
 
 import math
 import reprlib

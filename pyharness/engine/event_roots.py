@@ -143,7 +143,7 @@ def may_vanish(fits: Fits) -> Index:
 
 
 def isolated(fits: Fits) -> Roots:
-    """Return all polynomials' roots, and extrema that may be roots, ascending in time."""
+    """Return all roots, and extrema that may be roots, ascending in time."""
     near = np.maximum(fits.noise, FIT_ERROR * fits.sizes)
     smallest = np.maximum(fits.noise / 16.0, 1e-15 * fits.sizes)
     # Points from -1 to 1, sign changes and indices of polynomials.
@@ -235,7 +235,7 @@ def _bracketed(c: Array, low: Array, high: Array, sign: Array) -> Array:
 def _bent(
     rows: Index, *given: Array
 ) -> tuple[Array, Index, list[tuple[Array, Array, Index, Index]]]:
-    """Return extrema that may be roots, their row numbers, and parts with one root."""
+    """Return extrema that may be roots, their rows, and parts with one root."""
     c, first, last, slopes, near = (each[rows] for each in given)
     count = len(c)
     low, high = np.full(count, -1.0), np.ones(count)

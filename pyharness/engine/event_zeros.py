@@ -1,4 +1,4 @@
-"""Zero intervals, in which an event's function is 0 to within its error.
+"""Intervals in which an event's function is 0 to within its error.
 
 One is a root if the function reaches 0 by a kink or a jump, not by decay.
 """

@@ -146,7 +146,7 @@ def _grouped(roots: Roots, is_same: Index, ends: tuple[float, ...]) -> Roots:
 
 
 def _have_one_extremum(g: EventFunction, solution: Solution, roots: Roots, noise: Array) -> Index:
-    """Return which adjacent roots enclose an extremum that is 0 to within noise."""
+    """Return which adjacent roots enclose an extremum of 0 to within noise."""
     found: Index = np.zeros(len(noise), dtype=bool)
     widest = np.sqrt(8.0 * roots.near / np.abs(roots.curvature))
     # A distant root belongs to another extremum, however flat the function is here.
@@ -163,7 +163,7 @@ def _have_one_extremum(g: EventFunction, solution: Solution, roots: Roots, noise
 def _with_extrema(
     g: EventFunction, solution: Solution, roots: Roots, ends: tuple[float, ...]
 ) -> Roots:
-    """Return the roots, with each double root at the polynomial's extremum."""
+    """Return the roots, each double one at the extremum."""
     if roots.change.all():
         return roots
     is_double = (roots.change == 0) & ~np.isin(roots.time, ends)
@@ -213,7 +213,7 @@ def side_events(g: EventFunction, solution: Solution, roots: Roots, side: int) -
 def _repeated(
     g: EventFunction, solution: Solution, times: Array, side: int, period: float
 ) -> Array:
-    """Return event times (s) on one side of 0, repeated periodically beyond the polynomials."""
+    """Return event times (s) on one side of 0, periodic beyond the polynomials."""
     last, end = solution.pieces.edges[-1], solution.sol.t_max
     if side < 0:
         last, end = solution.pieces.edges[0], solution.sol.t_min

@@ -1,6 +1,6 @@
 """C code for Taylor series of many bodies, one per vector lane; see fortran/many/tape_lanes.c.
 
-To save loads, the sums of products for four successive terms begin together.
+To save loads, sums of products for four successive terms begin together.
 """
 
 import re

@@ -32,7 +32,7 @@ _NATIVE = "-march=native"
 
 
 class LeavesError(Exception):
-    """The reason, in one line, why C code (leaves) can't be compiled or loaded."""
+    """The reason, in one line, why leaves can't be compiled or loaded."""
 
 
 # RuntimeError: no home folder is known.
@@ -51,7 +51,7 @@ def size() -> int:
 
 
 def about_leaves() -> dict[str, str | int]:
-    """Return the folder of compiled code, its size (bytes), and the compiler or an error."""
+    """Return folder and size (bytes) of compiled code, and the compiler or an error."""
     try:
         return {"folder": str(folder()), "bytes": size(), "compiler": " ".join(compiler())}
     except _FAILURES as error:
@@ -181,7 +181,7 @@ def compiled_file(place: Path, text: str) -> Path:
 
 
 def _run(command: list[str]) -> str:
-    """Run a compiler; return the first line of its error message, or ""."""
+    """Run a compiler; return its error's first line, or ""."""
     import subprocess
 
     try:

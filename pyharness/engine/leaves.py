@@ -1,4 +1,4 @@
-"""Compiled leaves: C code for values, series, Jacobian and rounding errors of recorded operations.
+"""Compiled leaves: C code for values, series, Jacobian and rounding errors of tapes.
 
 They replace the interpreter, fortran/modern/tape_terms.c. Tapes that differ only in coefficients
 share leaves, which read coefficients from memory.
@@ -149,7 +149,7 @@ def _vector(names: list[str]) -> str:
 
 
 def _kept(unknowns: range, k: str) -> Iterator[str]:
-    """Yield C statements that store term k of the unknowns, singly and in groups."""
+    """Yield C code that stores term k of the unknowns, singly and in groups."""
     yield from (f"  {place(slot, k)} = t{slot};" for slot in unknowns)
     for begin in unknowns[::_ABREAST]:
         at = (begin - FIRST_UNKNOWN) * Storage.PERTURBATION_LENGTH
@@ -198,7 +198,7 @@ def _set_values(tape: Structure) -> Iterator[str]:
 
 
 def kept_values(lines: list[str], rates: list[str], number: str) -> Iterator[str]:
-    """Yield C statements that store term 0 of results, and define what `rates` read."""
+    """Yield C code that stores term 0 of results, and defines what `rates` read."""
     results = [int(each[1 : each.index(" ")]) for each in lines]
     for slot in slots_read([each.partition("=")[2] for each in lines] + rates):
         if slot not in results:
@@ -209,7 +209,7 @@ def kept_values(lines: list[str], rates: list[str], number: str) -> Iterator[str
 
 
 def _roundings(tape: Structure) -> tuple[list[str], list[str]]:
-    """Return C definitions of the errors of results and of rates, in units of roundoff.
+    """Return C code for errors of results and rates, in units of roundoff.
 
     This is the running error analysis of fortran/modern/tape_noise.h.
     """
@@ -271,7 +271,7 @@ def noises(tape: Structure, number: str, written: Callable[[str], str]) -> Itera
 
 
 def derivatives(tape: Structure, count: int) -> tuple[list[str], list[dict[int, str]]]:
-    """Return C definitions of values and slopes, and each rate's derivatives by unknown.
+    """Return C code for values and slopes, and each rate's derivatives by unknown.
 
     The values are at the fraction u of a step, from `count` terms.
     """

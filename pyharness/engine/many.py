@@ -1,6 +1,6 @@
 """Solution of many bodies in one call, side by side in the kernel and in threads.
 
-Each result is bit for bit independent of other bodies, their order and the number of threads.
+Results are bit for bit independent of other bodies, their order and threads.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -112,9 +112,9 @@ def solve_many(
         name. Bodies that differ only in these values, moments or coefficients, and initial states
         are solved side by side.
     states : dict of arrays, shape (n,), or of float
-        Initial values of the scene's own states (unknowns that `Scene.states` adds), by name; the
-        default is the scene's values. Bodies with own states are solved one by one; `events`,
-        `sensitivities` and `out` are then not allowed.
+        Initial values of the scene's own states (`Scene.states`), by name; the default is the
+        scene's values. Bodies with own states are solved one by one, without `events`,
+        `sensitivities` and `out`.
     method : str
         A name in `pyharness.engine.solver.PREPARED`. `auto` uses a closed form if there is one,
         else the Taylor series.
@@ -300,7 +300,7 @@ def _solve(
 
 
 def _kind_of(scene: Scene, row: int) -> int:
-    """Return a number that is equal for scenes of one kernel call."""
+    """Return a number, equal for scenes of one kernel call."""
     checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True)
     return row if is_solved_alone(scene, {}) else _PLAIN if scene.inertia is None else _TILTED
 

@@ -75,7 +75,7 @@ def many_states(
     solver: "Solver[Any]", omega: Any, t_end: Any, attitude: Any = None, *, threads: int = 1,
     out: "Ensemble | Array | None" = None,
 ) -> tuple[Array, Array, NDArray[np.int8]]:  # fmt: skip
-    """Return omegas, (n, 3), attitudes, (n, 4), and statuses, as in `Solver.many`."""
+    """Return omegas, (n, 3), attitudes, (n, 4), and statuses."""
     usual = solver.scene.attitude or IDENTITY
     given = usual if attitude is None else scalar_first(attitude)
     starts, times = rows_of("omega", omega, 3), rows_of("t_end", t_end)

@@ -240,7 +240,7 @@ def _extrapolate(name: str, moved: Callable[[float], Scene], size: float, states
 
 
 def _moves(scene: Scene, name: str) -> Iterator[tuple[Callable[[float], Scene], float]]:
-    """Yield, for each parameter value, a function that changes it by h, and the value's scale."""
+    """Yield, by parameter value, a function that changes it by h, and its scale."""
     if name == ATTITUDE:
         for axis in np.eye(3):
             yield lambda h, axis=axis: _turned(scene, h * axis), 1.0  # type: ignore[misc]

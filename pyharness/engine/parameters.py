@@ -46,7 +46,7 @@ class VariedEquations(NamedTuple):
 
 
 def parameters_of(scene: Scene) -> dict[str, list[float] | None]:
-    """Return parameters by name, except the initial state; None if two summands share it."""
+    """Return parameters by name, without the initial state; None if summands share one."""
     found: dict[str, list[float] | None] = {}
     if scene.moments is not None:
         found["moments"] = list(scene.moments)
@@ -139,7 +139,7 @@ def tape_of_bodies(
 
 
 def initial_state(scene: Scene, equations: VariedEquations) -> tuple[Array, Array]:
-    """Return the state at time 0, (n,), and its derivatives by m parameter values, (n, m)."""
+    """Return the initial state, (n,), and its derivatives by m values, (n, m)."""
     n, m = equations.forcings.shape
     start = scene.attitude or IDENTITY
     state = np.array([*scene.omega, *start])[:n]

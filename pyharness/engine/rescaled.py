@@ -133,7 +133,7 @@ def rescaling_factor(scene: Scene, time: float) -> float:
 
 
 def _underflowing(law: TorqueLaw, factor: float) -> TorqueLaw:
-    """Return the terms of a law whose numbers are rounded in rescaled time."""
+    """Return a law's terms that rescaling rounds."""
     back = _scaled_law(_scaled_law(law, factor), 1.0 / factor)
 
     def rounded(given: Triple, found: Triple) -> Triple:
@@ -263,7 +263,7 @@ def _scaled(values: Any, exponents: Any) -> Any:
 
 
 def unscaled(trajectory: Trajectory, times: Sequence[float], factor: float) -> Trajectory:
-    """Return a trajectory of rescaled time in rad/s and s, up to the first overflow."""
+    """Return a rescaled trajectory in rad/s and s, up to the first overflow."""
     with np.errstate(over="ignore"):
         omega = trajectory.omega / factor
     finite = np.isfinite(omega).all(axis=1)

@@ -50,7 +50,7 @@ _FINEST = 1e-13  # tolerance of the steps that end at switches
 
 
 class NoNumberError(Exception):
-    """The exception for an integration that can't continue, as after a NaN in Radau."""
+    """An integration can't continue, as after a NaN in Radau."""
 
 
 class Run:

@@ -46,8 +46,8 @@ def torque_noise(
     """Return the rounding error of torque terms that nearly cancel, in units of omega's.
 
     It is the |omega| that the terms cause one by one until `t_end` (s), rounded in each of `steps`
-    steps, over `scale` (rad/s), by default the larger of the initial |omega| and the omega that the
-    whole torque causes. The result is 0 if no terms nearly cancel.
+    steps, over `scale` (rad/s). This is by default the larger of the initial |omega| and the omega
+    that the whole torque causes. The result is 0 if no terms nearly cancel.
     """
     if isinstance(scene.torque, StateTorque) or not (scene.law.sines or scene.law.cosines):
         return 0.0

@@ -18,7 +18,7 @@ _UNBOUNDED = 1e6
 
 
 class SingularError(TimedError):
-    """The exception for a time beyond which no step is possible."""
+    """No step is possible beyond a time."""
 
     def __init__(self, what: str | None, time: float) -> None:
         """Store a text about the undefined operation, None if omega or torque is infinite."""

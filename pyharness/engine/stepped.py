@@ -33,7 +33,7 @@ def steps_to(
 def step_lengths(
     scene: Scene, attitude: bool, end: float, tolerance: float, bounds: Sequence[float]
 ) -> dict[float, float]:
-    """Return the length (s) of each step to `end` (s) by its end, except at `bounds`."""
+    """Return the length (s) of each step by its end, except at `bounds`."""
     cuts = frozenset(bounds)
     return {
         stepper.time: abs(stepper.time - before)

@@ -53,8 +53,7 @@ class Stepper:
     attitude : ndarray, shape (4,), or None
         The quaternion from body to space, scalar first. It may be set.
     states : dict of str to float
-        The scene's own states (unknowns that `Scene.states` adds). A dict of some or all may be
-        set.
+        The scene's own states (`Scene.states`). A dict of some or all may be set.
     held_torque : ndarray, shape (3,)
         A torque about the body axes, added to the scene's torque, in N m; for a body given by
         coefficients, torque over moment in rad/s2. It is 0 at first, and remains until set again,

@@ -2,7 +2,7 @@
 
 One step of length h solves omega' = f(t, omega) (eq. 16-18) with a polynomial trial function
 omega(0) + c1 t + ... + cn t**n. The first estimate assumes constant f. Each correction (the thesis
-makes one) evaluates f along the previous estimate, and chooses c1, ..., cn so that the integrals of
+makes one) evaluates f along the previous estimate. It chooses c1, ..., cn so that the integrals of
 W (omega' - f) over the step vanish for n weight functions W (eq. 26).
 """
 

@@ -1,4 +1,4 @@
-"""Comparison of a page that any machine printed with ours, to find the machine's arithmetic."""
+"""Comparison of any machine's printed page with ours, to find its arithmetic."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace

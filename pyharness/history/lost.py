@@ -140,7 +140,7 @@ def _matrix(weighting: str, length: float) -> Array:
 
 
 def _solved(matrix: Array, right: Array, mistake: str, second: bool) -> Array:
-    """Return c1 and c2 of omega(0) + c1 t + c2 t**2 for all components, shape (2, 3)."""
+    """Return c1 and c2 of omega(0) + c1 t + c2 t**2, shape (2, 3)."""
     # `right` has a row for each component; `second` is true for the correction.
     if mistake == "transposed":
         matrix = matrix.T

@@ -120,7 +120,7 @@ def machine_cells(
 def _runs(
     cases: Sequence[int], listings: Sequence[Listing], words: Sequence[Word], progress: Progress
 ) -> Iterator[list[WordRun]]:
-    """Yield, for each case and listing, the run in binary64 followed by the runs in `words`."""
+    """Yield, by case and listing, the runs in binary64, then in `words`."""
     every, done = len(cases) * len(listings) * len(words), 0
     truths = {case: reference(case_scene(case), case_scene(case).times()) for case in cases}
     for case, listing in product(cases, listings):
@@ -182,7 +182,7 @@ def words_report(cells: Sequence[WordCell]) -> Report:
 
 
 def machine_report(cells: Sequence[WordCell]) -> Report:
-    """Return the verdict on the CDC's arithmetic, from the result of `machine_cells`."""
+    """Return the verdict on the CDC's arithmetic, from `machine_cells`."""
     runs = [(cell.double, run) for cell in cells for run in cell.runs]
     stops = sum(run.stop != double.stop for double, run in runs)
     changes = [

@@ -1,4 +1,4 @@
-"""Checks of a user's arrays for many bodies, with one row per body or one for all."""
+"""Checks of arrays for many bodies, with one row per body or one for all."""
 
 from collections.abc import Callable, Mapping
 from typing import Any

@@ -52,7 +52,7 @@ class _Quantity(NamedTuple):
 class Conversions:
     """The base class of trajectories.
 
-    If the inertia changes with time, each row uses its value at the row's time.
+    If the inertia changes, each row uses its value at the row's time.
     """
 
     time: Array
@@ -181,9 +181,9 @@ class Conversions:
         """Return the work of the torque on the body from time 0 to each row.
 
         The work, equal to the change of the kinetic energy, is computed as (omega - omega0) . I
-        (omega + omega0)/2, with the inertia I and the initial omega0. This form loses no digits
-        where omega has changed little. Its error is the error of omega times the angular momentum.
-        The work of the motors of `pyharness.torques.wheels` on the wheels is not included.
+        (omega + omega0)/2, with the inertia I and the initial omega0. It loses no digits where
+        omega has changed little; its error is omega's times the angular momentum. The work of the
+        motors of `pyharness.torques.wheels` on the wheels is not included.
 
         Returns
         -------

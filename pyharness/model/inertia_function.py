@@ -164,7 +164,7 @@ def inertia_of_tables(
 
 
 def checked_function(found: InertiaFunction) -> InertiaFunction:
-    """Return an inertia; raise InputError if it jumps, is asymmetric, or is invalid at time 0."""
+    """Return an inertia; raise InputError if it jumps, or is asymmetric or invalid."""
     # Imported only here, because most scenes need no exact numbers.
     from pyharness.model.inertia import checked_inertia
 

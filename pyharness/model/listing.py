@@ -150,8 +150,6 @@ def subset(
 ) -> Listing:
     """Return a Listing: a program with a selection of its defects, readings and conjectures.
 
-    `Listing` explains the three kinds.
-
     Parameters
     ----------
     program : {"two-term", "four-term", "runge-kutta"}

@@ -120,7 +120,7 @@ class Scene:
         name with its value at time 0, or with a pair of this value and a scale. The torque is then
         a function of ``(t, omega, states)`` or ``(t, omega, attitude, states)``, which returns the
         torque and a dict of the states' time derivatives. The error of a state is relative to its
-        largest absolute value so far, or to its scale if that is larger.
+        largest absolute value so far, or to a larger scale.
     step_size : float
         The step size (s) of methods with a fixed step, and of the programs of the thesis. The
         arguments below are for these programs only.

@@ -1,4 +1,4 @@
-"""Torques that depend on the state: recorded as operations, or opaque (called at each time)."""
+"""Torques that depend on the state: recorded, or opaque (called at each time)."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -434,7 +434,7 @@ def _list_summands(torque: StateTorque | TorqueLaw) -> "tuple[StateTorque | Torq
 
 
 def _sum(parts: "Sequence[StateTorque | TorqueLaw]") -> StateTorque:
-    """Return the sum in the order of a scene file, so that reading the file gives the same tape."""
+    """Return the sum in a scene file's order, so that the file gives the same tape."""
     torques = [each for each in parts if isinstance(each, StateTorque)]
     torques.sort(key=lambda each: bool(each.expression))
     tapes = [each.tape for each in torques if each.tape is not None]

@@ -325,7 +325,7 @@ def float_outputs(tape: Tape, inputs: Sequence[float]) -> list[float]:
 
 
 def _without_branches(tape: Tape, inputs: Sequence[float]) -> Tape:
-    """Return the tape with 0 for operations that these inputs do not need."""
+    """Return the tape with 0 for operations not needed."""
     values: list[Any] = [*inputs, *[0.0] * len(tape.operations)]
 
     def compute(slot: int) -> None:

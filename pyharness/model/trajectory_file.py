@@ -122,7 +122,7 @@ def _moments_record(moments: Any) -> Any:
 
 
 def _scene_record(scene: Scene) -> tuple[dict[str, Any], str]:
-    """Return, for JSON, what a scene file lacks, and the scene file's text."""
+    """Return, for JSON, what a scene file lacks, and its text."""
     record: dict[str, Any] = {
         "masses": scene.masses,
         "forces": scene.forces,

@@ -1,4 +1,4 @@
-"""Axes of a sweep's grid, each of which varies one field of the scene or of the solver."""
+"""Axes of a sweep's grid, each of which varies a field of scene or solver."""
 
 import math
 import zlib

@@ -1,4 +1,4 @@
-"""Executors, which compute the chunks of a sweep in this or other processes, with equal results.
+"""Executors, which compute a sweep's chunks in this or other processes, with equal results.
 
 Child processes ignore Ctrl-C, and end when this process ends.
 """

@@ -94,7 +94,7 @@ def _pattern(sweep: Sweep, chunk: int) -> Arrays:
 def seconds_per_chunk(sweep: Sweep) -> float:
     """Return the time (s) to solve a chunk in this process.
 
-    Below 0.2 s it is measured on whole chunks, else on sample scenes.
+    It is measured on whole chunks below 0.2 s, else on samples.
     """
     scenes = math.prod(sweep.chunk_shape)
     seconds = scenes * seconds_per_scene(sweep)

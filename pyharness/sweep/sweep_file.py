@@ -45,9 +45,9 @@ _LONGEST_NAME = 240  # bytes; most file systems take 255
 def read_sweep(path: str | os.PathLike[str], claims: Mapping[str, Claim] | None = None) -> Sweep:
     """Return the sweep that a TOML file describes.
 
-    The path of a scene file is relative to the sweep file. `claims` has a function for each claim,
-    which for a `Batch` of n scenes returns n codes: 1 if the claim holds, 0 if it fails, 2 if it
-    does not apply, 3 if it holds in part.
+    The path of a scene file is relative to the sweep file. `claims` has a function for each claim.
+    For a `Batch` of n scenes it returns n codes: 1 if the claim holds, 0 if it fails, 2 if it does
+    not apply, 3 if it holds in part.
     """
     path = os.fsdecode(path)
     where = f"sweep file '{path}'"

@@ -100,7 +100,7 @@ def run_many(
     scene : Scene
         The source of each value for which no array is specified.
     listing : Listing
-        The program with its active defects, readings of doubtful cards and conjectures.
+        The program with its active defects, readings and conjectures.
     omega, moments, coefficients, torque_constant : array_like, shape (n, 3) or (3,), optional
         Initial angular velocities (rad/s), moments of inertia (kg m2) or Euler coefficients A, B,
         C, and constant torques (N m; rad/s2 for bodies specified by coefficients). At most one of

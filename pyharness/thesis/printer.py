@@ -48,7 +48,7 @@ def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
 
 
 def _printed_rows(trajectory: Trajectory, form: str) -> list[list[float]]:
-    """Return omega (rad/s) and velocity (m/s) by row, as floats that print like exact numbers."""
+    """Return omega (rad/s) and velocity (m/s) as floats that print like exact numbers."""
     if trajectory.exact is None:
         assert trajectory.velocity is not None
         return np.hstack([trajectory.omega, trajectory.velocity]).tolist()  # type: ignore[no-any-return]

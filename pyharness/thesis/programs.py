@@ -120,7 +120,7 @@ def run_program(
     scene : Scene
         Body, initial condition, torque, step size and number of steps.
     listing : Listing
-        The program with its active defects, readings of doubtful cards and conjectures.
+        The program with its active defects, readings and conjectures.
     implementation : {"fortran", "python"}
         The compiled program or its Python port; the results are bit-for-bit identical.
     lipschitz : float
@@ -128,8 +128,8 @@ def run_program(
     may_stop : bool
         Whether the stop test may end the run.
     velocity : bool
-        Whether to return the translational velocity. False has an effect only on the compiled
-        program in binary64, and not on its other results.
+        Whether to return the translational velocity. False affects only the compiled program in
+        binary64, and no other results.
     effort : float
         Factor on the work limit. The work is the number of steps, increased for each sine or cosine
         of the torque.

@@ -1,6 +1,6 @@
 """Proved enclosures of omega by Taylor steps in integer arithmetic, and their certificates.
 
-`certificate_checker` explains the error bound of a step, and verifies a certificate independently.
+`certificate_checker` explains a step's error bound, and verifies certificates independently.
 """
 
 import math
@@ -153,7 +153,7 @@ class _Run:
         self.omega: list[Balls] = []
 
     def prove(self, limit: float, effort: float, progress: Progress, early: float) -> None:
-        """Compute all steps; raise _AmplifiedError if radii grow too fast after part `early`."""
+        """Compute all steps; raise _AmplifiedError if radii grow too fast after `early`."""
         system, clock = self._system, self._clock
         middle = [int(Fraction(x) * (1 << self._bits)) for x in self._record["omega"]]
         waves = [0, 1 << self._bits] * len(system.frequencies)

@@ -203,7 +203,7 @@ def _law_of(scene: Scene) -> TorqueLaw:
 
 
 def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal, leading: int = 3) -> Decimal:
-    """Return the length (s), at most `rest`, of a step whose last two Taylor terms are small."""
+    """Return a step (s), at most `rest`, whose last two Taylor terms are small."""
     # The terms are at most `tolerance` times the largest of the first `leading` unknowns or, if
     # these are 0, times one of four Taylor terms, from their first that is not 0.
     order = len(coefficients[0]) - 1
@@ -238,7 +238,7 @@ def _is_continued(
     length: Decimal,
     tolerance: Decimal,
 ) -> bool:
-    """Return whether the rates at the end of a step agree with the Taylor series' derivative."""
+    """Return whether the rates at a step's end agree with the series' derivative."""
     # A pulse of the torque that is invisible at the beginning of the step makes them disagree. The
     # last of the `equations` shows the effect of rounding.
     slopes = _evaluate([[k * x for k, x in enumerate(row)][1:] for row in series], length)
@@ -380,7 +380,7 @@ def _rates_by_momentum(
     series: list[Row],
     backward: list[Row],
 ) -> Row:
-    """Return Taylor coefficient k of omega', from L' = N - omega x L with momentum L, torque N."""
+    """Return coefficient k of omega', from L' = N - omega x L, momentum L, torque N."""
     # `torque` is coefficient k of N. `momentum` (L = I omega), `series` (omega) and `inertia` (I)
     # have coefficients 0 to k; `backward` is `series` reversed.
     right = []

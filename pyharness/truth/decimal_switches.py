@@ -118,7 +118,7 @@ class Switches:
 
 
 def _first_root(terms: Row, length: Decimal, side: int) -> Decimal | None:
-    """Return the distance to the first root in a step where a series loses the sign `side`."""
+    """Return the distance at which a series first loses the sign `side` in a step."""
     scaled = [each * length**k for k, each in enumerate(terms)]
     if not scaled[0]:
         scaled = scaled[1:]

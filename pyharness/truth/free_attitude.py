@@ -86,7 +86,7 @@ def _rate_and_period(scene: Scene) -> tuple[Decimal, Decimal | None]:
 
 
 def _settling_time(scene: Scene, rate: Decimal) -> Decimal:
-    """Return the time (s) from 0, either way, after which separatrix motion is steady."""
+    """Return the time (s) from 0 after which separatrix motion is steady."""
     i, w = list(scene.exact_moments or ()), [Fraction(x) for x in scene.omega]
     low, middle, high = sorted(range(3), key=lambda axis: i[axis])
     energies = [moment * rate * rate for moment, rate in zip(i, w, strict=True)]

@@ -246,7 +246,7 @@ class TapeSeries:
         return 2 * order > self._order and size > least
 
     def _largest_change(self, operation: Operation) -> Decimal | None:
-        """Return how much an operation's last operand may change in a step; None without limit."""
+        """Return how much an operation's last operand may change; None without limit."""
         if operation.kind not in ("exp", "tanh", "quotient"):
             return None
         x = self._slots[operation.operands[-1]][0]
@@ -304,7 +304,7 @@ def _powers(tape: Tape) -> tuple[list[_Power], int]:
 
 
 def _divisors(tape: Tape) -> dict[int, set[int]]:
-    """Return, by slot, the divisors and the arguments of roots in which the slot occurs."""
+    """Return, by slot, divisors and arguments of roots with the slot."""
     found: dict[int, set[int]] = {}
     for slot, (kind, operands, linear, _) in reversed([*enumerate(tape.operations, N_INPUTS)]):
         parts = operands if linear is None else [each for each, _ in linear.terms]

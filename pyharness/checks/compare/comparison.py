@@ -201,8 +201,7 @@ def compare_methods(
     effort : float
         Factor on the work limits of the methods and the reference.
     attitude : bool
-        Whether attitudes are compared too, as they always are if the torque depends on the
-        attitude.
+        Whether attitudes are compared too; always if the torque depends on them.
 
     Returns
     -------

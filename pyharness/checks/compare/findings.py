@@ -1,4 +1,4 @@
-"""The results of a comparison, with their differences from the reference."""
+"""The results of a comparison."""
 
 from dataclasses import dataclass
 

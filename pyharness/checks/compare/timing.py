@@ -1,4 +1,4 @@
-"""Timing of calls in interleaved batches, so that other load affects all equally."""
+"""Timing of calls in interleaved batches."""
 
 import contextlib
 import gc

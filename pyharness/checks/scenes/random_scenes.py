@@ -1,4 +1,4 @@
-"""Random scenes, listings and parameters, reproducible from a seed and a number."""
+"""Random scenes, listings and parameters, from a seed and a number."""
 
 import datetime
 import math

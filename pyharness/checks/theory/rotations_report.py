@@ -1,6 +1,6 @@
 """The report of the command `rotations`, with a picture of polhodes and growth rates.
 
-Polhodes, curves of torque-free omega, are drawn as directions of the angular momentum.
+Polhodes are drawn as directions of the angular momentum.
 """
 
 import math

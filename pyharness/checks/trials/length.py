@@ -1,6 +1,6 @@
 """Trial of length: energy, momentum and phase over a million revolutions, by Brouwer's law.
 
-The phase is the position along the closed curve of omega; `theory.brouwer` has the law.
+The phase is the position along the curve of omega; `theory.brouwer` has the law.
 """
 
 import math

@@ -126,7 +126,7 @@ def shown_starts(names: Sequence[str]) -> dict[Triple, dict[str, int]]:
 
 
 def atlas_report(atlas: Atlas) -> Report:
-    """Return the report of `claims --atlas`, mainly for the first reading and number of steps."""
+    """Return the report of `claims --atlas`, mainly for the first reading."""
     claims = _claims(atlas)
     score = atlas.score()
     first = f"reading {atlas.readings[0]}, {atlas.steps[0]} steps"
@@ -239,7 +239,7 @@ def _by_choice(atlas: Atlas) -> Table:
 
 
 def _percentage_turned(atlas: Atlas) -> Table:
-    """Return, by claim, the percentage of verdicts that another reading or step number changes."""
+    """Return, by claim, the percentage of verdicts that readings or steps change."""
     places = [(k, 0) for k in range(1, len(atlas.readings))]
     places += [(0, m) for m in range(1, len(atlas.steps))]
     rows = []

@@ -113,7 +113,7 @@ def undecided(found: list[Combination]) -> dict[str, list[str]]:
 
 
 def _relevant(entry: dict[str, Any], chosen: Assumptions) -> Assumptions:
-    """Return `chosen` with the defaults for assumptions on which the claim does not depend."""
+    """Return `chosen` with defaults for assumptions on which the claim does not depend."""
     # Combinations that then agree share one test of the claim.
     hangs_on = entry["assumptions"]
     readings = frozenset(name for name in chosen.readings if f"reading {name}" in hangs_on)

@@ -251,8 +251,8 @@ def computer_error(
     """Judge whether rounding error makes the weightings other than collocation fail.
 
     Rounding error (rad/s) is measured in Case 1, which every method solves exactly except for
-    rounding, with decreasing steps; and as the difference between the methods of section IV.2 in
-    binary64 and in the arithmetics `words`.
+    rounding, with decreasing steps. It is also the difference between the methods of section IV.2
+    in binary64 and in the arithmetics `words`.
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})

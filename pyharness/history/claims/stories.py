@@ -1,4 +1,4 @@
-"""Sentences of the thesis with their claims, and a story of three sentences for each claim.
+"""Sentences of the thesis with their claims, and each claim's story.
 
 `data/claims.toml` has the stories, with placeholders for the numbers of our verdict.
 """

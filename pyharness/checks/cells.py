@@ -1,12 +1,12 @@
 """Checks that the Fortran port of each program and its Python twin agree bit for bit.
 
 A cell is a combination of a program, a case of Table 1 of the thesis, defects and readings
-(interpretations of doubtful cards). Our arithmetic of other number formats, such as the CDC's with
-48 bits, is checked too.
+(interpretations of doubtful cards). Our arithmetic of other number formats, such as the CDC's, is
+checked too.
 
-A deck is compiled from the author's cards and shares no code with port and twin. Its TAPE5 (the
-file of all steps) and its printed page must equal the port's. After an overflow the deck continues,
-unlike the port, but must not produce finite omega.
+A deck is compiled from the author's cards and shares no code with port and twin. Its TAPE5 and
+printed page must equal the port's. After an overflow the deck continues, unlike the port, but must
+not produce finite omega.
 """
 
 from collections.abc import Iterator, Sequence

@@ -1,8 +1,7 @@
 """Checks of methods against the true solution of a scene, within bounds derived beforehand.
 
 Errors of the thesis's programs are reported without a bound. `auto`, `quick` and methods without a
-tolerance run as prepared solvers, whose results report a refused scene; the others raise
-InputError.
+tolerance run as prepared solvers, which report a refusal; others raise InputError.
 """
 
 import math
@@ -120,8 +119,8 @@ def check_methods(
     """Yield checks of each method's error at `time` (s) in the scene of `name`.
 
     By default, the limit is the sum of the amplified tolerance, the amplified rounding error, and
-    the error of the true solution. For fixed steps without torque, a bound from the order replaces
-    the tolerance. There is no limit without either, or if the sum leaves fewer than two digits of
+    the true solution's error. For fixed steps without torque, a bound from the order replaces the
+    tolerance. There is no limit without either, or if the sum leaves fewer than two digits of
     omega. Without torque, energy and momentum always have a limit, because their errors are not
     amplified. A refusal fails, unless `refusable` permits it.
     """

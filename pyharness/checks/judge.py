@@ -1,6 +1,6 @@
 """Comparison of methods with the true solution, and limits of their errors.
 
-Errors and limits of omega are relative to its largest component; those of the attitude are angles
+Errors and limits of omega are relative to its largest component; of the attitude, they are angles
 (rad).
 """
 

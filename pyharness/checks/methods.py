@@ -1,7 +1,7 @@
 """Checks of methods against the reference in the cases of Table 1 of the thesis.
 
-The limit of an error is the requested tolerance. Errors of omega are relative to the largest omega;
-errors of the attitude are angles (rad).
+The limit of an error is the tolerance. Errors of omega are relative to the largest omega; of the
+attitude, they are angles (rad).
 
 An order is the power of the step size to which errors are proportional. The programs' omega is
 compared with `solve_ivp`; their velocity, and fixed-step methods, with the reference.

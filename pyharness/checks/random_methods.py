@@ -1,8 +1,8 @@
 """Checks of methods in random scenes against an independent true solution.
 
 The true omega is from `integer_series`, the true attitude from `reference`. An entry point is
-`solve` or a prepared solver, with one method. The tolerance limits the error of the attitude (rad)
-or of omega, relative to the largest omega until the last time.
+`solve` or a prepared solver, with one method. The tolerance limits the error of the attitude (rad),
+or of omega relative to its largest until the last time.
 
 Torques that depend on omega or attitude are sums of recorded functions or ready-made terms. The
 reference's series for them (`truth.tape_series`) shares no code with the methods.

@@ -1,6 +1,6 @@
 """The edition as plain data: cards, apparatus, verdicts, runs and printed pages.
 
-It is an RO-Crate without the machine's times and paths, so that two runs write the same bytes.
+It is an RO-Crate without times and paths of the machine, the same bytes in every run.
 """
 
 from collections.abc import Iterator, Mapping

@@ -48,8 +48,8 @@ class Curve(NamedTuple):
 class Chart(NamedTuple):
     """A chart with fixed axes, as numbers for SVG.
 
-    `x` and `y` are ranges; for a logarithmic `y`, exponents of ten. Ticks are pairs of position and
-    label. If `is_marked`, curves are marks without lines; `marks` distinguish coincident curves.
+    `x` and `y` are ranges; for a logarithmic `y`, exponents of ten. Ticks have position and label.
+    If `is_marked`, curves are marks without lines; `marks` distinguish coincident curves.
     """
 
     name: str

@@ -42,8 +42,8 @@ def gauss(
     The step is halved until the estimated relative error of omega meets the tolerance, or the last
     two solutions differ only by rounding. The estimate is 2 d / (r**p - 1), with a safety factor 2.
     Here d is the largest relative difference of the solutions. The ratio r, at most 2, is the
-    smallest of their numbers of steps between requested times. The exponent p is min(2 `stages`,
-    8), because long steps show no higher order.
+    smallest ratio of their numbers of steps between requested times. The exponent p is min(2
+    `stages`, 8), because long steps show no higher order.
     """
     given, most = normalized(scene), effort * _MOST_EVALUATIONS / (1.0 + 0.5 * waves(scene))
     if times[-1] == 0.0:

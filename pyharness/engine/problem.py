@@ -1,7 +1,7 @@
 """Conversion of scenes to arguments of the Fortran kernels, and of results to trajectories.
 
-A torque divided by moments is four arrays: constant (rad/s2), rate (rad/s3), sines and cosines,
-whose columns have three amplitudes (rad/s2) and a frequency (rad/s).
+A torque over moments is four arrays: constant (rad/s2), rate (rad/s3), sines and cosines, whose
+columns have three amplitudes (rad/s2) and a frequency (rad/s).
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Software Heritage identifiers (SWHIDs) of the edition, and a digest of its text.
+"""Software Heritage identifiers (SWHIDs) and a digest of the edition.
 
 A SWHID (ISO/IEC 18670) contains git's SHA-1 hash of a file or folder, by which the archive Software
 Heritage finds its copies.

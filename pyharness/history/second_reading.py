@@ -1,4 +1,4 @@
-"""An estimate of the remaining transcription errors, by capture and recapture.
+"""An estimate of remaining transcription errors, by capture and recapture.
 
 The first reading of the scan is our text of the cards, the second is of a random sample
 (`data/cards/second-reading.toml`). The numbers of errors of the scanned text that each corrects,

@@ -1,4 +1,4 @@
-"""Archives of trajectories and ensembles, in the format of `numpy.savez`.
+"""Archives of trajectories and ensembles, as of `numpy.savez`.
 
 The array `header` is JSON with the kind of content and the schema number; `sha256` is a digest of
 the other arrays. Files are not trusted: nothing is unpickled, and no array may exceed the file's

@@ -1,4 +1,4 @@
-"""Exact sums of the waves of a torque law that have the same frequency.
+"""Exact sums of a torque law's waves of the same frequency.
 
 A solver rounds each quotient of amplitude and moment: if two amplitudes cancel to 1e-10 of their
 size, the sum has only six correct digits. A merged law has at most one sine and one cosine of each

@@ -1,4 +1,4 @@
-"""The store of a sweep: a Zarr group in a folder, with one array for each reduction.
+"""The store of a sweep: a Zarr group with an array for each reduction.
 
 A chunk of the grid has a file for each array, and one of their checksums. Each is written under a
 temporary name and then renamed, the checksums last.

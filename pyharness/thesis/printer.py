@@ -1,4 +1,4 @@
-"""The printed page and the file TAPE5 of a program, made from its trajectory.
+"""A program's printed page and file TAPE5, from its trajectory.
 
 The page omits each record's carriage control, a blank. `data/printer.toml` has the FORMATs, with
 conjectural parts marked. `fortranformat` writes all values except negative zeros and those not

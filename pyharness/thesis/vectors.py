@@ -1,4 +1,4 @@
-"""Numbers and instructions of CDC machines in octal, and test vectors for their arithmetic.
+"""Numbers and instructions of CDC machines in octal, and test vectors.
 
 A CDC word has a sign bit, an exponent field of 11 bits, and a coefficient of 48 bits. All bits of a
 negative number are complemented. The exponent is the field minus 2000 (octal), plus one if the

@@ -1,7 +1,7 @@
 """Exact solution of a symmetric body with a torque along its axis, in decimals.
 
-The spin about the axis is its initial value plus the integral of torque over moment. The other
-components rotate by an angle proportional to the integral of the spin.
+The spin is its initial value plus the integral of torque over moment. The other components rotate
+by an angle proportional to the integral of the spin.
 """
 
 import decimal

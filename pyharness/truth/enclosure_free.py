@@ -1,4 +1,4 @@
-"""Proved enclosures of torque-free motion at any time, in ball arithmetic (python-flint).
+"""Proved enclosures of torque-free motion, in ball arithmetic (python-flint).
 
 Omega is given by Jacobi's elliptic functions, the attitude by a theta function (Jacobi 1850;
 Whittaker, Analytical Dynamics, section 69). Formulas are chosen by exact comparison of fractions,

@@ -1,7 +1,7 @@
 """Taylor coefficients, in decimal arithmetic, of a recorded torque.
 
-A tape is a list of operations, whose results are in numbered slots. The coefficients are computed
-order by order with those of the solution (Jorba and Zou 2005, Experimental Mathematics 14).
+A tape is a list of operations, with results in numbered slots. Coefficients are computed order by
+order with the solution's (Jorba and Zou 2005, Experimental Mathematics 14).
 """
 
 from bisect import bisect_left, bisect_right

@@ -1,7 +1,7 @@
 """Comparisons of programs (original and corrected) and methods on one scene.
 
-Errors (rad/s) below the reference solution's own have no meaning. Differences between Fortran and
-Python are in units in the last place.
+Errors (rad/s) below the reference's own have no meaning. Differences between Fortran and Python are
+in units in the last place.
 """
 
 import itertools

@@ -34,10 +34,10 @@ class State(NamedTuple):
 class Fault:
     """A fault of an integrator: its name, a sentence on it, and its changes.
 
-    `scene` returns the scene that the faulty integrator solves, or None if the fault has no effect.
-    `times` returns the times (s) of its states, from the requested times and the step size (s).
-    `state` then changes the states; its second argument is the right scene. If `of_step`, the
-    states approach the true ones as the step decreases.
+    `scene` returns the scene that the faulty integrator solves, or None without effect. `times`
+    returns the times (s) of its states, from the requested times and the step size (s). `state`
+    then changes the states; its second argument is the right scene. If `of_step`, the states
+    approach the true ones as the step decreases.
     """
 
     name: str

@@ -2,7 +2,7 @@
 
 The drift is the change of conserved quantities in a long torque-free motion: relative for energy
 and |L|, an angle (rad) for the direction of the angular momentum L in space. A level, from 0 to
-`LEVELS` - 1, sets a step size (s) and a tolerance; both decrease with the level.
+`LEVELS` - 1, sets a step size (s) and a tolerance, which decrease with it.
 """
 
 import math

@@ -2,9 +2,9 @@
 
 A perturbation x of a steady rotation, or the velocity during it, obeys x' = J x with a constant
 Jacobian J. A step of size h multiplies x by a matrix of polynomials in z, where z is h times an
-eigenvalue of J, or hJ itself. The matrix has a row for each vector that a program propagates. The
-original Runge-Kutta program propagates two: the result, and U(1), at which the first stage is
-evaluated. A program is linearly stable for z where the spectral radius is at most 1.
+eigenvalue of J, or hJ itself. It has a row for each propagated vector. The original Runge-Kutta
+program propagates two: the result, and U(1), at which the first stage is evaluated. A program is
+linearly stable for z where the spectral radius is at most 1.
 
 A collocation program evaluates the right-hand side along its first estimate, a straight line, and
 corrects once. At time s it is F + s J F + s**2 Q(F), with its value F at s = 0 and quadratic part

@@ -1,4 +1,4 @@
-"""The atlas of claims: which claims of the thesis hold for which initial omega (start).
+"""The atlas of claims: which claims hold for which initial omega (start).
 
 The starts cover all directions at several magnitudes. A claim scores 1 point if reproduced, 1/2 if
 in part. Verdict codes are those of `over_starts`.

@@ -102,8 +102,8 @@ def _hamilton(moments: Triple, state: Array) -> Array:
 def bounded_not_lipschitz(lab: Laboratory, decades: float, above: float) -> Judged:
     """Judge whether a bounded function satisfies a Lipschitz condition.
 
-    It is false if a quotient of the square root between x and 2 x exceeds `above`, x from .01 to
-    10**-decades.
+    The claim is false if a quotient of the square root between x and 2 x exceeds `above`, x from
+    .01 to 10**-decades.
     """
     points = 10.0 ** -np.arange(2.0, decades + 1.0, 2.0)
     quotients = (np.sqrt(2.0 * points) - np.sqrt(points)) / points
@@ -124,7 +124,7 @@ def local_error(
 def same_as_taylor(lab: Laboratory, cases: list[int], within: float) -> Judged:
     """Judge whether Runge-Kutta and the Taylor series up to h**4 are the same method.
 
-    It is reproduced in part if the results of one step differ by O(h**5).
+    The claim is reproduced in part if the results of one step differ by O(h**5).
     """
     numbers, same, near = {}, True, True
     for case in cases:

@@ -33,7 +33,10 @@ def bundle(entry: Path) -> str:
 def _add(
     path: Path, importing: tuple[Path, ...], exports: dict[Path, list[str]], parts: list[str]
 ) -> None:
-    """Append a module to `parts` after its imports; `importing` are the modules that led to it."""
+    """Append a JavaScript module to `parts` and `exports`, after its imports.
+
+    `importing` are the modules that led to it.
+    """
     text = path.read_text(encoding="utf-8")
 
     def declare(found: re.Match[str]) -> str:

@@ -66,10 +66,7 @@ class _Ahead(NamedTuple):
 
 
 def steps_sum(name: str, radians: float, growth: float, turned: float = 0.0) -> float:
-    """Return a bound on the ratio of the error at the end to the local error.
-
-    `radians` is the phase, `growth` the error amplification, `turned` the rotation (rad).
-    """
+    """Return a bound on the ratio of the error at the end to the local error, from `_Ahead`."""
     found = _SUM[name] + _SUM_A_RADIAN[name] * radians * min(growth, _SENSITIVE)
     return found + _SUM_A_TURN[name] * turned * min(growth, _SENSITIVE)
 

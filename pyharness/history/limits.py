@@ -172,7 +172,7 @@ def _slow_slopes(scene: Scene) -> Rate:
 def _solved(
     rate: Rate, start: list[float], times: Sequence[float], scale: float, effort: float
 ) -> tuple[Array, float | None]:
-    """Return the solution, NaN after a blow-up, and the blow-up's time (s) or None."""
+    """Return the solution (NaN after a blow-up), and the blow-up's time (s) or None."""
     from scipy.integrate import solve_ivp
 
     evaluations, latest = 0, 0.0

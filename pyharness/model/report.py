@@ -72,14 +72,14 @@ def format_bytes(number: float) -> str:
 
 
 class Column(NamedTuple):
-    """A table column: head and format for rounded numbers and for CSV."""
+    """A table column, for rounded numbers and for CSV."""
 
     head: str
-    write: Callable[[Any], str] = plain
+    write: Callable[[Any], str] = plain  # formats rounded numbers
     left: bool = False  # whether the values are aligned left; numbers are aligned right
     unit: str = ""  # of the values in CSV; `write` may convert them
     name: str = ""  # head in CSV; if empty, `head` is used
-    full: Callable[[Any], str] = exact
+    full: Callable[[Any], str] = exact  # formats numbers in CSV
     fit: str = ""  # "wrap" or "cut": treatment of a last column that is too wide
 
 

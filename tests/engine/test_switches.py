@@ -88,7 +88,9 @@ def test_an_attitude_of_a_tilted_body_may_begin_at_a_level() -> None:
     def torque(t: Any, w: Any, q: Any) -> Any:
         return np.where(q[2] > 0.0, 1.0, 0.0) * np.ones(3)
 
-    scene = Scene("", (0.0, 0.0, 0.0), torque=torque, inertia=_TILTED, attitude=(1.0, 0.0, 0.0, 0.0))
+    scene = Scene(
+        "", (0.0, 0.0, 0.0), torque=torque, inertia=_TILTED, attitude=(1.0, 0.0, 0.0, 0.0)
+    )
     assert not solve(scene, 1.0).omega.any()
     assert not prepare(scene, attitude=True)(np.zeros(3), 1.0)[0].any()
 

@@ -288,7 +288,7 @@ KINDS = {"plain": _plain, **NASTY, "pointing": _pointing, "driven": _driven}
 
 
 def _law(source: Random, size: float, kinds: int, frequencies: tuple[float, float]) -> TorqueLaw:
-    """Return a random torque law of at most `size` (N m, N m/s), with `frequencies` in rad/s."""
+    """Return a random torque law with components up to `size`, with `frequencies` in rad/s."""
     # `kinds` is a sum of 1 for a constant term, 2 for a rate, 4 for a sine, 8 for a cosine.
     low, high = map(math.log10, frequencies)
     constant, rate = _vector(source, size), _vector(source, size)

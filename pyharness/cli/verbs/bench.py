@@ -26,8 +26,8 @@ _OPTION_OF = {"method": "--method", "peer": "--peers"}
 OPTIONS = {
     "--case N": "Measure only this case of Table 1 of the thesis, 1 to 7 (default: Cases 2 to 7, "
     "with --attitude also Case 1).",
-    "--horizon T": "End time of each integration, in s, above 0, up to 1000 (default: 3; in Cases "
-    "3 and 4 also 100, with --attitude in all but Case 6).",
+    "--horizon T": "End time of each integration, in s, above 0, up to 1000 (default: 3, in Cases "
+    "3 and 4 also 100; with --attitude also 100 in all Cases but 6).",
     "--draws N": "Instead of the cases, measure N random scenes, 1 to 10000, with all kinds of "
     "torque and body.",
     "--ensemble": "Instead of single trajectories, measure calls that solve many bodies at once: "

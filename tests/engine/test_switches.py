@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pyharness import InputError, Scene, Stepper, Taylor, opaque, prepare, solve, solve_many
+from pyharness import (
+    InputError, Scene, Stepper, Taylor, opaque, prepare, principal, solve, solve_many,
+)  # fmt: skip
 from pyharness.model.state_torque import recorded
 from pyharness.truth.reference import reference
 
@@ -82,6 +84,14 @@ def test_a_component_of_a_tilted_body_may_begin_at_a_level(torque: Torque, omega
     assert found.sol.derivative(0.0)[:3] == pytest.approx(slope(0.0, np.array(omega)), abs=1e-12)
     energy = 0.5 * truth @ _TILTED @ truth
     assert found.energy()[-1] == pytest.approx(energy, abs=1e-6)
+
+
+@pytest.mark.parametrize("omega", [(1.2, 0.0, -0.36), (1.3, 0.0, -0.36), (0.7, 0.0, 0.2)])
+def test_an_operand_that_begins_as_a_rounding_error_may_cross_its_level(omega: Any) -> None:
+    """Regression test: a step to its root was rejected until the work limit."""
+    scene = principal(Scene("", omega, torque=_friction, inertia=_TILTED))[0]
+    assert solve(scene, 1.0).ended == "complete"
+    assert solve(scene, 1e-3).ended == "complete"
 
 
 def test_an_attitude_of_a_tilted_body_may_begin_at_a_level() -> None:

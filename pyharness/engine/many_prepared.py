@@ -108,7 +108,7 @@ def solve_each(
     matrix is full, or the torque neither recorded nor about the axes of space.
     """
     left = list(range(piece.start, piece.stop))
-    if solver.packed[Places.METHOD] == Methods.TAPE and not uses_principal_axes(solver.scene):
+    if solver.packed[Places.METHOD] == Methods.TAPE and solver.scene.inertia is None:
         own = times if solver.scene.changing is None else times_within(solver.scene, times)
         left = solve_lanes(solver.packed, NO_PARAMETERS, starts, own, turns, found, piece, given_up)
     for i in left:

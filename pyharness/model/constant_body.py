@@ -25,10 +25,8 @@ def integrated(scene: Scene) -> Scene:
         return principal(scene)[0]
     assert isinstance(torque, StateTorque)
     assert torque.tape is not None
-    attitude = (scene.attitude or IDENTITY) if torque.needs_attitude else scene.attitude
     rates = _rates(torque.tape, torque.own, scene.inertia)
-    given: dict[str, Any] = {"inertia": None, "coefficients": (0.0, 0.0, 0.0)}
-    return replace(scene, torque=rates, attitude=attitude, **given)
+    return replace(scene, inertia=None, coefficients=(0.0, 0.0, 0.0), torque=rates)
 
 
 def uses_principal_axes(scene: Scene) -> bool:

@@ -11,7 +11,15 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pyharness import (
-    InputError, Scene, Stepper, Taylor, opaque, prepare, principal, solve, solve_many,
+    InputError,
+    Scene,
+    Stepper,
+    Taylor,
+    opaque,
+    prepare,
+    principal,
+    solve,
+    solve_many,
 )  # fmt: skip
 from pyharness.model.state_torque import recorded
 from pyharness.truth.reference import reference
@@ -92,6 +100,21 @@ def test_an_operand_that_begins_as_a_rounding_error_may_cross_its_level(omega: A
     scene = principal(Scene("", omega, torque=_friction, inertia=_TILTED))[0]
     assert solve(scene, 1.0).ended == "complete"
     assert solve(scene, 1e-3).ended == "complete"
+
+
+def test_the_reference_of_a_tilted_needle_keeps_its_digits() -> None:
+    """About the body axes the equations would be rounded."""
+    turn = np.linalg.qr(np.array([[1.0, 2.0, 3.0], [0.0, 1.0, 4.0], [5.0, 6.0, 0.0]]))[0]
+    inertia = turn @ np.diag([1e-6, 1.0, 1.0 + 5e-7]) @ turn.T
+    scene = Scene(
+        "", (0.4, -1.1, 0.7), torque=lambda t, w: [0.0, -1e-7 * np.clip(w[1], -0.2, 0.2), 0.0],
+        inertia=0.5 * (inertia + inertia.T),
+    )  # fmt: skip
+    about, axes = principal(scene)
+    expected = axes @ solve(about, 1.0, "reference").omega[-1]
+    found = solve(scene, 1.0, "reference").omega[-1]
+    assert found == pytest.approx(expected, rel=0.0, abs=1e-14)
+    assert solve(scene, 1.0).omega[-1] == pytest.approx(expected, rel=0.0, abs=1e-9)
 
 
 def test_an_attitude_of_a_tilted_body_may_begin_at_a_level() -> None:

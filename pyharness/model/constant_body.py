@@ -4,14 +4,16 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
+import numpy as np
+
 from pyharness.model.attitude import IDENTITY
-from pyharness.model.changing import rates_of_changing, rates_of_inertia
+from pyharness.model.changing import rates_of_changing
 from pyharness.model.principal import principal
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque, has_switches, of_law, replayed, torque_of
 from pyharness.model.tape import Tape
 from pyharness.model.torque_law import TorqueLaw
-from pyharness.model.values import Matrix
+from pyharness.model.values import Matrix, Triple
 
 
 def integrated(scene: Scene) -> Scene:
@@ -20,12 +22,15 @@ def integrated(scene: Scene) -> Scene:
     They are principal axes; under a torque with switches they are the body axes, because rounding
     would move a state off the level on which it begins.
     """
+    about, axes = principal(scene)
     torque = scene.torque
     if scene.inertia is None or uses_principal_axes(scene):
-        return principal(scene)[0]
+        return about
     assert isinstance(torque, StateTorque)
     assert torque.tape is not None
-    rates = _rates(torque.tape, torque.own, scene.inertia)
+    assert about.moments is not None
+    body = about.euler_coefficients, about.moments, tuple(map(tuple, axes.tolist()))
+    rates = _rates(torque.tape, torque.own, *body)
     return replace(scene, inertia=None, coefficients=(0.0, 0.0, 0.0), torque=rates)
 
 
@@ -35,10 +40,18 @@ def uses_principal_axes(scene: Scene) -> bool:
 
 
 @lru_cache(maxsize=64)
-def _rates(tape: Tape, own: tuple[str, ...], inertia: Matrix) -> StateTorque:
+def _rates(
+    tape: Tape, own: tuple[str, ...], coefficients: Triple, moments: Triple, axes: Matrix
+) -> StateTorque:
+    # The products are those of principal axes; in products of components about the body axes large
+    # terms would cancel.
     def rates(time: Any, omega: Any, q: Any, *states: Any) -> list[Any]:
         torque = torque_of(tape, time, omega, q, *states)
-        return [*rates_of_inertia(inertia, omega, torque[:3]), *torque[3:]]
+        columns = np.array(axes)
+        x, y, z = omega @ columns
+        products = coefficients * np.array([y * z, z * x, x * y])
+        found = columns @ (products + np.array(torque[:3]) @ columns / moments)
+        return [*found, *torque[3:]]
 
     return replayed(rates, own)
 

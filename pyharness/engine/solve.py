@@ -34,6 +34,7 @@ from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.constant_body import integrated, with_constant_body
 from pyharness.model.errors import InputError, known
+from pyharness.model.inertia import principal_frame
 from pyharness.model.keywords import with_hints
 from pyharness.model.principal import PrincipalScene, in_scene_axes, principal, states_in_scene_axes
 from pyharness.model.scene import Scene, checked_scene, most_steps
@@ -165,9 +166,9 @@ def solve(
     axes = None
     moments = scene.changing or scene.moments
     if scene.inertia is not None:
-        about, axes = principal(scene)
-        moments = about.moments
-        scene = about if method == "reference" else integrated(scene)
+        frame = principal_frame(scene.inertia)
+        axes, moments = frame.axes.copy(), frame.moments
+        scene = principal(scene)[0] if method == "reference" else integrated(scene)
     values, turned = ascending_times(times)
     if scene.changing is not None:
         scene.changing.check((values[0], values[-1]))

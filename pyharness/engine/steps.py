@@ -8,10 +8,10 @@ import numpy as np
 
 from pyharness.engine.recorded import outputs_at, slopes_of, system_of
 from pyharness.model.array_type import Array
-from pyharness.model.attitude import product, quaternion_of_axes, quaternion_rates
+from pyharness.model.attitude import product, quaternion_rates
 from pyharness.model.constant_body import integrated, uses_principal_axes, with_constant_body
 from pyharness.model.dense_output import POINTS, DenseOutput, Pieces, nodes
-from pyharness.model.principal import principal
+from pyharness.model.principal import axes_and_turn
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import of_law
 from pyharness.model.torque_law import TorqueLaw
@@ -22,7 +22,7 @@ MOST_STEPS = 20_000  # that `sol` has; it limits the memory
 
 def rates(scene: Scene, times: Array, state: Array) -> Array:
     """Return time derivatives of n states, shape (n, m); not finite at a singular torque."""
-    axes = principal(scene)[1] if uses_principal_axes(scene) else None
+    turn = axes_and_turn(scene) if uses_principal_axes(scene) else None
     bare = with_constant_body(integrated(scene))
     torque = bare.torque
     if isinstance(torque, TorqueLaw):
@@ -31,9 +31,9 @@ def rates(scene: Scene, times: Array, state: Array) -> Array:
     end = state.shape[1] - len(scene.states)
     omega, attitude, own = state[:, :3], state[:, 3:end], state[:, end:]
     inner = state
-    if axes is not None:
-        turned = product(attitude.T, quaternion_of_axes(axes)) if attitude.size else []
-        inner = np.column_stack([omega @ axes, *turned, own])
+    if turn is not None:
+        turned = product(attitude.T, turn[1]) if attitude.size else []
+        inner = np.column_stack([omega @ turn[0], *turned, own])
     more = own
     if torque.tape is not None:
         tape = system_of(bare, bool(attitude.size and own.size))
@@ -43,8 +43,8 @@ def rates(scene: Scene, times: Array, state: Array) -> Array:
         slopes = slopes_of(bare)
         rows = zip(times.tolist(), inner.tolist(), strict=True)
         found = np.array([slopes(*row)[:3] for row in rows]).reshape(-1, 3)
-    if axes is not None:
-        found = found @ axes.T
+    if turn is not None:
+        found = found @ turn[0].T
     if attitude.size:
         found = np.column_stack([found, *quaternion_rates(omega.T, attitude.T)])
     return np.column_stack([found, more]) if own.size else found

@@ -13,7 +13,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque, has_switches, of_law, replayed, torque_of
 from pyharness.model.tape import Tape
 from pyharness.model.torque_law import TorqueLaw
-from pyharness.model.values import Matrix, Triple
+from pyharness.model.values import Matrix
 
 
 def integrated(scene: Scene) -> Scene:
@@ -22,15 +22,12 @@ def integrated(scene: Scene) -> Scene:
     They are principal axes; under a torque with switches they are the body axes, because rounding
     would move a state off the level on which it begins.
     """
-    about, axes = principal(scene)
     torque = scene.torque
     if scene.inertia is None or uses_principal_axes(scene):
-        return about
+        return principal(scene)[0]
     assert isinstance(torque, StateTorque)
     assert torque.tape is not None
-    assert about.moments is not None
-    body = about.euler_coefficients, about.moments, tuple(map(tuple, axes.tolist()))
-    rates = _rates(torque.tape, torque.own, *body)
+    rates = _rates(torque.tape, torque.own, scene.inertia)
     return replace(scene, inertia=None, coefficients=(0.0, 0.0, 0.0), torque=rates)
 
 
@@ -40,18 +37,17 @@ def uses_principal_axes(scene: Scene) -> bool:
 
 
 @lru_cache(maxsize=64)
-def _rates(
-    tape: Tape, own: tuple[str, ...], coefficients: Triple, moments: Triple, axes: Matrix
-) -> StateTorque:
+def _rates(tape: Tape, own: tuple[str, ...], inertia: Matrix) -> StateTorque:
     # The products are those of principal axes; in products of components about the body axes large
     # terms would cancel.
+    about, axes = principal(Scene("", (0.0, 0.0, 0.0), inertia=inertia))
+    coefficients, moments = np.array(about.euler_coefficients), np.array(about.moments)
+
     def rates(time: Any, omega: Any, q: Any, *states: Any) -> list[Any]:
-        torque = torque_of(tape, time, omega, q, *states)
-        columns = np.array(axes)
-        x, y, z = omega @ columns
+        torque = np.array(torque_of(tape, time, omega, q, *states))
+        x, y, z = omega @ axes
         products = coefficients * np.array([y * z, z * x, x * y])
-        found = columns @ (products + np.array(torque[:3]) @ columns / moments)
-        return [*found, *torque[3:]]
+        return [*(axes @ (products + torque[:3] @ axes / moments)), *torque[3:]]
 
     return replayed(rates, own)
 

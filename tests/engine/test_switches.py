@@ -21,7 +21,7 @@ from pyharness import (
     principal,
     solve,
     solve_many,
-)  # fmt: skip
+)
 from pyharness.model.state_torque import recorded
 from pyharness.truth.reference import reference
 
@@ -118,19 +118,22 @@ def test_a_tilted_symmetric_body_keeps_its_digits_in_a_long_motion() -> None:
     assert np.abs(found.omega[-1] - truth).max() / 0.7 < min(found.error, 1e-10)
 
 
-def test_the_reference_of_a_tilted_needle_keeps_its_digits() -> None:
-    """About the body axes the equations would be rounded."""
-    turn = np.linalg.qr(np.array([[1.0, 2.0, 3.0], [0.0, 1.0, 4.0], [5.0, 6.0, 0.0]]))[0]
-    inertia = turn @ np.diag([1e-6, 1.0, 1.0 + 5e-7]) @ turn.T
+@pytest.mark.parametrize(
+    ("moments", "omega", "end"), [((1e-6, 1.0, 1.0 + 5e-7), (0.4, -1.1, 0.7), 1.0),
+                                  ((1.0, 2.0, 3.0), (1e-3, 1.0, 0.0), 20.0)],
+)  # fmt: skip
+def test_a_tilted_body_keeps_its_digits(moments: Any, omega: Any, end: float) -> None:
+    """The second motion amplifies errors 1e5 times; the reference has none to amplify."""
+    turn = Rotation.from_rotvec((0.4, 0.2, 0.7)).as_matrix()
+    inertia = turn @ np.diag(moments) @ turn.T
     scene = Scene(
-        "", (0.4, -1.1, 0.7), torque=lambda t, w: [0.0, -1e-7 * np.clip(w[1], -0.2, 0.2), 0.0],
-        inertia=0.5 * (inertia + inertia.T),
+        "", turn @ omega, inertia=0.5 * (inertia + inertia.T),
+        torque=lambda t, w: [0.0, -1e-7 * np.clip(w[1], -0.2, 0.2), 0.0],
     )  # fmt: skip
     about, axes = principal(scene)
-    expected = axes @ solve(about, 1.0, "reference").omega[-1]
-    found = solve(scene, 1.0, "reference").omega[-1]
-    assert found == pytest.approx(expected, rel=0.0, abs=1e-14)
-    assert solve(scene, 1.0).omega[-1] == pytest.approx(expected, rel=0.0, abs=1e-12)
+    expected = axes @ solve(about, end, "reference").omega[-1]
+    assert solve(scene, end, "reference").omega[-1] == pytest.approx(expected, rel=0.0, abs=1e-15)
+    assert solve(scene, end).omega[-1] == pytest.approx(expected, rel=0.0, abs=1e-10)
 
 
 def test_an_attitude_of_a_tilted_body_may_begin_at_a_level() -> None:

@@ -109,10 +109,8 @@ def compare_programs(
     methods = boolean("methods", methods)
     effort = checked_effort(effort)
     listings = listings_for() if listings is None else listings
-    if not isinstance(listings, Sequence):
-        raise InputError(f"listings: {kind_of(listings)}; allowed: a list of Listing, as of subset")
-    for each in listings:
-        if not isinstance(each, Listing):
+    for each in listings if are_several(listings) else [listings]:
+        if not isinstance(each, Listing) or not are_several(listings):
             raise InputError(f"listings: {kind_of(each)}; allowed: a list of Listing, as of subset")
     in_floats = checked_word(word, "python") == BINARY64
     has_fortran = in_floats or word in compiled_words()

@@ -38,6 +38,7 @@ module tape
   ! What C reads of a tape, and the terms that it computes.
   type, bind(c), public :: tape_arrays_t
     integer(c_int) :: n_unknowns, n_operations, n_combinations
+    integer(c_int) :: has_attitude !! not 0: perturbations are those of omega and the attitude
     type(c_ptr) :: operations, starts, slots, coefficients, constants, a, v, work, leaves
   end type tape_arrays_t
 
@@ -125,7 +126,7 @@ contains
     type(c_ptr), intent(in) :: a, v  !! the terms of the slots and of perturbations, as in series_t
     type(c_ptr), intent(in) :: work  !! storage, as begin_work of tape_terms.c divides it
 
-    arrays_of = tape_arrays_t(tape%n_unknowns, tape%n_operations, size(tape%constants), &
+    arrays_of = tape_arrays_t(tape%n_unknowns, tape%n_operations, size(tape%constants), 0, &
                               c_loc(tape%operations), c_loc(tape%starts), c_loc(tape%slots), &
                               c_loc(tape%coefficients), c_loc(tape%constants), a, v, work, &
                               tape%leaves)

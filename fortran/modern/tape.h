@@ -87,6 +87,7 @@ struct leaves {
 /* Numbers of slots and combinations begin with 1. */
 struct tape {
   int n_unknowns, n_operations, n_combinations;
+  int has_attitude; /* perturbations: the unknowns are omega and the attitude, no others */
   const int (*operations)[4]; /* kind, two operands and result */
   const int *starts, *slots;
   const double *coefficients, *constants;

@@ -138,6 +138,7 @@ contains
     first_own = n + 1
     if (associated(solution%own)) first_own = n + 2 - size(solution%own, 1)
     y(4:first_own - 1) = attitude(:first_own - 4)
+    s%arrays%has_attitude = merge(1, 0, n == 7 .and. first_own > n)
     call begin_own()
     y_low = 0.0_dp
     t = 0.0_dp
@@ -429,6 +430,11 @@ contains
           s%blocks(1:SIDE_BY_SIDE, 0, FIRST_UNKNOWN - 1 + i, block) = lanes(:, i, block)
         end do
       end do
+      if (s%arrays%has_attitude == 0) return
+      associate (v => s%blocks(:, 0, FIRST_UNKNOWN + 3:FIRST_UNKNOWN + 6, 1))
+        call rotate(y(4), -y(5), -y(6), -y(7), v(:, 1), v(:, 2), v(:, 3), v(:, 4))
+        v = v/dot_product(y(4:7), y(4:7))
+      end associate
     end subroutine set_lanes
 
     subroutine perturb()
@@ -783,10 +789,14 @@ contains
         call sum_perturbations(arrays_of_block(block), last_terms(block), factor, &
                                lanes(1, 1, block))
       end do
-      lanes(1, :n, 1) = lanes(1, :n, 1) - left
       do i = 1, n
         call two_sum((y(i)), change(i) + y_low(i), y(i), y_low(i))
       end do
+      if (s%arrays%has_attitude /= 0) then
+        call rotate(y(4), y(5), y(6), y(7), lanes(:, 4, 1), lanes(:, 5, 1), lanes(:, 6, 1), &
+                    lanes(:, 7, 1))
+      end if
+      lanes(1, :n, 1) = lanes(1, :n, 1) - left
     end subroutine take_step
 
     subroutine evaluate(part, change, error)
@@ -805,6 +815,10 @@ contains
           error(i) = part*error(i) + s%blocks(1, k, FIRST_UNKNOWN - 1 + i, 1)
         end do
       end do
+      if (s%arrays%has_attitude /= 0) then
+        call rotate(y(4) + change(4), y(5) + change(5), y(6) + change(6), y(7) + change(7), &
+                    error(4), error(5), error(6), error(7))
+      end if
       error = error - (part/factor)**(s%order + 1)*left
     end subroutine evaluate
 
@@ -887,6 +901,12 @@ contains
                           (MOST_ORDER + 1)*SIDE_BY_SIDE, n, last_terms(1), parts, errors)
         do i = 1, n
           errors(:, i) = errors(:, i) + s%blocks(1, 0, FIRST_UNKNOWN - 1 + i, 1)
+        end do
+        if (s%arrays%has_attitude /= 0) then
+          call rotate(y(4) + changes(:, 4), y(5) + changes(:, 5), y(6) + changes(:, 6), &
+                      y(7) + changes(:, 7), errors(:, 4), errors(:, 5), errors(:, 6), errors(:, 7))
+        end if
+        do i = 1, n
           errors(:, i) = errors(:, i) - powers*left(i)
           sizes = max(sizes, weights(i)*abs(errors(:, i)))
         end do
@@ -905,6 +925,21 @@ contains
     end subroutine add_nodes
 
   end subroutine march
+
+  elemental subroutine rotate(w, x, y, z, a, b, c, d)
+    !! Multiply the quaternion (a, b, c, d) by (w, x, y, z), from the left.
+    real(dp), intent(in) :: w, x, y, z
+    real(dp), intent(inout) :: a, b, c, d
+    real(dp) :: p, q, r
+
+    p = a
+    q = b
+    r = c
+    a = w*p - x*q - y*r - z*d
+    b = w*q + x*p + y*d - z*r
+    c = w*r - x*d + y*p + z*q
+    d = w*d + x*r - y*q + z*p
+  end subroutine rotate
 
   pure function transposed(n, lanes) result(matrix)
     !! Compute the matrix of the open block from the perturbations in the lanes.

@@ -533,6 +533,38 @@ static ALWAYS_INLINE void perturb_with(const int n, const int columns, const int
   }
 }
 
+/* The same for omega and the attitude, whose perturbation is a rotation q (e, p) of the attitude q: as
+   q' = q omega / 2, e is constant and p' = p x omega + (perturbation of omega) / 2. Row 3 of the
+   Jacobian is omega, times the step; the other rows are derivatives of the rates of omega. */
+static ALWAYS_INLINE void perturb_attitude(const int nodes, perturbations *v, const matrix *jacobian,
+                                           double h, int k)
+{
+  const double part = 1.0 / (k + 1);
+  const int degree = k < nodes - 1 ? k : nodes - 1;
+  for (int p = 0; p < SIDE_BY_SIDE; p += IN_REGISTER) {
+    reg sums[WITH_ATTITUDE] = {{0.0}};
+#pragma GCC unroll 3
+    for (int i = 0; i < 3; i++) sums[4 + i] = 0.5 * h * *(const reg *)(v[i][k] + p);
+    for (int d = 0; d <= degree; d++) {
+      const row *const at = jacobian[d][0];
+      const reg x = *(const reg *)(v[4][k - d] + p), y = *(const reg *)(v[5][k - d] + p);
+      const reg z = *(const reg *)(v[6][k - d] + p);
+#pragma GCC unroll 7
+      for (int j = 0; j < WITH_ATTITUDE; j++) {
+        if (j == 3 && d < k) continue;
+        const reg of_j = *(const reg *)(v[j][k - d] + p);
+#pragma GCC unroll 3
+        for (int i = 0; i < 3; i++) sums[i] += at[i][j] * of_j;
+      }
+      sums[4] += at[3][2] * y - at[3][1] * z;
+      sums[5] += at[3][0] * z - at[3][2] * x;
+      sums[6] += at[3][1] * x - at[3][0] * y;
+    }
+#pragma GCC unroll 7
+    for (int i = 0; i < WITH_ATTITUDE; i++) *(reg *)(v[i][k + 1] + p) = part * sums[i];
+  }
+}
+
 /* The nodes of Gauss on (0, 1), and the coefficients of a polynomial through its values there. */
 static const nodal few_parts = {0.21132486540518712, 0.78867513459481288};
 static const double few_weights[][FEW_NODES] = {
@@ -577,13 +609,13 @@ void OF_LEVEL(jacobian_at, LEVEL)(const struct tape *tape, double h, const doubl
 
 /* Replace one block of columns of the Jacobian at the nodes of Gauss by a polynomial of the part of the
    step: the error of the perturbations is of order 2 nodes + 1. */
-static ALWAYS_INLINE void fit_block(const struct tape *tape, const int block, const int columns,
+static ALWAYS_INLINE void fit_block(const int n_rows, const int block, const int columns,
                                     const int nodes, double factor, matrix *jacobian)
 {
   const int is_few = nodes == FEW_NODES;
   row *to[] = {jacobian[0][block], jacobian[1][block], jacobian[2][block], jacobian[3][block]};
   const double per_factor = 1.0 / factor;
-  for (int i = 0; i < tape->n_unknowns; i++) {
+  for (int i = 0; i < n_rows; i++) {
     for (int p = 0; p < columns; p += IN_REGISTER) {
       reg values[NODES];
       double power = 1.0;
@@ -601,6 +633,26 @@ static ALWAYS_INLINE void fit_block(const struct tape *tape, const int block, co
   }
 }
 
+/* Change a Jacobian to the variables of perturb_attitude: the derivatives by the attitude q are taken
+   by e and p. */
+static ALWAYS_INLINE void change_variables(const struct tape *tape, const int nodes, nodal parts,
+                                           matrix *jacobian)
+{
+  const series *const a = (const series *)tape->a + FIRST_UNKNOWN + 3;
+  const nodal w = summed(a[0], parts), x = summed(a[1], parts), y = summed(a[2], parts);
+  const nodal z = summed(a[3], parts);
+  for (int d = 0; d < nodes; d++) {
+    row *const at = jacobian[d][0];
+    const abreast by_w = {w[d], -x[d], -y[d], -z[d]}, by_x = {x[d], w[d], -z[d], y[d]};
+    const abreast by_y = {y[d], z[d], w[d], -x[d]}, by_z = {z[d], -y[d], x[d], w[d]};
+    /* The rates of x, y and z by w are halves of omega. */
+    for (int i = 0; i < 3; i++) at[3][i] = 2.0 * at[4 + i][3];
+    for (int i = 0; i < 3; i++)
+      *(abreast_anywhere *)(at[i] + 3) =
+          at[i][3] * by_w + at[i][4] * by_x + at[i][5] * by_y + at[i][6] * by_z;
+  }
+}
+
 static ALWAYS_INLINE void set_blocks(const struct tape *tape, const int nodes, double h,
                                      double factor, matrix *jacobian)
 {
@@ -611,18 +663,21 @@ static ALWAYS_INLINE void set_blocks(const struct tape *tape, const int nodes, d
   else
     for (int block = 0; block * SIDE_BY_SIDE < n; block++)
       set_at(tape, block, SIDE_BY_SIDE, nodes, h, parts, jacobian);
-  if (n == 3) fit_block(tape, 0, 4, nodes, factor, jacobian);
-  else
+  if (n == 3) fit_block(3, 0, 4, nodes, factor, jacobian);
+  else if (tape->has_attitude) {
+    change_variables(tape, nodes, parts, jacobian);
+    fit_block(4, 0, SIDE_BY_SIDE, nodes, factor, jacobian);
+  } else
     for (int block = 0; block * SIDE_BY_SIDE < n; block++)
-      fit_block(tape, block, SIDE_BY_SIDE, nodes, factor, jacobian);
+      fit_block(n, block, SIDE_BY_SIDE, nodes, factor, jacobian);
 }
 
-static ALWAYS_INLINE void perturb_all(const int n, const int nodes, perturbations *v,
-                                      const matrix *jacobian, int k)
+static ALWAYS_INLINE void perturb_all(const struct tape *tape, const int nodes, perturbations *v,
+                                      const matrix *jacobian, double h, int k)
 {
-  if (n == 3) perturb_with(3, 4, nodes, v, jacobian, k);
-  else if (n == WITH_ATTITUDE) perturb_with(WITH_ATTITUDE, SIDE_BY_SIDE, nodes, v, jacobian, k);
-  else perturb_with(n, SIDE_BY_SIDE, nodes, v, jacobian, k);
+  if (tape->n_unknowns == 3) perturb_with(3, 4, nodes, v, jacobian, k);
+  else if (tape->has_attitude) perturb_attitude(nodes, v, jacobian, h, k);
+  else perturb_with(tape->n_unknowns, SIDE_BY_SIDE, nodes, v, jacobian, k);
 }
 
 /* Expand eight perturbations, from number `number` on, to as many terms as the part `factor` of the
@@ -656,8 +711,8 @@ int OF_LEVEL(perturb_tape, LEVEL)(const struct tape *tape, int number, double h,
   if (is_long) set_blocks(tape, NODES, h, factor, jacobian);
   else set_blocks(tape, FEW_NODES, h, factor, jacobian);
   do {
-    if (is_long) perturb_all(n, NODES, v, jacobian, k++);
-    else perturb_all(n, FEW_NODES, v, jacobian, k++);
+    if (is_long) perturb_all(tape, NODES, v, jacobian, h, k++);
+    else perturb_all(tape, FEW_NODES, v, jacobian, h, k++);
     power *= factor;
     was_small = is_small;
     is_small = k >= (is_long ? FIRST_OF_LONG : FIRST_CHECKED) && are_small(tape, k, weights, power, limits, count);

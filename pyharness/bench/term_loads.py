@@ -32,8 +32,8 @@ OURS, HEYOKA, DOP853 = "auto", "heyoka", "solve_ivp-dop853"
 VARIATIONAL = "heyoka-variational"
 MANY_OURS, MANY_HEYOKA = "taylor", "heyoka-batch"
 ONE_TOLERANCE = 1e-9  # for solvers compared with ours at one tolerance
-# Coarser tolerances miss every target error. The finest is the default of heyoka.
-_TOLERANCES = (*(each for each in TOLERANCES if each < 1e-4), 2.0**-52)
+# Coarser tolerances change nothing in our steps. The finest is the default of heyoka.
+_TOLERANCES = (*(each for each in TOLERANCES if each <= 1e-3), 2.0**-52)
 
 HORIZONS = (10.0, 100.0)  # end times of a single body, s
 READY, EXPRESSION = "ready term", "expression"

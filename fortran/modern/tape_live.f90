@@ -29,6 +29,13 @@ contains
     do n = size(tape%constants) - tape%n_unknowns + 1, size(tape%constants)
       call use_combination(n)
     end do
+    if (associated(s%forcings)) then
+      do i = 1, size(s%forcings, 2)
+        do n = 1, size(s%forcings, 1)
+          if (s%forcings(n, i) > 0) call use_combination(s%forcings(n, i))
+        end do
+      end do
+    end if
     last = tape%n_slots
     i = switches%n
     do n = tape%n_operations, 1, -1

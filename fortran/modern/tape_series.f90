@@ -56,6 +56,8 @@ module tape_series
     real(dp), allocatable :: noise(:)       !! (slots): rounding errors of terms 0, in units
     type(powers_t) :: powers
     type(tape_arrays_t) :: arrays           !! what tape_terms.c reads of the tape
+    !! Combinations that matter beside the rates; 0 for none.
+    integer, pointer, contiguous :: forcings(:, :) => null()
   end type series_t
 
   ! Derivatives of the unknowns with respect to eight parameters, side by side.

@@ -98,6 +98,7 @@ contains
     subroutine begin()
       integer :: block, column, lane
 
+      s%forcings => request%forcings
       s%blocks = 0.0_dp
       do block = 1, n_blocks
         associate (b => blocks(block))

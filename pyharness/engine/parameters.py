@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY, product, quaternion_rates
 from pyharness.model.changing import Changing, rates_of_changing, rates_of_inertia
+from pyharness.model.constant_body import rates_about_body_axes
 from pyharness.model.dual import with_parameters
 from pyharness.model.errors import InputError
 from pyharness.model.expressions import components
@@ -247,8 +248,10 @@ def _rates(
         return rates_of_changing(changing, time, omega, torque)
     x, y, z = omega
     if inertia is not None:
+        if "inertia" not in given:
+            return rates_about_body_axes(inertia, omega, torque)
         matrix = [list(row) for row in inertia]
-        for (i, j), value in zip(INERTIA_ELEMENTS, given.get("inertia", ()), strict=False):
+        for (i, j), value in zip(INERTIA_ELEMENTS, given["inertia"], strict=True):
             matrix[i][j] = matrix[j][i] = value
         return rates_of_inertia(matrix, omega, torque)
     products = y * z, z * x, x * y

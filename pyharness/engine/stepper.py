@@ -13,6 +13,7 @@ from pyharness.engine.recorded import LONGEST_TRIAL, Step, kernel_tape, taylor_s
 from pyharness.engine.singular import SingularError, undefined_operation
 from pyharness.model.attitude import IDENTITY, quaternion_rates, unit_quaternion
 from pyharness.model.changing import rates_of_changing
+from pyharness.model.constant_body import rates_about_body_axes
 from pyharness.model.errors import InputError
 from pyharness.model.keywords import with_hints
 from pyharness.model.scene import Scene, checked_scene
@@ -330,8 +331,7 @@ def _equations(scene: Scene, torque: Tape, attitude: bool) -> Tape:
         moments = np.array(scene.moments or (1.0, 1.0, 1.0))
         rates = np.array(scene.euler_coefficients) * products + total / moments
     else:
-        inertia = np.array(scene.inertia)
-        rates = np.linalg.inv(inertia) @ (total - np.cross(omega, inertia @ omega))
+        rates = rates_about_body_axes(scene.inertia, omega, total)
     rates = list(rates)
     if attitude:
         rates += quaternion_rates(omega, q)

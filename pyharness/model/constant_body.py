@@ -38,18 +38,23 @@ def uses_principal_axes(scene: Scene) -> bool:
 
 @lru_cache(maxsize=64)
 def _rates(tape: Tape, own: tuple[str, ...], inertia: Matrix) -> StateTorque:
-    # The products are those of principal axes; in products of components about the body axes large
-    # terms would cancel.
-    about, axes = principal(Scene("", (0.0, 0.0, 0.0), inertia=inertia))
-    coefficients, moments = np.array(about.euler_coefficients), np.array(about.moments)
-
     def rates(time: Any, omega: Any, q: Any, *states: Any) -> list[Any]:
         torque = np.array(torque_of(tape, time, omega, q, *states))
-        x, y, z = omega @ axes
-        products = coefficients * np.array([y * z, z * x, x * y])
-        return [*(axes @ (products + torque[:3] @ axes / moments)), *torque[3:]]
+        return [*rates_about_body_axes(inertia, omega, torque[:3]), *torque[3:]]
 
     return replayed(rates, own)
+
+
+def rates_about_body_axes(inertia: Matrix, omega: Any, torque: Any) -> Any:
+    """Return omega' of a body with a full inertia matrix; vectors are arrays about the body axes.
+
+    The products are those of principal axes; in products of components about the body axes large
+    terms would cancel.
+    """
+    about, axes = principal(Scene("", (0.0, 0.0, 0.0), inertia=inertia))
+    x, y, z = omega @ axes
+    products = np.array(about.euler_coefficients) * np.array([y * z, z * x, x * y])
+    return axes @ (products + torque @ axes / np.array(about.moments))
 
 
 def with_constant_body(scene: Scene) -> Scene:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from pyharness import InputError, Scene, TorqueLaw, load, solve
 from pyharness.engine.parameters import INERTIA_ELEMENTS, parameters_of
@@ -337,6 +338,29 @@ def test_names_of_summands() -> None:
     assert isinstance(law, TorqueLaw)
     both = replace(BRICK, torque=recorded(_decay) + law)
     assert list(parameters_of(both)) == ["moments", "torque.rate", "torque.size"]
+
+
+def test_a_tilted_needle() -> None:
+    axes = Rotation.from_rotvec([0.3, -0.8, 0.5]).as_matrix()
+    matrix = axes @ np.diag([1e-8, 1.0, 1.0 + 3e-9]) @ axes.T
+    omega = (axes @ [0.3, 0.5, 0.7]).tolist()
+    needle = Scene("needle", tuple(omega), inertia=(matrix + matrix.T) / 2)
+    found = slopes(needle, [3.0], "omega", tolerance=1e-12)
+    check(found, differences(lambda w: replace(needle, omega=tuple(w)), omega, [3.0]))
+
+
+def test_a_limit_of_the_inertia_that_is_not_reached_changes_nothing() -> None:
+    def scene(length: Callable[[Any], Any]) -> Scene:
+        def moments(t: Any) -> Any:
+            return np.array([20.0, 22.0, 25.0]) + length(t) ** 2 * np.array([0.0, 4.0, 4.0])
+
+        return Scene("booms", (0.1, 0.2, 1.0), moments=moments, torque=damping(0.5) + LAW)
+
+    limited = scene(lambda t: 0.5 + 0.1 * np.minimum(t, 30.0))
+    free = scene(lambda t: 0.5 + 0.1 * t)
+    for name in ("torque.rate", "torque.constant", "torque.sines", "omega"):
+        expected = slopes(free, 10.0, name, tolerance=1e-12)
+        check(slopes(limited, 10.0, name, tolerance=1e-12), expected)
 
 
 @pytest.mark.parametrize("expression", ['["a*w1", "b", "0"]', '["a", "b*sin(t)", "0"]'])

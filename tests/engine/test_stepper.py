@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from scipy.spatial.transform import Rotation
 
 from pyharness import InputError, Scene, Stepper, solve
 from pyharness.engine import stepper as engine_stepper
@@ -149,6 +150,15 @@ def test_the_least_omega_is_stepped() -> None:
         stepper = Stepper(Scene("", omega, moments=(1.0, 1.0, 1.0)), 1e-14)
         stepper.until(1.0)
         assert stepper.omega.tolist() == pytest.approx(omega, rel=1e-12, abs=0.0)
+
+
+def test_a_tilted_needle_is_as_exact_as_along_its_axes() -> None:
+    axes = Rotation.from_rotvec([0.3, -0.8, 0.5]).as_matrix()
+    matrix = axes @ np.diag([1e-8, 1.0, 1.0 + 3e-9]) @ axes.T
+    tilted = Scene("needle", tuple(axes @ [0.3, 0.5, 0.7]), inertia=(matrix + matrix.T) / 2)
+    stepper = Stepper(tilted, 1e-13)
+    stepper.until(3.0)
+    assert stepper.omega == pytest.approx(solve(tilted, 3.0).omega[0], rel=0, abs=1e-14)
 
 
 def test_a_tiny_step_does_not_shorten_the_next() -> None:

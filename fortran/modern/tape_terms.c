@@ -533,6 +533,31 @@ static ALWAYS_INLINE void perturb_with(const int n, const int columns, const int
   }
 }
 
+/* The same for omega alone: a shorter register suffices, and only the sums of the newest term wait for
+   it. */
+static ALWAYS_INLINE void perturb_omega(const int nodes, perturbations *v, const matrix *jacobian, int k)
+{
+  const double part = 1.0 / (k + 1);
+  const int degree = k < nodes - 1 ? k : nodes - 1;
+  abreast newest[3], others[3] = {{0.0}};
+#pragma GCC unroll 4
+  for (int d = 1; d <= degree; d++) {
+#pragma GCC unroll 3
+    for (int j = 0; j < 3; j++) {
+      const abreast x = *(const abreast *)v[j][k - d];
+#pragma GCC unroll 3
+      for (int i = 0; i < 3; i++) others[i] += jacobian[d][0][i][j] * x;
+    }
+  }
+#pragma GCC unroll 3
+  for (int i = 0; i < 3; i++) {
+    newest[i] = others[i];
+#pragma GCC unroll 3
+    for (int j = 0; j < 3; j++) newest[i] += jacobian[0][0][i][j] * *(const abreast *)v[j][k];
+    *(abreast *)v[i][k + 1] = part * newest[i];
+  }
+}
+
 /* The same for omega and the attitude, whose perturbation is a rotation q (e, p) of the attitude q: as
    q' = q omega / 2, e is constant and p' = p x omega + (perturbation of omega) / 2. Row 3 of the
    Jacobian is omega, times the step; the other rows are derivatives of the rates of omega. */
@@ -675,7 +700,7 @@ static ALWAYS_INLINE void set_blocks(const struct tape *tape, const int nodes, d
 static ALWAYS_INLINE void perturb_all(const struct tape *tape, const int nodes, perturbations *v,
                                       const matrix *jacobian, double h, int k)
 {
-  if (tape->n_unknowns == 3) perturb_with(3, 4, nodes, v, jacobian, k);
+  if (tape->n_unknowns == 3) perturb_omega(nodes, v, jacobian, k);
   else if (tape->has_attitude) perturb_attitude(nodes, v, jacobian, h, k);
   else perturb_with(tape->n_unknowns, SIDE_BY_SIDE, nodes, v, jacobian, k);
 }

@@ -318,17 +318,14 @@ def solve_with_states(
             return
         except InputError:
             return
-        row, last = (i, -1) if times is None else ((i, slice(len(one.time))), slice(None))
+        # Either side of time 0 may end early.
+        row = i, np.isin(row_of(ends, i), one.time)
         found.status[i] = ENDS.index(one.ended)
         if not one.has_all_rows:
-            if times is None:
-                return
-            # The rows before the end of an integration that did not reach all times are complete.
             found.status[row] = Statuses.COMPLETE
-        assert one.own is not None
-        found.omega[row], own[row] = one.omega[last], one.own[last]
-        if found.attitude is not None and one.attitude is not None:
-            found.attitude[row] = one.attitude[last]
+        found.omega[row], own[row] = one.omega, one.own
+        if found.attitude is not None:
+            found.attitude[row] = one.attitude
         if found.estimates is not None:
             found.estimates[row] = np.array([one.error, one.growth], float)
 

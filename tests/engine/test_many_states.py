@@ -89,6 +89,22 @@ def test_bodies_that_fail_have_a_status() -> None:
     assert tired.ended.tolist() == ["gave up"]
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_rows_are_at_their_times_if_a_side_ends_early(order: int) -> None:
+    def law(t: Any, omega: Any, states: Any) -> Any:
+        return [0.1 * states["x"], 0.0, 0.0], {"x": 1.0 + states["x"] ** 2}  # x is tan t
+
+    scene = Scene(omega=(0.1, 0.2, 0.3), moments=MOMENTS, torque=law, states={"x": 0.0})
+    for times in ([-2.0, -1.0, 0.5, 1.0], [-2.0, -1.0, 1.0, 2.0], [-1.0, 0.0, 2.0]):
+        rows = np.array(times)[::order]
+        found = solve_many(scene, times=rows, omega=[scene.omega])
+        inside = np.abs(rows) < np.pi / 2
+        assert found.states["x"][0, inside] == pytest.approx(np.tan(rows[inside]), rel=1e-8)
+        assert np.isnan(found.states["x"][0, ~inside]).all()
+        assert ((found.ended[0] == "complete") == inside).all()
+        assert found.omega[0, inside] == pytest.approx(solve(scene, rows[inside]).omega, rel=1e-8)
+
+
 @pytest.mark.parametrize(("given", "message"), [
     ({"states": {"wheel4": 1.0}}, "wheel1, wheel2, wheel3"), ({"states": [1.0]}, "a dict"),
     ({"events": lambda t, y: y[0]}, "events"), ({"sensitivities": ["omega"]}, "sensitivities"),

@@ -104,10 +104,10 @@ def _with_values(part: StateTorque | TorqueLaw, values: Mapping[str, float]) -> 
         tuple((name, float(values.get(name, value))) for name, value in pairs)
         for pairs in (part.constants, part.parameters)
     )
-    found = replayed(lambda time, omega, q: _torque(part, time, omega, q, given))
+    found = replayed(lambda t, omega, q, *own: _torque(part, t, omega, q, given, own), part.own)
     return replace(
         found, expression=part.expression, constants=constants, parameters=parameters,
-        varied=part.varied,
+        varied=part.varied, starts=part.starts,
     )  # fmt: skip
 
 
@@ -212,8 +212,9 @@ def _parameters_of(part: StateTorque | TorqueLaw) -> dict[str, list[float]]:
 
 
 def _torque(
-    part: TorqueLaw | StateTorque, time: Any, omega: Any, q: Any, given: Mapping[str, list[Any]]
-) -> Any:
+    part: TorqueLaw | StateTorque, time: Any, omega: Any, q: Any, given: Mapping[str, list[Any]],
+    own: Sequence[Any] = (),
+) -> Any:  # fmt: skip
     """Return a summand of the torque with the symbols `given` as parameters."""
     if isinstance(part, TorqueLaw):
         law: Any = SimpleNamespace(in_space=part.frame == "space")
@@ -227,11 +228,12 @@ def _torque(
             setattr(law, name, waves)
         return body_torque(law, time, q)
     if any(f"torque.{name}" in given for name, _ in part.constants):
-        constants = {
-            name: given.get(f"torque.{name}", [value])[0] for name, value in part.constants
-        }
-        places = {f"[torque] expression {k}": text for k, text in enumerate(part.expression, 1)}
-        return np.array(components(places, (time, *omega, *q), constants), dtype=object)
+        constants = dict(zip(part.own, own, strict=True))
+        constants |= {name: given.get(f"torque.{name}", [x])[0] for name, x in part.constants}
+        places = [f"[torque] expression {k}" for k in (1, 2, 3)]
+        places += [f"[states.{name}] rate" for name in part.own]
+        texts = dict(zip(places, part.expression, strict=True))
+        return np.array(components(texts, (time, *omega, *q), constants), dtype=object)
     others = [(f"torque.{name}", value) for name, value in part.parameters]
     if part.varied is not None and any(name in given for name, _ in others):
         numbers = [given.get(name, [value])[0] for name, value in others]

@@ -137,3 +137,24 @@ def test_a_torque_of_time_alone_has_parameters_too() -> None:
     found = solve_many(scene, 3.0, parameters={"size": [0.1, 0.3]})
     assert found.omega[1] == pytest.approx(solve(scene, 3.0).omega[0], rel=1e-11)
     assert np.abs(found.omega[0] - found.omega[1]).max() > 0.1
+
+
+def test_constants_of_expressions_beside_own_states() -> None:
+    """The state x is a sine of frequency k, and omega3 its integral."""
+    data = {
+        "body": {"moments": [4, 3, 2]}, "initial": {"omega": [0, 0, 0.8]},
+        "torque": {
+            "expression": ["0", "0", "2*x"], "constants": {"k": 1.5},
+            "terms": [{"kind": "wheels", "momentum": [0, 0, 1]}],
+        },
+        "states": {"x": {"rate": "v"}, "v": {"start": 1, "rate": "-k*k*x"}},
+    }  # fmt: skip
+    scene, k, t = scene_of(data, ""), np.array([1.5, 0.7]), 2.0
+    found = solve_many(scene, t, parameters={"k": k}, tolerance=1e-11)
+    assert found.omega[:, 2] == pytest.approx(0.8 + (1.0 - np.cos(k * t)) / k**2, rel=1e-10)
+    assert found.states["x"] == pytest.approx(np.sin(k * t) / k, rel=1e-10)
+    slopes = solve(scene, t, sensitivities=["torque.k"]).sensitivities
+    assert slopes is not None
+    angle = 1.5 * t
+    slope = t * np.sin(angle) / 1.5**2 - 2.0 * (1.0 - np.cos(angle)) / 1.5**3
+    assert slopes["torque.k"][0, 2, 0] == pytest.approx(slope, rel=1e-8)

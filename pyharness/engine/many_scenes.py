@@ -227,7 +227,7 @@ def scene_of_row(scene: Scene, rows: Mapping[str, Array], i: int) -> Scene:
         if name in torque:
             torque[name] = [(wave[:3], float(wave[3])) for wave in torque[name]]
     if own.keys() & BODIES:
-        own = {**dict.fromkeys(BODIES), **own}
+        own = {**dict.fromkeys((*BODIES, "changing")), **own}
     law = scene.torque
     if torque:
         if isinstance(law, StateTorque):

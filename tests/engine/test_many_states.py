@@ -1,12 +1,13 @@
 """Tests of many bodies with states of their own."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from pyharness import Ensemble, InputError, Scene, prepare, solve, solve_many
+from pyharness import ChangingMoments, Ensemble, InputError, Scene, prepare, solve, solve_many
 from pyharness.torques import wheels
 
 MOMENTS = (4.0, 3.0, 2.0)
@@ -103,6 +104,15 @@ def test_rows_are_at_their_times_if_a_side_ends_early(order: int) -> None:
         assert np.isnan(found.states["x"][0, ~inside]).all()
         assert ((found.ended[0] == "complete") == inside).all()
         assert found.omega[0, inside] == pytest.approx(solve(scene, rows[inside]).omega, rel=1e-8)
+
+
+def test_other_bodies_replace_a_changing_inertia() -> None:
+    changing: Any = ChangingMoments([(3.0, 0.1), (2.0, 0.2), (1.2,)])
+    scene, moments = replace(SCENE, moments=changing), (5.0, 4.0, 2.0)
+    wanted = solve(replace(SCENE, moments=moments), 2.0, tolerance=1e-10)
+    for given in ({"moments": [moments]}, {"inertia": [np.diag(moments)]}):
+        found = solve_many(scene, 2.0, **given, tolerance=1e-10)
+        assert found.omega[0] == pytest.approx(wanted.omega[0], rel=1e-9)
 
 
 @pytest.mark.parametrize(("given", "message"), [

@@ -108,7 +108,10 @@ def sensitivities_at(
     times, attitude = found.time, found.attitude is not None
     if scene.states or has_switches(scene.torque):
         slopes = {
-            name: [_extrapolate(name, *move, states) for move in _moves(scene, name)]
+            name: [
+                _extrapolate(name, *move, states) if times.size else found.y.T
+                for move in _moves(scene, name)
+            ]
             for name in names
         }
         return {name: np.stack(each, 2) for name, each in slopes.items()}

@@ -75,6 +75,17 @@ def test_derivatives_of_own_states() -> None:
     )
 
 
+def test_motions_that_end_before_the_first_time_have_no_rows() -> None:
+    def law(t: Any, omega: Any, states: Any) -> Any:
+        return [states["x"], 0.0, 0.0], {"x": 1.0 + states["x"] ** 2}  # x is tan t
+
+    scene = Scene("ends", (0.1, 0.2, 0.3), MOMENTS, torque=law, states={"x": 0.0})
+    for times, rows in ([2.0], 0), ([-2.0], 0), ([1.0, 2.0], 1):
+        found = solve(scene, times, sensitivities=["omega", "moments"])
+        assert found.sensitivities is not None
+        assert [each.shape for each in found.sensitivities.values()] == [(rows, 4, 3)] * 2
+
+
 @pytest.mark.parametrize("name", ["omega", "attitude", "moments", "inertia", "torque.gain"])
 def test_differences_are_the_derivatives_where_no_switch_changes(name: str) -> None:
     def law(t: Any, omega: Any, q: Any, *, gain: float = 0.3) -> Any:

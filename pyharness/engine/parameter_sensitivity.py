@@ -123,7 +123,8 @@ def sensitivities_at(
     # A function of time that is 0 for these parameters may have derivatives that depend on time.
     if is_closed and not getattr(scene.torque, "named", None):
         period = period_of(scene)
-        if not period * np.abs(_slope(scene)).max() > _VARIES * math.hypot(*scene.omega):
+        least = _VARIES * math.hypot(*scene.omega)
+        if period > 0.0 and not period * np.abs(_slope(scene)).max() > least:
             period = 0.0
     # Extrapolating one period takes as long as an integration over two.
     if 0.0 < 2.0 * period < np.abs(times).max(initial=0.0):

@@ -114,7 +114,8 @@ def test_rows_at_time_0_are_the_derivatives_of_the_initial_state() -> None:
     assert np.array_equal(found["omega"][1], np.eye(7, 3))
     assert not found["moments"][1].any()
     assert np.array_equal(found["attitude"][1][3:], 0.5 * np.eye(4, 3, -1))
-    assert np.array_equal(slopes(BRICK, 0.0, "omega")[0], np.eye(3))
+    for scene in (BRICK, _BOOMS, replace(_BOOMS, torque=TorqueLaw())):
+        assert np.array_equal(slopes(scene, 0.0, "omega")[0], np.eye(3))
 
 
 def test_times_in_any_number_have_the_same_derivatives() -> None:

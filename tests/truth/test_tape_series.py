@@ -227,6 +227,12 @@ def test_the_rows_end_at_a_singularity(function: Callable[..., Any], rows: int) 
     assert np.isfinite(found.omega).all()
 
 
+def test_a_step_of_zero_has_products_too() -> None:
+    torque = replayed(lambda t, w, q: [-0.1 * x * x * x * np.sin(t) ** 4 for x in w])
+    found = reference(Scene("", _OMEGA, _MOMENTS, torque=torque), [0.0])
+    assert found.omega.tolist() == [list(_OMEGA)]
+
+
 def test_a_root_that_is_zero_throughout_has_a_series() -> None:
     """Quadratic drag on a body at rest is not singular: the body remains at rest."""
 

@@ -4,7 +4,6 @@ In this module, `own` maps each field in which the n scenes of a batch differ to
 """
 
 import sys
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -18,7 +17,7 @@ from pyharness.model.attitude import IDENTITY
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.listing import Listing, subset
 from pyharness.model.scene import SPACE_TORQUE, STATE_TORQUE, Scene
-from pyharness.model.scene_file import body_of, scene_text
+from pyharness.model.scene_file import body_of
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
@@ -79,7 +78,7 @@ def listing_of(program: str, listing: str, reading: str) -> Listing:
 def looped_fields(sweep: Sweep) -> list[str]:
     """Return the varied fields that all scenes of a batch (one call) share."""
     of_arrays = () if sweep.solver.program is None else OF_PROGRAMS
-    own = ("body.",) if follows_body(sweep.scene) else ()
+    own = ("body.",) if follows_body(sweep) else ()
     names = [axis.field for axis in sweep.axes if axis.field not in of_arrays]
     return [x for x in names if x in CHOICES or number_field(x).looped or x.startswith(own)]
 
@@ -96,9 +95,6 @@ def batches(sweep: Sweep, where: list[Indices]) -> Iterator[tuple[Indices, Batch
 
 def _batch(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Batch:
     scene = sweep.scene
-    if "step_size" in shared or "steps" in shared:
-        step_size = float(shared.pop("step_size", scene.step_size))
-        scene = replace(scene, step_size=step_size, steps=int(shared.pop("steps", scene.steps)))
     bodies = {name: shared.pop(name) for name in list(shared) if name.startswith("body.")}
     own = {**own, **{name: np.full(n, value) for name, value in bodies.items()}}
     body, values = _body(scene, own, n)
@@ -107,10 +103,13 @@ def _batch(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Batch:
     if constants or bodies:
         changed = values[0].tolist() if bodies and values is not None else None
         try:
-            scene = with_numbers(scene, constants, changed)
+            scene = with_numbers(sweep, constants, changed)
         except InputError:
             # With the end time NaN, every method fails, and each scene reports the failure.
             own["t_end"] = np.full(n, np.nan)
+    if "step_size" in shared or "steps" in shared:
+        step_size = float(shared.pop("step_size", scene.step_size))
+        scene = replace(scene, step_size=step_size, steps=int(shared.pop("steps", scene.steps)))
     solver = replace(sweep.solver, **shared)
     listing = None
     if solver.program is not None:
@@ -257,37 +256,25 @@ def check_state_solver(scene: Scene, methods: Sequence[str], has_program: bool) 
         check_torque(scene, method, attitude=True)
 
 
-def follows_body(scene: Scene) -> bool:
-    """Return whether a term of the torque contains the inertia of the scene's body."""
-    return isinstance(scene.torque, StateTorque) and any(
-        _is_of_body(dict(term), scene) for term in _terms(scene.torque)
+def follows_body(sweep: Sweep) -> bool:
+    """Return whether a term of the torque has the inertia of the scene's body by default."""
+    return any(
+        term["kind"] == "gravity_gradient" and "inertia" not in term
+        for term in sweep.tables.get("torque", {}).get("terms", ())
     )
 
 
 def with_numbers(
-    scene: Scene, constants: Mapping[str, float], values: Sequence[Any] | None
+    sweep: Sweep, constants: Mapping[str, float], values: Sequence[Any] | None
 ) -> Scene:
     """Return the scene with other `constants` of its torque's expressions, and another body.
 
     `values` are moments, inertia or coefficients.
     """
-    data: dict[str, Any] = tomllib.loads(scene_text(scene))
+    tables = dict(sweep.tables)
     if constants:
-        data["torque"]["constants"].update(constants)
+        torque = tables["torque"]
+        tables["torque"] = {**torque, "constants": {**torque["constants"], **constants}}
     if values is not None:
-        assert isinstance(scene.torque, StateTorque)
-        data["body"] = {body_of(scene)[0]: list(values)}
-        for table, term in zip(data["torque"]["terms"], _terms(scene.torque), strict=True):
-            if _is_of_body(dict(term), scene):
-                # The reader then gives the term the inertia of the table [body].
-                del table["inertia"]
-    return scene_of(data, scene.name)
-
-
-def _terms(torque: StateTorque) -> list[tuple[tuple[str, Any], ...]]:
-    return [each for each in torque.terms if isinstance(each, tuple)]
-
-
-def _is_of_body(term: Mapping[str, Any], scene: Scene) -> bool:
-    own = scene.moments or scene.inertia
-    return bool(term["kind"] == "gravity_gradient" and term["inertia"] == own)
+        tables["body"] = {body_of(sweep.scene)[0]: values}
+    return scene_of(tables, sweep.scene.name)

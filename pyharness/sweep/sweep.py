@@ -37,12 +37,14 @@ class ReductionSpec:
 class Sweep:
     """A sweep as a sweep file describes it.
 
-    `scene` supplies what no axis varies. `chunk` is the largest number of scenes in a chunk.
-    `fingerprint` is the SHA-256 of the sweep file's `text` and its scene file.
+    `scene`, read from `tables` unless it is a case, supplies what no axis varies. `chunk` is the
+    largest number of scenes in a chunk. `fingerprint` is the SHA-256 of the sweep file's `text` and
+    its scene file.
     """
 
     name: str
     scene: Scene
+    tables: dict[str, Any]
     axes: tuple[Axis, ...]
     solver: Solver
     reductions: tuple[ReductionSpec, ...]

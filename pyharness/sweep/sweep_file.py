@@ -65,7 +65,7 @@ def _sweep(data: dict[str, Any], path: Path, text: str, claims: Mapping[str, Cla
     name = data.get("name", path.stem)
     if not isinstance(name, str):
         raise InputError(f"name is {kind_of(name)}; it must be text")
-    scene, more = _scene(data.get("scene", {}), path)
+    scene, own, more = _scene(data.get("scene", {}), path)
     tables = data.get("axis", [])
     if not isinstance(tables, list) or not tables:
         raise InputError("axis is missing; give at least one table [[axis]]")
@@ -82,22 +82,22 @@ def _sweep(data: dict[str, Any], path: Path, text: str, claims: Mapping[str, Cla
     if not 1 <= chunk <= _MOST_IN_CHUNK:
         raise InputError(f"chunk is {chunk}; allowed: 1 to {_MOST_IN_CHUNK} scenes")
     digest = hashlib.sha256(text.encode() + more).hexdigest()
-    sweep = Sweep(name, scene, axes, solver, reductions, chunk, text, digest)
+    sweep = Sweep(name, scene, own, axes, solver, reductions, chunk, text, digest)
     _check_names(sweep)
     _check_reductions(sweep)
     _check_solvers(sweep)
     return sweep
 
 
-def _scene(table: object, path: Path) -> tuple[Scene, bytes]:
-    """Return the scene of [scene]; for the digest, a null byte and the scene file, if any."""
+def _scene(table: object, path: Path) -> tuple[Scene, dict[str, Any], bytes]:
+    """Return the scene and its tables; for the digest, a null byte and the scene file, if any."""
     if not isinstance(table, dict):
         raise InputError(f"scene is {kind_of(table)}; it must be a table [scene]")
     given = [key for key in ("case", "file") if key in table]
     if given and len(table) > 1:
         raise InputError("[scene]: allowed: case, or file, or the tables of a scene file")
     if given == ["case"]:
-        return case_scene(table["case"]), b""
+        return case_scene(table["case"]), {}, b""
     more = b""
     if given == ["file"]:
         if not isinstance(table["file"], str):
@@ -107,11 +107,12 @@ def _scene(table: object, path: Path) -> tuple[Scene, bytes]:
         content = read_file(beside, named)
         # The zero byte separates the files in the SHA-256.
         scene, more = scene_of_file(content, beside.stem, named), b"\0" + content
+        table = toml_of(content, named)
     elif table:
         scene = scene_of(table, path.stem)
     else:
         raise InputError("scene is missing; give [scene] with case, file, or a scene's own tables")
-    return checked_scene(scene, any_axes=True, any_torque=True, any_state=True), more
+    return checked_scene(scene, any_axes=True, any_torque=True, any_state=True), table, more
 
 
 def _solver(table: object, axes: tuple[Axis, ...]) -> Solver:

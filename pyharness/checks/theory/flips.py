@@ -41,7 +41,10 @@ def flip_times(moments: ArrayLike, omega0: ArrayLike) -> Array:
 def mean(upper: Array, lower: Array) -> Array:
     """Return the arithmetic-geometric mean of each pair of non-negative numbers."""
     for _ in range(_LEVELS):
-        if (np.abs(upper - lower) <= _NEAR * upper).all():
+        # A pair keeps its bits while others converge.
+        left = ~(np.abs(upper - lower) <= _NEAR * upper)
+        if not left.any():
             break
-        upper, lower = 0.5 * (upper + lower), np.sqrt(upper) * np.sqrt(lower)
+        means = 0.5 * (upper + lower), np.sqrt(upper) * np.sqrt(lower)
+        upper, lower = np.where(left, means, (upper, lower))
     return 0.5 * (upper + lower)

@@ -37,6 +37,12 @@ def test_is_half_the_period_of_the_exact_motion() -> None:
         assert time == pytest.approx(float(period / 2), rel=1e-14)
 
 
+def test_no_bit_depends_on_other_bodies() -> None:
+    moments, omega, _ = _drawn(400, 1e-8)
+    alone = [flip_times(*each)[0] for each in zip(moments, omega, strict=True)]
+    assert flip_times(moments, omega).tolist() == alone
+
+
 @pytest.mark.campaign
 def test_middle_component_changes_its_sign_once_in_it() -> None:
     moments, omega, middle = _drawn(2000, 1e-3)

@@ -3,6 +3,7 @@
 In this module, `own` maps each field in which the n scenes of a batch differ to its n values.
 """
 
+import math
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -186,7 +187,7 @@ def _omega(scene: Scene, own: Columns, moments: Array | None, n: int) -> Array:
     if cartesian is not None:
         return cartesian
     start = np.array(scene.omega)
-    length = float(np.linalg.norm(start))
+    length = math.hypot(*scene.omega)  # without squares, which may underflow
     magnitude = own.get("omega.magnitude", np.full(n, length))
     zero = np.zeros(n)
     if "tilt" in own or "azimuth" in own:

@@ -103,6 +103,19 @@ def test_every_body_of_the_square_is_real_and_as_asked(tmp_path: Path) -> None:
     assert np.allclose(found, tilts, atol=1e-7)
 
 
+@pytest.mark.parametrize("size", [1e-170, 1.0, 1e200])
+def test_directions_do_not_depend_on_the_size_of_omega(size: float, tmp_path: Path) -> None:
+    start = np.array([0.6, 0.8, 0.0]) * size
+    scene = BASE.replace("[0.0, 1.0, 0.0]", str(start.tolist()))
+    for field, values, wanted in (
+        ("tilt", [0.0, np.pi / 2.0], [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]),
+        ("omega.magnitude", [size, 2.0 * size], [[0.6, 0.8, 0.0], [1.2, 1.6, 0.0]]),
+    ):
+        sweep = read_sweep(written(tmp_path, text(axis(field, values), scene=scene)))
+        ((_, batch),) = batches(sweep, every(sweep))
+        assert np.abs(batch.omega0 / size - wanted).max() < 1e-15
+
+
 def test_fields_reach_the_scenes(tmp_path: Path) -> None:
     axes = (
         axis("body.ratio.1", [0.5, 0.25]), axis("torque.constant.2", [0.0, 3.0]),

@@ -145,8 +145,7 @@ def _cards() -> dict[str, str]:
 
 def _certainties() -> dict[str, str]:
     every = [each["certainty"] for each in entries()]
-    kinds = ("certain", "probable", "conjecture", "undecidable")
-    return {"all": str(len(every)), **{name: str(every.count(name)) for name in kinds}}
+    return {"all": str(len(every)), "certain": str(every.count("certain"))}
 
 
 def _switched() -> list[dict[str, Any]]:

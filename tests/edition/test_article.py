@@ -36,7 +36,7 @@ FORMULAS = (
     r"$$2\,g(t/3) - g(2t/3) = F - \tfrac{2}{9} t^2 Q(F).$$",
     r"$h (1 + \dots + n) = t^2/(2h) + t/2$",
     r"$$\dot\omega_1 = A\,\omega_2\omega_3 + M_1, \quad \dot\omega_2 = B\,\omega_1\omega_3 + M_2, "
-    r"\quad \dot\omega_3 = C\,\omega_1\omega_2 + M_3,$$",
+    r"\quad \dot\omega_3 = C\,\omega_1\omega_2 + M_3.$$",
 )  # fmt: skip
 # Digits that are no results: years, places in the thesis and in books, cases, names and units.
 NAMES = (
@@ -47,23 +47,22 @@ NAMES = (
 # Words of number that are counts by definition, orders of methods, parts of a name, or pronouns.
 COUNTS = (
     "half an Euler step", "Two-term collocation", "Four-term collocation", "three points",
-    "three, four and five terms", "Two terms are", "Two mistakes in the use", "half a point at",
+    "three, four and five terms", "Two terms are", "Two in the use of", "half a point at",
     "not one of discretization",
     "three FORTRAN programs", "two by collocation and one by a Runge-Kutta method",
     "the seven cases", "One moves", "two others together", "at half the speed", "half speed",
     "two collocation programs, with two and with four terms", "seven cases", "fourth order",
-    "second order", "three programs", "three questions", "once more", "thirds of the step",
+    "order two", "three programs", "three questions", "order four", "thirds of the step",
     "for two terms and at fifths for four", "one machine reading", "From the second step on",
-    "on one digit", "two-term", "third, separate",
+    "to one digit", "two-term", "third, separate",
     "three main programs", "misplaces one page",
     "double precision", "One right-hand side", "One body",
     "with three choices", "for two terms", "for four,", "two terms",
     "as four", "about twice the time", "last fifth", "a known solution in two cases",
     "its three products", "one observation",
-    "two implementations", "three or five terms", "the one that",
+    "two implementations", "three or five terms",
     "three or four terms",
-    "four-term", "where one exists", "tends to zero", "are zero", "therefore zero",
-    "the two errors",
+    "four-term", "where one exists", "tends to zero", "are zero",
 )  # fmt: skip
 WORDS = (
     r"\b(?:zero|one|two|three|four|five|six|seven|eight|nine|ten|eleven|twelve|twelfth|dozen|"

@@ -51,7 +51,7 @@ COUNTS = (
     "not one of discretization",
     "three FORTRAN programs", "two by collocation and one by a Runge-Kutta method",
     "the seven cases", "One moves", "two others together", "at half the speed", "half speed",
-    "two collocation programs, with two and with four terms", "seven cases", "fourth order",
+    "seven cases", "fourth order",
     "order two", "three programs", "three questions", "order four", "thirds of the step",
     "for two terms and at fifths for four", "one machine reading", "From the second step on",
     "to one digit", "two-term", "third, separate",

@@ -44,6 +44,7 @@ def text_page() -> str:
             "ground | meaning", [[each["siglum"], each["what"]] for each in scan["ground"]]
         ),
         "sample": reading["sample"],
+        "uncorrected": str(max(each["uncorrected"] for each in reading["recaptures"])),
         "recaptures": table(
             "unit | corrected by our text | by the second reading | by both | estimate | "
             "95 % interval | uncorrected",

@@ -46,7 +46,6 @@ def proofs_page() -> str:
         {
             "count": str(len(planned())),
             "other_starts": {2: "two"}[len(starts()) - 1],
-            "digits": str(DIGITS),
             "steps": str(case_scene(1).steps),
             "solutions": solutions,
             "solution_error": solution_error,

@@ -29,10 +29,9 @@ NOTEBOOKS = HERE.parents[1] / "build" / "notebooks"
 """The folder of the notebooks."""
 
 _HEAD = """
-Each example has a question, a short program that uses public functions only, a picture, and the
-answer in numbers. In a script, `figure.savefig("picture.png")` saves the picture. `python -m
-docs.gallery.build` writes the examples as notebooks to `build/notebooks`; the web pages offer them
-too.
+Each example answers a question by a short program, a picture and numbers. In a script,
+`figure.savefig("picture.png")` saves the picture. The web pages offer the examples as Jupyter
+notebooks; `python -m docs.gallery.build` writes these to `build/notebooks`.
 """
 
 
@@ -81,7 +80,8 @@ def gallery_page() -> str:
 
 
 def _alternative(picture: str) -> str:
-    return " ".join(picture[2 : picture.index("]")].split())
+    """Return what a picture shows: its alternative text up to the first comma or the like."""
+    return " ".join(re.split("[],;:]", picture[2:])[0].split())
 
 
 def rebuild(path: Path) -> None:

@@ -23,6 +23,7 @@ DATA = HERE / "tally.json"
 
 _NONE = "not explained yet"
 _NEAR = 0.9  # of its limit: the page shows errors above
+_COUNTS = 6  # columns of the table; the page tells the others, of estimates, in words
 
 
 def promises_page() -> str:
@@ -30,7 +31,8 @@ def promises_page() -> str:
     tally = read(DATA)
     template = (HERE / "promises.md.in").read_text(encoding="utf-8")
     found = {
-        "table": tally.markdown(_NEAR),
+        "table": tally.markdown(_NEAR, _COUNTS),
+        "estimates": _estimates(tally),
         "commands": "\n".join(run.command for run in tally.runs),
         "scenes": tally.summary(),
         "exceptions": _exceptions(tally),
@@ -41,6 +43,22 @@ def promises_page() -> str:
 def write_page() -> None:
     """Write the document from the stored tally."""
     (HERE.parent / PAGE).write_text(promises_page(), encoding="utf-8")
+
+
+def _estimates(tally: Tally) -> str:
+    """Return a paragraph for each row of the table that has estimates."""
+    found = []
+    for name, row in tally.shown(_NEAR).items():
+        count, below, *quantiles = row.cells()[_COUNTS - 1 :]
+        if row.estimates:
+            median, ninth, last, largest = quantiles
+            found.append(
+                f"The row *{name}* also has {count} estimates of errors, of which {below} are too "
+                f"small. The error divided by its estimate has the median {median}, the 90 % "
+                f"quantile {ninth}, the 99 % quantile {last} and the largest value {largest}; "
+                f"ratios below 1e-9 count as 1e-9.\n"
+            )
+    return "\n".join(found)
 
 
 def _exceptions(tally: Tally) -> str:

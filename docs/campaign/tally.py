@@ -159,14 +159,15 @@ class Tally:
         """Return the cells of the table, beginning with the names of the results."""
         return [[name, *row.cells()] for name, row in sorted(self.rows.items())]
 
-    def markdown(self, above: float = 0.0) -> str:
-        """Return a Markdown table of counts and quantiles.
-
-        Rows without broken promises are left out if error over limit is below `above`.
-        """
-        rows = {name: row for name, row in sorted(self.rows.items())
+    def shown(self, above: float) -> dict[str, Row]:
+        """Return the rows with a broken promise, or with error over limit of at least `above`."""
+        return {name: row for name, row in sorted(self.rows.items())
                 if row.broken or row.largest >= above}  # fmt: skip
-        return table(_HEAD, [[name, *row.cells()] for name, row in rows.items()])
+
+    def markdown(self, above: float = 0.0, columns: int | None = None) -> str:
+        """Return the first columns of the rows that `shown` returns as a Markdown table."""
+        cells = [[name, *row.cells()][:columns] for name, row in self.shown(above).items()]
+        return table(" | ".join(_HEAD.split(" | ")[:columns]), cells)
 
     def text(self) -> str:
         """Return the whole table, and the summary, as text."""

@@ -21,7 +21,7 @@ from pyharness.model.state_torque import StateTorque, replayed, torque_of
 from pyharness.model.symbols import MOST_OPERATIONS, SYMBOLS, Recorder
 from pyharness.model.tape import N_INPUTS, Tape, evaluate
 from pyharness.model.torque_law import TorqueLaw, body_torque
-from pyharness.model.values import Triple
+from pyharness.model.values import Matrix, Triple
 
 OMEGA, ATTITUDE = "omega", "attitude"
 TORQUE = "torque."  # prefix of the names of its parameters
@@ -30,7 +30,7 @@ INERTIA_ELEMENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 # The moments, coefficients, inertia matrix and changing inertia of a scene.
-_Body = tuple[Triple | None, Triple | None, tuple[Triple, ...] | None, Changing | None]
+_Body = tuple[Triple | None, Triple | None, Matrix | None, Changing | None]
 
 
 class VariedEquations(NamedTuple):
@@ -251,7 +251,7 @@ def _rates(
     x, y, z = omega
     if inertia is not None:
         if "inertia" not in given:
-            return rates_about_body_axes(inertia, omega, torque)
+            return list(rates_about_body_axes(inertia, omega, torque))
         matrix = [list(row) for row in inertia]
         for (i, j), value in zip(INERTIA_ELEMENTS, given["inertia"], strict=True):
             matrix[i][j] = matrix[j][i] = value

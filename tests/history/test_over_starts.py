@@ -1,6 +1,7 @@
 """Claims over many starts have, start by start, the verdicts of the ledger."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,8 @@ from pyharness.history.claims.verdicts import REPRODUCED
 from pyharness.model.listing import Listing, subset
 from pyharness.model.scene import Triple
 from pyharness.model.scene_file import case_scene
+from pyharness.sweep.batches import solve_chunk
+from pyharness.sweep.sweep_file import read_sweep
 
 pytestmark = pytest.mark.claims
 CODES = {REPRODUCED: HOLDS, PARTLY: IN_PART}
@@ -91,6 +94,22 @@ def test_silent_of_what_the_thesis_does_not_speak_of() -> None:
     ]
     for other in others:
         assert (over_starts.codes("v2-case-4-fails", other) == SILENT).all()
+
+
+@pytest.mark.parametrize("axis", ["lipschitz = [1e9]", "step_size = [0.01, 0.05]"])
+def test_silent_of_a_sweep_with_axes_of_which_the_thesis_does_not_speak(
+    axis: str, tmp_path: Path
+) -> None:
+    field, _, values = axis.partition(" = ")
+    path = tmp_path / "sweep.toml"
+    path.write_text(
+        'reductions = [{ name = "claim", id = "v2-case-4-fails" }]\n'
+        '[scene]\ncase = 4\n[solve]\nprogram = "runge-kutta"\n'
+        f'[[axis]]\nfield = "{field}"\nvalues = {values}\n'
+        '[[axis]]\nfield = "omega.1"\nvalues = [0.0, 1.0]\n'
+    )
+    (found,) = solve_chunk(read_sweep(path, over_starts.FUNCTIONS), 0).values()
+    assert (found == SILENT).all()
 
 
 def test_solutions_are_those_of_the_reference() -> None:

@@ -10,7 +10,7 @@ import pytest
 from pyharness import InputError
 from pyharness.cli.main import main
 from pyharness.history.claims.atlas import atlas_of, bits, shares, sum_of_points
-from pyharness.history.claims.over_starts import FAILS, FUNCTIONS, HOLDS, IN_PART, JUDGED
+from pyharness.history.claims.over_starts import FAILS, FUNCTIONS, HOLDS, IN_PART, JUDGED, SILENT
 from pyharness.sweep.batches import solve_chunk
 from pyharness.sweep.sweep_file import read_sweep
 from tests.conftest import Printed
@@ -117,6 +117,8 @@ def test_an_atlas_lacks_nothing() -> None:
     assert atlas.start((0, 0, 0)) == pytest.approx((1.6, 0.0, 1.2))
     with pytest.raises(InputError, match="are missing"):
         atlas_of({"v2-case-4-fails": codes - 4}, axes)
+    with pytest.raises(InputError, match="v2-case-4-fails does not concern all scenes"):
+        atlas_of({"v2-case-4-fails": np.full_like(codes, SILENT)}, axes)
     del axes["reading"]
     with pytest.raises(InputError, match="reading, steps"):
         atlas_of({"v2-case-4-fails": codes}, axes)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pyharness.history.claims.evidence import POINTS
 from pyharness.history.claims.laboratory import Assumptions, Laboratory, starts
 from pyharness.history.claims.ledger import claim
-from pyharness.history.claims.over_starts import FAILS, HOLDS, IN_PART, Starts, judged
+from pyharness.history.claims.over_starts import FAILS, HOLDS, IN_PART, SILENT, Starts, judged
 from pyharness.history.claims.verdicts import IN_PART as PARTLY
 from pyharness.history.claims.verdicts import REPRODUCED
 from pyharness.model.errors import InputError
@@ -85,6 +85,12 @@ def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Array]) -> Atlas:
         raise InputError(
             "--atlas: chunks of the store are missing; 'pyharness sweep' computes them"
         )
+    for name, each in codes.items():
+        if (each == SILENT).any():
+            raise InputError(
+                f"--atlas: {name} does not concern all scenes of the sweep; allowed: a case of the "
+                "thesis, listing original or corrected, no other step_size, lipschitz or may_stop"
+            )
     readings, steps = [*map(str, axes["reading"])], [*map(int, axes["steps"])]
     return Atlas(codes, readings, steps, *(axes[name] for name in WHERE))
 

@@ -119,6 +119,28 @@ def test_an_atlas_lacks_nothing() -> None:
         atlas_of({"v2-case-4-fails": codes - 4}, axes)
     with pytest.raises(InputError, match="v2-case-4-fails does not concern all scenes"):
         atlas_of({"v2-case-4-fails": np.full_like(codes, SILENT)}, axes)
-    del axes["reading"]
-    with pytest.raises(InputError, match="reading, steps"):
-        atlas_of({"v2-case-4-fails": codes}, axes)
+    # A dimension without a field of its name has no values.
+    for lacking in ({**axes, "reading": ()}, {**axes, "body.moments.1": np.ones(1)}):
+        with pytest.raises(InputError, match="reading, steps"):
+            atlas_of({"v2-case-4-fails": codes}, lacking)
+
+
+@pytest.mark.parametrize(("listing", "steps"), [("original", 300), ("corrected", 100)])
+def test_an_atlas_is_of_the_listing_reading_and_steps_of_its_sweep(
+    listing: str, steps: int, printed: Printed, tmp_path: Path
+) -> None:
+    pytest.importorskip("zarr")
+    names, sweep, store = ("v2-case-4-fails", "v2-case-3-concur"), tmp_path / "s", tmp_path / "z"
+    reading = "do-variable" if listing == "original" else "adopted"
+    asked = ", ".join(f'{{ name = "claim", id = "{name}" }}' for name in names)
+    axes = {
+        # Another field comes first along the dimension of the readings.
+        'program"\ndimension = "reading': ["runge-kutta"], "reading": [reading],
+        "steps": [steps], "omega.magnitude": [1.0], "height": [0.5], "longitude": [0.1],
+    }  # fmt: skip
+    told = "".join(f'[[axis]]\nfield = "{name}"\nvalues = {x}\n' for name, x in axes.items())
+    head = f'reductions = [{asked}]\n[scene]\ncase = 4\n[solve]\nlisting = "{listing}"\n'
+    sweep.write_text(head + told)
+    assert main(["sweep", str(sweep), "--out", str(store)]) == 0
+    text = printed(f"claims --atlas {store} --sweep {sweep}")
+    assert f"Starts by points (reading {reading}, {steps} steps):" in text

@@ -89,7 +89,9 @@ def _atlas(options: argparse.Namespace) -> int:
     sweep = read_sweep(options.sweep, over_starts.FUNCTIONS)
     if not check_store(sweep, options.atlas):
         raise InputError(f"--atlas '{options.atlas}': does not exist; 'pyharness sweep' writes it")
-    axes = {axis.dimension: axis.coordinates() for axis in reversed(sweep.axes)}
+    # Other fields may vary along the same dimension.
+    fields = {axis.field: axis.coordinates() for axis in sweep.axes}
+    axes = {each: fields.get(each, ()) for each in sweep.dimensions}
     with opened(sweep, options.atlas) as store:
         if not all(store.done()):
             raise InputError(
@@ -97,5 +99,4 @@ def _atlas(options: argparse.Namespace) -> int:
             )
         judged = (asked for asked in sweep.reductions if asked.reduction == "claim")
         codes = {dict(x.parameters)["id"]: store.array(x.name)[...] for x in judged}
-    atlas = atlas_of(codes, {each: axes[each] for each in sweep.dimensions})
-    return shared.show(atlas_report(atlas), options)
+    return shared.show(atlas_report(atlas_of(codes, axes)), options)

@@ -74,9 +74,9 @@ class Atlas:
         return (float(found[0]), float(found[1]), float(found[2]))
 
 
-def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Array]) -> Atlas:
+def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Any]) -> Atlas:
     """Return the atlas of a sweep, which must be complete and have its axes."""
-    if tuple(axes) != (*CHOSEN, *WHERE) or not codes:
+    if tuple(axes) != (*CHOSEN, *WHERE) or not all(map(len, axes.values())) or not codes:
         allowed = ", ".join((*CHOSEN, *WHERE))
         raise InputError(
             f"--atlas: the sweep must store verdicts on claims, and have the axes {allowed}"

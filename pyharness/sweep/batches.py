@@ -55,9 +55,13 @@ def solve_points(sweep: Sweep, where: list[Indices]) -> Arrays:
 
 def leaves_of_sweep(sweep: Sweep) -> str | None:
     """Return the origin of the code for the first scene's Taylor terms, as `Ensemble.leaves`."""
-    first = [np.zeros(1, dtype=np.intp) for _ in sweep.shape]
-    ((_, batch),) = batches(sweep, first)
-    return batch.leaves
+    return first_batch(sweep).leaves
+
+
+def first_batch(sweep: Sweep) -> Batch:
+    """Return a batch of the first scene."""
+    ((_, batch),) = batches(sweep, [np.zeros(1, dtype=np.intp) for _ in sweep.shape])
+    return batch
 
 
 def listing_of(program: str, listing: str, reading: str) -> Listing:

@@ -2,15 +2,21 @@
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from pyharness import InputError
+from pyharness.checks.compare.batch import Batch, Solver
 from pyharness.cli.main import main
 from pyharness.history.claims.atlas import atlas_of, bits, shares, sum_of_points
+from pyharness.history.claims.evidence import POINTS
+from pyharness.history.claims.laboratory import Assumptions, Laboratory, starts
+from pyharness.history.claims.ledger import claim, outcome
 from pyharness.history.claims.over_starts import FAILS, FUNCTIONS, HOLDS, IN_PART, JUDGED, SILENT
+from pyharness.model.scene_file import case_scene
 from pyharness.sweep.batches import solve_chunk
 from pyharness.sweep.sweep_file import read_sweep
 from tests.conftest import Printed
@@ -112,17 +118,18 @@ def test_an_atlas_lacks_nothing() -> None:
         "omega.magnitude": np.array([2.0]), "height": np.array([0.6]), "longitude": np.zeros(1),
     }  # fmt: skip
     codes = np.full((1, 1, 1, 1, 1), IN_PART, np.int8)
-    atlas = atlas_of({"v2-case-4-fails": codes}, axes)
+    first = Batch(case_scene(4), Solver(), None, np.ones(1), {})
+    atlas = atlas_of({"v2-case-4-fails": codes}, axes, first)
     assert atlas.score().tolist() == [[[0.5]]]
     assert atlas.start((0, 0, 0)) == pytest.approx((1.6, 0.0, 1.2))
     with pytest.raises(InputError, match="are missing"):
-        atlas_of({"v2-case-4-fails": codes - 4}, axes)
+        atlas_of({"v2-case-4-fails": codes - 4}, axes, first)
     with pytest.raises(InputError, match="v2-case-4-fails does not concern all scenes"):
-        atlas_of({"v2-case-4-fails": np.full_like(codes, SILENT)}, axes)
+        atlas_of({"v2-case-4-fails": np.full_like(codes, SILENT)}, axes, first)
     # A dimension without a field of its name has no values.
     for lacking in ({**axes, "reading": ()}, {**axes, "body.moments.1": np.ones(1)}):
         with pytest.raises(InputError, match="reading, steps"):
-            atlas_of({"v2-case-4-fails": codes}, lacking)
+            atlas_of({"v2-case-4-fails": codes}, lacking, first)
 
 
 @pytest.mark.parametrize(("listing", "steps"), [("original", 300), ("corrected", 100)])
@@ -144,3 +151,9 @@ def test_an_atlas_is_of_the_listing_reading_and_steps_of_its_sweep(
     assert main(["sweep", str(sweep), "--out", str(store)]) == 0
     text = printed(f"claims --atlas {store} --sweep {sweep}")
     assert f"Starts by points (reading {reading}, {steps} steps):" in text
+    chosen = Assumptions(readings=frozenset({reading} - {"adopted"}), steps=steps)
+    _, _, table = text.partition("which is ours:\n")
+    for row, start in zip(table.splitlines()[1:], starts(), strict=False):
+        lab = Laboratory(listing == "original", replace(chosen, start=start))
+        points = sum(POINTS.get(outcome(claim(name), lab).verdict, 0.0) for name in names)
+        assert [float(each) for each in row.split()[:4]] == [*start, points]

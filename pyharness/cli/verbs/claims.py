@@ -79,6 +79,7 @@ def _evidence(options: argparse.Namespace) -> int:
 def _atlas(options: argparse.Namespace) -> int:
     from pyharness.history.claims import over_starts
     from pyharness.history.claims.atlas import atlas_of, atlas_report
+    from pyharness.sweep.batches import first_batch
     from pyharness.sweep.store import check_store, opened
     from pyharness.sweep.sweep_file import read_sweep
 
@@ -99,4 +100,4 @@ def _atlas(options: argparse.Namespace) -> int:
             )
         judged = (asked for asked in sweep.reductions if asked.reduction == "claim")
         codes = {dict(x.parameters)["id"]: store.array(x.name)[...] for x in judged}
-    return shared.show(atlas_report(atlas_of(codes, axes)), options)
+    return shared.show(atlas_report(atlas_of(codes, axes, first_batch(sweep))), options)

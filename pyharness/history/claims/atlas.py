@@ -6,7 +6,7 @@ in part. Verdict codes are those of `over_starts`.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product, repeat
 from typing import TYPE_CHECKING, Any
@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyharness.checks.compare.batch import Batch
 from pyharness.history.claims.evidence import POINTS
-from pyharness.history.claims.laboratory import Assumptions, Laboratory, starts
+from pyharness.history.claims.laboratory import starts
 from pyharness.history.claims.ledger import claim
-from pyharness.history.claims.over_starts import FAILS, HOLDS, IN_PART, SILENT, Starts, judged
+from pyharness.history.claims.over_starts import FAILS, FUNCTIONS, HOLDS, IN_PART, SILENT
 from pyharness.history.claims.verdicts import IN_PART as PARTLY
 from pyharness.history.claims.verdicts import REPRODUCED
 from pyharness.model.errors import InputError
@@ -47,12 +48,14 @@ class Atlas:
     """The verdict codes of claims over a grid.
 
     The axes of `codes` are reading, number of steps, magnitude of omega(0) (rad/s), height (omega3
-    over the magnitude) and longitude (rad).
+    over the magnitude) and longitude (rad). `first` has scenes of the first reading and number of
+    steps.
     """
 
     codes: Mapping[str, Codes]
     readings: Sequence[str]
     steps: Sequence[int]
+    first: Batch
     magnitudes: Array
     heights: Array
     longitudes: Array
@@ -74,7 +77,7 @@ class Atlas:
         return (float(found[0]), float(found[1]), float(found[2]))
 
 
-def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Any]) -> Atlas:
+def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Any], first: Batch) -> Atlas:
     """Return the atlas of a sweep, which must be complete and have its axes."""
     if tuple(axes) != (*CHOSEN, *WHERE) or not all(map(len, axes.values())) or not codes:
         allowed = ", ".join((*CHOSEN, *WHERE))
@@ -92,7 +95,7 @@ def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Any]) -> Atlas:
                 "thesis, listing original or corrected, no other step_size, lipschitz or may_stop"
             )
     readings, steps = [*map(str, axes["reading"])], [*map(int, axes["steps"])]
-    return Atlas(codes, readings, steps, *(axes[name] for name in WHERE))
+    return Atlas(codes, readings, steps, first, *(axes[name] for name in WHERE))
 
 
 def sum_of_points(codes: Sequence[Codes]) -> Array:
@@ -123,11 +126,11 @@ def about(names: Sequence[str]) -> dict[int, list[str]]:
     return found
 
 
-def shown_starts(names: Sequence[str]) -> dict[Triple, dict[str, int]]:
-    """Return, for each of `starts`, the original programs' verdict codes by claim."""
+def shown_starts(names: Sequence[str], first: Batch) -> dict[Triple, dict[str, int]]:
+    """Return, for each of `starts`, the verdict codes by claim, with the programs of `first`."""
     given = starts()
-    bench = Starts(Laboratory(True, Assumptions()), np.array(given))
-    found = {name: judged(claim(name), bench, len(given)) for name in names}
+    batch = replace(first, arrays={"omega": np.array(given)})
+    found = {name: FUNCTIONS[name](batch) for name in names}
     return {start: {name: int(x[k]) for name, x in found.items()} for k, start in enumerate(given)}
 
 
@@ -219,7 +222,7 @@ def _by_case(atlas: Atlas) -> Table:
 
 def _shown(atlas: Atlas, score: Any) -> Table:
     rows = []
-    for start, codes in shown_starts(list(atlas.codes)).items():
+    for start, codes in shown_starts(list(atlas.codes), atlas.first).items():
         points = float(sum_of_points([np.array(code, np.int8) for code in codes.values()]))
         failing = [name for name, code in codes.items() if code == 0]
         rows.append((*start, points, float((score > points).mean()), ", ".join(failing) or "none"))

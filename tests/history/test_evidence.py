@@ -1,6 +1,7 @@
 """Evidence: every combination is scored by the stated rule, and by nothing else."""
 
 import json
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -10,6 +11,7 @@ from pyharness.history.claims.evidence import Combination, evidence
 from pyharness.history.claims.laboratory import Assumptions, Laboratory
 from pyharness.history.claims.ledger import claim, outcome
 from pyharness.history.claims.verdicts import FALSE, IN_PART, NOT_REPRODUCED, REPRODUCED
+from pyharness.model.scene import Triple
 from tests.conftest import Printed
 
 pytestmark = pytest.mark.claims
@@ -45,6 +47,27 @@ def test_verdict_of_a_combination_is_that_of_its_laboratory(identity: str) -> No
     for assumptions in list(every)[::17]:
         whole = outcome(claim(identity), Laboratory(True, assumptions)).verdict
         assert every[assumptions] == whole, assumptions
+
+
+@pytest.mark.parametrize(
+    ("identity", "start", "readings", "verdict"),
+    [
+        ("v2-case-4-fails", (0.0, 1.0, 1.0), [], REPRODUCED),
+        ("v2-case-3-diverging", (1.0, 1.0, 1.0), [], REPRODUCED),
+        ("iv3-guard", (1.0, 1.0, 1.0), ["do-variable"], IN_PART),
+    ],
+)
+def test_300_steps_change_verdicts_of_runs_that_stop_later(
+    identity: str, start: Triple, readings: list[str], verdict: str
+) -> None:
+    few = Assumptions(start, frozenset(readings))
+    many = replace(few, steps=300)
+    case = claim(identity)["parameters"].get("case", 3)
+    assert Laboratory(True, few).run("runge-kutta", case).ended == "complete"
+    assert Laboratory(True, many).run("runge-kutta", case).ended == "stopped"
+    entry = claim(identity)
+    assert scored._verdict(identity, scored._relevant(entry, many)) == verdict
+    assert scored._verdict(identity, scored._relevant(entry, few)) != verdict
 
 
 def test_evidence_is_told(printed: Printed) -> None:

@@ -4,7 +4,6 @@ A sweep supplies the starts, the listing, and the number of steps. A start is us
 which the thesis gives none.
 """
 
-from dataclasses import replace
 from functools import cache, lru_cache, partial
 from typing import Any
 
@@ -98,14 +97,10 @@ def codes(identity: str, batch: Batch) -> NDArray[np.int8]:
 
     All are SILENT if the claims do not apply to the sweep.
     """
-    entry = claim(identity)
-    chosen = Assumptions(readings=frozenset(batch.listing.readings if batch.listing else ()))
-    if "steps" in entry["assumptions"]:
-        chosen = replace(chosen, steps=batch.scene.steps)
-    one = _laboratory(batch, chosen)
-    if one is None:
+    bench = _bench(batch)
+    if bench is None:
         return np.full(len(batch.omega0), SILENT, np.int8)
-    return judged(entry, _bench(one, batch), len(batch.omega0))
+    return judged(claim(identity), bench, len(batch.omega0))
 
 
 FUNCTIONS = {name: partial(codes, name) for name in JUDGED}
@@ -119,14 +114,9 @@ def judged(entry: dict[str, Any], bench: Starts, n: int) -> NDArray[np.int8]:
     return np.broadcast_to(found, (n,)).astype(np.int8)
 
 
-@lru_cache(maxsize=2)
-def _bench(one: Laboratory, batch: Batch) -> Starts:
-    # One bench has the requested number of steps, the other 100 for claims that do not depend on
-    # it.
-    return Starts(one, batch.omega0)
-
-
-def _laboratory(batch: Batch, assumptions: Assumptions) -> Laboratory | None:
+# All claims of a batch share its runs.
+@lru_cache(maxsize=1)
+def _bench(batch: Batch) -> Starts | None:
     # The claims apply only to original or corrected programs, to bodies, torques and step sizes of
     # the thesis's cases, and to the stop test as on the cards.
     if batch.listing is None or batch.arrays.keys() != {"omega"}:
@@ -137,9 +127,11 @@ def _laboratory(batch: Batch, assumptions: Assumptions) -> Laboratory | None:
     about = [_without_start(case_scene(case)) for case in range(1, 8)]
     if _without_start(batch.scene) not in about:
         return None
+    assumptions = Assumptions(readings=batch.listing.readings, steps=batch.scene.steps)
     both = (Laboratory(is_original, assumptions) for is_original in (True, False))
     program = batch.listing.program
-    return next((one for one in both if one.listing(program) == batch.listing), None)
+    ones = (Starts(one, batch.omega0) for one in both if one.listing(program) == batch.listing)
+    return next(ones, None)
 
 
 def _without_start(scene: Scene) -> tuple[Any, ...]:

@@ -297,10 +297,11 @@ def _settings(code: int, step_size: float, tolerance: float, effort: float) -> A
 
 
 class Step(NamedTuple):
-    """A Taylor step of length `h`, 0 if no step is short enough.
+    """A Taylor step of length `h` (s); 0 if even the shortest step exceeds the tolerances.
 
     `terms`, shape (order + 1, n), are Taylor coefficients times powers of `h`; `state`, shape (n,),
-    is their sum. `expansions` counts series; `is_switched` means an end at a switch.
+    is their sum. `expansions` is the number of series that were computed. `is_switched` says whether
+    the step ends where a branch of the torque changes.
     """
 
     h: float

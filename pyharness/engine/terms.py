@@ -219,13 +219,12 @@ def wheels(
 ) -> StateTorque:
     """Return the torque -omega x h - u that wheels with the angular momentum h exert on their body.
 
-    The motors exert the torque u on the wheels: h' = u. Without motors, h is constant, and the body
-    is a gyrostat.
+    u is h', the rate of h. Without motors, h is constant.
 
-    If h is the absolute angular momentum of the wheels about their axes, the inertia of the body
-    must exclude the moments of the wheels about these axes. If h is relative to the body, the
-    inertia must include them, and u is h' alone: the motors' torque is u plus these moments times
-    omega'.
+    If h is the absolute angular momentum of the wheels about their axes, u is the motors' torque,
+    and the inertia of the body must exclude the moments of the wheels about these axes. If h is
+    relative to the body, the inertia must include these moments, and the motors' torque is u plus
+    the moments times omega'.
 
     Parameters
     ----------

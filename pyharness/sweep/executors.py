@@ -39,8 +39,8 @@ _ADDRESS = re.compile(r"(?:(?:tcp|tls)://)?(?P<host>[\w.-]+|\[[\da-fA-F:.]+\]):(
 class Engine(NamedTuple):
     """A started executor.
 
-    `computed` takes a sweep and numbers of chunks. It yields each number, with an array for each
-    stored quantity.
+    `computed` takes a sweep and chunk numbers. It yields each chunk number with the chunk's arrays,
+    one for each stored quantity.
     """
 
     workers: int

@@ -168,7 +168,10 @@ class Outcome:
 
 
 def check_size(sweep: Sweep, path: str, workers: int, missing: int) -> tuple[int, int]:
-    """Return the sizes (bytes) of the missing chunks on disk, and of all workers in memory."""
+    """Return the bytes that missing chunks need on disk, and all workers in memory.
+
+    Raises InputError if they exceed what is available.
+    """
     disk = os.statvfs(Path(path).absolute().parent)
     scenes = math.prod(sweep.chunk_shape)
     sizes = [scenes * empty(asked, 1).nbytes for asked in sweep.reductions]

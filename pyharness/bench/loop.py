@@ -13,7 +13,7 @@ Say = Callable[[str], None]  # receives the name of the current part
 
 
 class Task(Protocol):
-    """A unit of measurement, such as a workload; messages name it by `place`."""
+    """Something to measure, such as a workload; messages name it by `place`."""
 
     @property
     def place(self) -> str: ...  # noqa: D102

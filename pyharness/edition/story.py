@@ -46,10 +46,10 @@ class Curve(NamedTuple):
 
 
 class Chart(NamedTuple):
-    """A chart with fixed axes, as numbers for SVG.
+    """A chart with fixed axes.
 
     `x` and `y` are ranges; for a logarithmic `y`, exponents of ten. Ticks have position and label.
-    If `is_marked`, curves are marks without lines; `marks` distinguish coincident curves.
+    If `is_marked`, curves are points without lines; `marks` distinguish coincident curves.
     """
 
     name: str
@@ -252,7 +252,7 @@ def _up(chart: Chart, y: float) -> float:
 
 
 def _curve(chart: Chart, name: str, x: Iterable[float], y: Iterable[float]) -> Curve:
-    """Return a curve as SVG points, as chart.js does."""
+    """Return a curve as SVG points, as the page's script chart.js does."""
     pairs = zip(x, y, strict=True)
     shown = ((a, b) for a, b in pairs if not chart.is_logarithmic or b > 0.0)
     points = (f"{_across(chart, a):.1f},{_up(chart, b):.1f}" for a, b in shown)

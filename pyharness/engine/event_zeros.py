@@ -166,8 +166,8 @@ def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroInte
 def _refined(
     g: EventFunction, solution: Solution, ends: Array, others: Array, level: Array
 ) -> Array:
-    """Return times, from `ends` toward `others`, up to which a function is below `level`."""
-    # A polynomial may extend beyond a kink of the function; kinks of the solution are at edges.
+    """Return times from `ends` toward `others`, up to which a function is 0 to within `level`."""
+    # A polynomial's interval may contain a kink of the function; kinks of the solution are edges.
     inner, outer = ends.copy(), others.copy()
     k = np.flatnonzero(~np.isin(inner, solution.pieces.edges))
     k = k[np.abs(solution.values(g, outer[k])) > level[k]]

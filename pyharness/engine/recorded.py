@@ -46,7 +46,7 @@ LONGEST_TRIAL = 1e3
 
 
 def inputs_of(times: Array, state: Array) -> list[Array]:
-    """Return a tape's eight inputs, shape (n,), from states, (n, 7), without attitude (n, 3)."""
+    """Return a tape's eight inputs, (n,), from states (n, 7), or (n, 3) without attitude."""
     columns = [times, *state.T]
     return columns + [np.zeros(len(times))] * (N_INPUTS - len(columns))
 
@@ -300,8 +300,8 @@ class Step(NamedTuple):
     """A Taylor step of length `h` (s); 0 if even the shortest step exceeds the tolerances.
 
     `terms`, shape (order + 1, n), are Taylor coefficients times powers of `h`; `state`, shape (n,),
-    is their sum. `expansions` is the number of series that were computed. `is_switched` says whether
-    the step ends where a branch of the torque changes.
+    is their sum. `expansions` is the number of series that were computed. `is_switched` says
+    whether the step ends where a branch of the torque changes.
     """
 
     h: float

@@ -141,7 +141,7 @@ def _matrix(weighting: str, length: float) -> Array:
 
 def _solved(matrix: Array, right: Array, mistake: str, second: bool) -> Array:
     """Return c1 and c2 of omega(0) + c1 t + c2 t**2, shape (2, 3)."""
-    # `right` has a row for each component; `second` is true for the correction.
+    # `right` has a row for each component of omega; `second` is true for the second call of LEQT1F.
     if mistake == "transposed":
         matrix = matrix.T
     (a, b), (c, d) = matrix.tolist()

@@ -24,7 +24,10 @@ _COLUMNS = (
 
 
 class ReadCard(NamedTuple):
-    """A card of the sample; texts have no blanks. `first` is our text with the names as printed."""
+    """A card of the sample: its text without blanks in the scan, in ours and in a second reading.
+
+    `first`, ours, has the names of variables as printed.
+    """
 
     card: Card
     scan: str

@@ -122,7 +122,7 @@ class StateTorque:
             return math.nan, math.nan, math.nan
 
     def __add__(self, other: "StateTorque | TorqueLaw | Function | int") -> "StateTorque":
-        """Return the sum with a torque, law, function, or 0 (for ``sum``); none may be opaque."""
+        """Return the sum with a torque, law, function or 0 (for ``sum``); none may be `opaque`."""
         if type(other) is int and other == 0:
             return self
         if isinstance(other, (StateTorque, TorqueLaw)):

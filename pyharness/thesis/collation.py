@@ -23,8 +23,8 @@ _OF_THE_SCAN = ("misreading", "missing text", "normalization")
 def expected_lines() -> list[tuple[str, str]]:
     """Return the expected lines of the scanned appendix: text without blanks, and name.
 
-    The name is a card's, such as ``two-term:1660``, ``furniture`` for an editor's line, or
-    ``phantom`` for text of no card at its place.
+    The name is that of a card, such as ``two-term:1660``; ``furniture`` for a heading of the
+    editor; or ``phantom`` for text that belongs to no card at this place.
     """
     found = []
     for page in facts("cards/scan")["page"]:

@@ -275,8 +275,9 @@ class Drift:
 def long_motion(free: Judged) -> tuple[int, Array, float | None]:
     """Return level and times (s) of the long motion, and the limit of drift between two times.
 
-    The level is the first that allows enough times, else the last or, if errors do not decrease,
-    the first. The limit is None if errors in `free` are too large.
+    A level is a tolerance or step size. Chosen is the coarsest at which the drift over enough times
+    can be limited, else the finest or, if errors do not decrease, the coarsest. The limit is None
+    if errors in `free` are too large.
     """
     control = free.finest.control
     levels = range(_FIRST[control], LEVELS)

@@ -259,7 +259,7 @@ def _share(error: Fraction, bound: Fraction) -> float:
 
 
 def _pivoting(matrix: Fractions, order: Sequence[int], sizes: Fractions) -> tuple[float, float]:
-    """Return a pivot's largest relative shortfall from the best candidate, and its bound."""
+    """Return the pivots' largest relative shortfall from the best candidates, and its bound."""
     # Exact elimination in the solver's `order`; `sizes` is abs(L) abs(U).
     shortfall, allowed = Fraction(0), Fraction(0)
     scale = 1 / abs(matrix).max(axis=1)

@@ -172,7 +172,7 @@ def of_flow(flow: Array, times: Array, state: Array, source: Array, largest: flo
 def magnitudes(scene: Scene, times: Array, omega: Array) -> Array:
     """Return the sums of magnitudes of the terms of Euler's equations (rad/s2), shape (n, 3).
 
-    A sine or cosine is multiplied by 1 plus its angle, to allow for the angle's rounding error.
+    A wave's amplitude is multiplied by 1 plus its angle, to allow for the angle's rounding error.
     """
     products = np.abs(np.roll(omega, -1, 1) * np.roll(omega, -2, 1))
     products *= np.abs(scene.euler_coefficients)

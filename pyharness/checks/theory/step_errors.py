@@ -35,7 +35,7 @@ FORECAST = Basis(
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """A scene's solution, with state-transition matrices to the end."""
+    """A scene's solution, with its sensitivity to perturbations at earlier times."""
 
     scene: Scene  # with constant torque
     times: Array  # shape (n,), s: from 0 to the end
@@ -67,7 +67,7 @@ class Forecast:
 
 
 def path(scene: Scene, time: float) -> Path:
-    """Return the solution until `time` (s)."""
+    """Return the solution until `time` (s), and its sensitivity."""
     from pyharness.engine.solve import solve
 
     flow = conditioning(scene, time)

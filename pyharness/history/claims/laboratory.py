@@ -63,7 +63,7 @@ class Laboratory:
         return subset(program, "original", fixed, readings=readings, conjectures=assumed)
 
     def scene(self, case: int, parts: int = 1) -> Scene:
-        """Return the scene of a case under the assumptions."""
+        """Return the scene of a case under these assumptions, each step divided into `parts`."""
         scene, given = case_scene(case), self.assumptions
         is_open = case in open_starts()
         start = scene.omega if given.start is None or not is_open else given.start

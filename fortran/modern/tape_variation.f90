@@ -89,7 +89,8 @@ contains
       call add_rows()
       call advance()
       steps = steps + 1
-      call check_steps(steps, t, t_end - t, arrives(), limit, ahead, found%status)
+      call check_steps(steps, t, t_end - t, arrives() .or. step%is_switched, limit, ahead, &
+                       found%status)
       if (found%status /= COMPLETE) return
     end do
 

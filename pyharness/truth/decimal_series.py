@@ -70,6 +70,8 @@ def taylor_series(
     moving = len(state)
     state += [Decimal(x) for x in scene.attitude or ()]
     state = start or state
+    if not times[-1]:
+        return [state for _ in times]
     begin = Decimal(0)
     rows: list[Row] = []
     forward = times[-1] >= 0

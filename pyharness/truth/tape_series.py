@@ -225,7 +225,7 @@ class TapeSeries:
             if change > most:
                 # The change is a convex function of the length: one reduction is enough.
                 length *= most / change
-        while length and any(self._is_hidden(each, length) for each in self._powers):
+        while any(self._is_hidden(each, length) for each in self._powers):
             length *= Decimal("0.7")
         return length
 

@@ -341,6 +341,20 @@ def test_names_of_summands() -> None:
     assert list(parameters_of(both)) == ["moments", "torque.rate", "torque.size"]
 
 
+def test_a_short_step_to_a_switch_does_not_count_in_the_forecast_of_work() -> None:
+    def scene(gain: float) -> Scene:
+        def moments(t: Any) -> Any:
+            return [3.0 + 0.1 * np.minimum(t, 1e-7), 4.0, 5.0]
+
+        def brake(t: Any, omega: Any, *, gain: float = gain) -> Any:
+            return -gain * omega
+
+        return Scene("", (0.3, 0.2, 0.9), moments=moments, torque=brake)
+
+    found = slopes(scene(0.3), [1.0], "torque.gain")
+    check(found, differences(lambda gain: scene(*gain), [0.3], [1.0]))
+
+
 def test_a_tilted_needle() -> None:
     axes = Rotation.from_rotvec([0.3, -0.8, 0.5]).as_matrix()
     matrix = axes @ np.diag([1e-8, 1.0, 1.0 + 3e-9]) @ axes.T

@@ -17,6 +17,12 @@ from tests.conftest import Printed
 pytestmark = pytest.mark.claims
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _judged() -> None:
+    # Before the first test, whichever that is in this process: the cache then has all verdicts.
+    list(evidence())
+
+
 def _combination(*verdicts: str, steps: int = 100) -> Combination:
     return Combination(
         Assumptions((0.0, 1.0, 1.0), frozenset(), steps, frozenset()),

@@ -1,7 +1,7 @@
 """The method `averaged`: weak torques over very many revolutions, by two-scale averaging.
 
-A macro-step computes the slow change of the periodic torque-free motion from the state once per
-revolution (the stroboscopic solution).
+A macro-step, 100 revolutions or more, computes the slow drift of the torque-free motion, sampled
+once per revolution (the stroboscopic solution).
 
 Stroboscopic averaging: Calvo, Chartier, Murua and Sanz-Serna 2011, Applied Numerical Mathematics
 61. Two scales: Chartier, Crouseilles, Lemou and Mehats 2015, Numerische Mathematik 129.
@@ -97,14 +97,13 @@ def averaged(
 ) -> Trajectory:
     """Return the trajectory under a weak torque at `times` (s), by averaging.
 
-    The result's `steps` are macro-steps, of 100 revolutions or more. Its `error` is estimated from
-    a solution with more nodes and a higher order of averaging. A recorded torque must be a sum of
-    polynomials in omega and time, times sines and cosines of time; a macro-step might miss other
-    changes.
+    The result's `steps` are macro-steps, of 100 revolutions or more. A recorded torque must be a
+    sum of products of a polynomial in omega and time with sines and cosines of time, because a
+    macro-step might miss other changes.
 
     Raise InputError for another torque, or one that is opaque, depends on the attitude, is not
-    weak, or may be in resonance with omega. Raise it also near the separatrix, for a sphere, and at
-    the work limit.
+    weak, or may be in resonance with omega; also near the separatrix, for a sphere, and at the work
+    limit.
     """
     # The next macro-step refuses a point that is not finite.
     with np.errstate(all="ignore"):
@@ -196,7 +195,7 @@ class _Run:
         return self.coordinates.rate * math.sqrt(0.5 * (low + high) * math.sqrt(low * high))
 
     def _forecast(self) -> float:
-        """Return a guess of the next macro-step's length (rad)."""
+        """Return an estimate of the next macro-step's length (rad)."""
         point = self.point
         fast, times = fast_nodes(_FEWEST_ANGLES), np.full(_FEWEST_ANGLES, self.begin[0])
         slopes = self.forward * self.coordinates.slopes(
@@ -271,7 +270,7 @@ class _Run:
         )
 
     def _angles(self, modulus: float) -> int:
-        """Return how many angles a squared elliptic modulus needs; raise TimedError near 1."""
+        """Return the number of angles for a squared elliptic modulus; raise TimedError near 1."""
         # The oscillation is analytic up to this distance from the real axis of the angle.
         width = math.acosh(1.0 / math.sqrt(min(1.0, max(modulus, 1e-4))))
         if width * _MOST_ANGLES < _DIGITS:

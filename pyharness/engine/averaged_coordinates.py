@@ -35,7 +35,7 @@ Torque = Callable[[Array, list[Array]], list[Array] | Array]
 
 
 class Coordinates(NamedTuple):
-    """Constants of coordinates of omega; a point is (p1, p2, p3, t), t in s.
+    """Constants that relate omega to a point (p1, p2, p3, t), t in s.
 
     At the angle psi, x + i y = (p1 + i p2) exp(i psi) and w_a^2 = p3 + k y^2.
     """
@@ -83,12 +83,12 @@ class Coordinates(NamedTuple):
         return found
 
     def scale(self, point: Array) -> Array:
-        """Return the sizes of a point's components, for relative errors."""
+        """Return the sizes to which errors of a point's components are relative."""
         size = math.sqrt(abs(point[2]) + point[0] * point[0] + point[1] * point[1])
         return np.array([size, size, size * size, 1.0 / (self.rate * size)])
 
     def largest(self, point: Array) -> float:
-        """Return a bound on the components of omega (rad/s) in torque-free motion from points."""
+        """Return a bound on omega's components (rad/s) in torque-free motion through points."""
         square = point[0] * point[0] + point[1] * point[1]
         on_axis = np.maximum(point[2], point[2] + self.bend * square).max()
         on_others = square.max() / min(abs(self.on_b), abs(self.on_c)) ** 2
@@ -133,7 +133,7 @@ class Coordinates(NamedTuple):
 
 
 def torque_of(scene: Scene) -> tuple[Torque, bool]:
-    """Return torque over moments as a function, and whether it may depend on time."""
+    """Return torque over moments (rad/s2) as a function, and whether it may depend on time."""
     given = scene.torque
     if isinstance(given, StateTorque):
         tape = given.tape
@@ -175,10 +175,10 @@ class _Slot(NamedTuple):
 
 
 def fastest_of(torque: TorqueLaw | StateTorque) -> float:
-    """Return the highest frequency (rad/s) of a torque's waves (sines and cosines of time).
+    """Return the highest frequency (rad/s) of the sines and cosines of time in a torque.
 
-    A recorded torque must be a sum of polynomials of degree 8 at most, times waves; in another, a
-    macro-step may miss a pulse or an effect in a narrow range of omega.
+    Raise InputError unless a recorded torque is a sum of polynomials of degree 8 at most, times
+    these waves; a macro-step may miss another torque's pulse.
     """
     if isinstance(torque, TorqueLaw):
         return max((abs(f) for a, f in torque.sines + torque.cosines if any(a)), default=0.0)

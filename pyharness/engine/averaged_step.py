@@ -48,7 +48,7 @@ class Slow(NamedTuple):
 
 
 class Fast(NamedTuple):
-    """The n equidistant angles in a period, and arrays for them."""
+    """The n equidistant angles (rad) in a period, and arrays for them."""
 
     angles: Array
     cosine: Array
@@ -120,7 +120,7 @@ class NotResolvedError(Exception):
 class MacroStep:
     """The solution over one macro-step.
 
-    `stroboscopic`, (4, nodes), is V, the solution at psi = 0; its times lack the part proportional
+    `stroboscopic`, (4, nodes), is V, the solution at psi = 0; its times omit the part proportional
     to psi. `error` is the measured error of V; `modulus` is the largest squared elliptic modulus.
     """
 

@@ -1,4 +1,4 @@
-"""Calls of prepared solvers from compiled code; checks of refused arguments."""
+"""A prepared solver as a function for compiled code; checks of refused arguments."""
 
 import math
 import reprlib
@@ -28,7 +28,7 @@ class CompiledCall(NamedTuple):
 
 
 def compiled_call(solver: Any) -> CompiledCall:
-    """Return a prepared solver as a function for compiled code."""
+    """Return a function that compiled code can call with the solver's `data`."""
     from pyharness import _solver
 
     # PYFUNCTYPE, unlike CFUNCTYPE, raises KeyboardInterrupt after Ctrl-C if Python code calls it.
@@ -57,9 +57,9 @@ def get_include() -> str:
 def check_call(
     scene: Scene, with_attitude: bool, omega0: object, t_end: object, third: object
 ) -> tuple[tuple[float, ...], float]:
-    """Return the initial state and `t_end` (s) of a call that the C code refused.
+    """Return the initial state and `t_end` (s), checked, of a call that the C code refused.
 
-    `third` is the attitude or `out`.
+    `third` is the attitude if `with_attitude` is true, else `out`.
     """
     start, time = three_floats("omega", omega0), number("t_end", t_end)
     if scene.changing is not None and math.isfinite(time):

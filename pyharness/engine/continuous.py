@@ -22,7 +22,7 @@ from pyharness.model.trajectory import Trajectory
 def solution_of(
     scene: Scene, found: Trajectory, rows: dense.Rows, method: str, tolerance: float
 ) -> DenseOutput:
-    """Return the solution as a function of time, from time 0 to the last row of `found`."""
+    """Return the solution as a function of time, between time 0 and the ends of `found`."""
     is_closed = not found.evaluations and method != "reference"
     return dense.dense_output(scene, found, rows, tolerance, METHODS[method].finest, is_closed)
 
@@ -37,7 +37,7 @@ def with_events(
     method: str,
     tolerance: float,
 ) -> tuple[Trajectory, FoundEvents]:
-    """Return a trajectory without rows beyond a terminal event, and the events.
+    """Return a trajectory without times beyond a terminal event, and the events.
 
     `ends` are the first and last requested times (s).
     """
@@ -73,7 +73,7 @@ def with_events(
 def _first_periods(
     found: Trajectory, rows: dense.Rows, tolerance: float, period: float
 ) -> Trajectory:
-    """Return `found`, with only three periods on each side of time 0 that has over six."""
+    """Return `found`, cut to three periods on each side of time 0 that has over six."""
     ends = found.time[[0, -1]]
     last = PERIODS * period
     # For little more than three periods, repetition would save nothing.

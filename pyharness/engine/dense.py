@@ -87,7 +87,7 @@ class _Solved:
 def dense_output(
     scene: Scene, found: Trajectory, rows: Rows, tolerance: float, finest: float, is_closed: bool
 ) -> DenseOutput:
-    """Return the solution as a function of time, from time 0 to the last row of `found`.
+    """Return the solution as a function of time, between time 0 and the ends of `found`.
 
     ``rows(times, tolerance)`` computes states; a closed form is evaluated directly. `finest` is the
     method's smallest tolerance; a `tolerance` of 1 means fixed steps. At most 200 000 polynomials
@@ -119,7 +119,7 @@ def state_pieces(
 def _first_edges(
     scene: Scene, found: Trajectory, ends: list[float], tolerance: float
 ) -> list[float]:
-    """Return the edges (s) of the first intervals, with breaks of the torque's tables."""
+    """Return the edges (s) of the first intervals, including breaks of the torque's tables."""
     tape = scene.torque.tape if isinstance(scene.torque, StateTorque) else None
     inner = {time for time in (tape.breaks if tape else ()) if ends[0] < time < ends[-1]}
     bounds = sorted({*ends, *inner})
@@ -207,7 +207,7 @@ def _fitted(
 def _of_fixed_steps(
     scene: Scene, ends: list[float], rows: Rows, derivatives: Callable[[Array, Array], Array]
 ) -> Pieces:
-    """Return Hermite cubics between the ends of steps."""
+    """Return Hermite's cubics between the ends of steps."""
     step = scene.step_size
     steps = [math.ceil(abs(end) / step) for end in ends]
     if max(steps) > _MOST_PIECES:

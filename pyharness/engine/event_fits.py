@@ -81,11 +81,11 @@ class Solution:
         return g(times, states, rates)
 
     def exact_values(self, g: EventFunction, times: Array) -> Array:
-        """Return an event function's values for states of `sol` instead of `pieces`."""
+        """Return an event's values at `times` (s), from states of `sol` instead of `pieces`."""
         return self.values(g, times, self.sol.normalized(self.sol.states(times)))
 
     def noise(self, g: EventFunction, times: Array, shift: float = _SHIFT) -> Array:
-        """Return a function's errors due to errors of time, state and rates."""
+        """Return the errors of a function's values due to errors of time, state and rates."""
         return self.values_and_noise(g, times, None, shift)[1]
 
     def values_and_noise(
@@ -115,7 +115,7 @@ class Solution:
         return found[1], *(errors @ np.abs(found - found[1]))
 
     def changed_values(self, g: EventFunction, times: Array, part: float) -> Array:
-        """Return values at n times (s), also with each unknown changed, (m, n)."""
+        """Return values, (m, n), at n times (s): unchanged, and with each unknown changed."""
         states = self.states(times)
         n, width = states.shape
         count = 2 * width + 1
@@ -126,7 +126,7 @@ class Solution:
 
     @property
     def state_error(self) -> float:
-        """The relative error of the state, at most 1e-10, not to hide close roots."""
+        """The relative error of the state, limited to 1e-10, so that close roots are not merged."""
         return max(ROUNDING, min(self.tolerance, _COARSEST))
 
     @cached_property
@@ -141,7 +141,7 @@ class Solution:
 
 
 def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
-    """Return polynomials through a function, and sign changes where none converges."""
+    """Return polynomials through an event's values, and sign changes where they do not converge."""
     edges = solution.pieces.edges
     low, high = edges[:-1], edges[1:]
     times, inner = solution.at_nodes
@@ -200,7 +200,7 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
 def noise_of(
     g: EventFunction, solution: Solution, low: Array, high: Array, shift: float = _SHIFT
 ) -> Array:
-    """Return the largest noise at nodes of each interval from `low` to `high` (s)."""
+    """Return the largest error of an event's values in each interval, `low` to `high` (s)."""
     times = nodes(low, high, POINTS)[:, _SOME]
     noise = solution.noise(g, times.ravel(), shift).reshape(times.shape)
     return np.asarray(noise.max(axis=1))
@@ -209,7 +209,7 @@ def noise_of(
 def with_noise(
     g: EventFunction, solution: Solution, fits: Fits, needed: Index
 ) -> tuple[Fits, Roots]:
-    """Return `fits` with noise where needed, and roots at time 0 and both ends."""
+    """Return `fits` with `noise` where needed, and roots at time 0 and both ends."""
     sizes, largest = fits.sizes, fits.sizes.max(initial=0.0)
     which = np.flatnonzero(needed | (sizes <= largest / MUCH) | (sizes == largest))
     ends, states = solution.at_ends

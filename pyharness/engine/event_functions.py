@@ -54,8 +54,8 @@ class Event:
 class EventFunction:
     """A checked event.
 
-    Event number `limit`, from 1, ends the integration; infinity means none. `is_vectorized` says
-    whether the function accepts arrays; None means unknown.
+    Event number `limit`, from 1, ends the integration; if infinite, no event does. `is_vectorized`
+    says whether the function accepts arrays; None means unknown.
     """
 
     name: str
@@ -65,7 +65,7 @@ class EventFunction:
     _tapes: list[Tape | None] = field(default_factory=list, repr=False)  # at most one
 
     def __call__(self, times: Array, states: Array, rates: Array | None = None) -> Array:
-        """Return the finite values at n times (s), (n,)."""
+        """Return the values, all finite, at n times (s), (n,)."""
         given = times, states, None if rates is None else rates[:, :3]
         found = self._of_arrays(*given) if self.is_vectorized is not False else None
         if found is None:
@@ -162,7 +162,7 @@ class EventFunction:
 def event_functions(
     events: object, attitude: bool, states: Sequence[OwnState] = ()
 ) -> list[EventFunction]:
-    """Return one event or a list as checked functions."""
+    """Return one event, or a list of events, as checked functions."""
     if callable(events) or isinstance(events, Event):
         events = [events]
     if not isinstance(events, (list, tuple)):
@@ -218,7 +218,7 @@ def _with_own(
 
 
 def _arguments(given: Callable[..., Any], name: str, with_own: bool = False) -> int:
-    """Return a function's number of arguments, 2 or 3, without own states."""
+    """Return 2 or 3, a function's number of arguments without own states."""
     if type(given) is FunctionType and not (given.__defaults__ or vars(given).keys() & _SIGNED):
         code = given.__code__
         count = code.co_argcount - with_own

@@ -63,7 +63,7 @@ C = TypeVar("C", bound=_Columns)
 
 
 def together(parts: list[C], order: str) -> C:
-    """Return all tables' rows in ascending order of column `order`."""
+    """Return the rows of all tables in ascending order of column `order`."""
     names = parts[0].__dataclass_fields__
     found = type(parts[0])(*(np.concatenate([getattr(x, name) for x in parts]) for name in names))
     return found.only(np.argsort(getattr(found, order), kind="stable"))
@@ -136,14 +136,14 @@ def values_at(coefficients: Array, x: Array) -> Array:
 
 
 def may_vanish(fits: Fits) -> Index:
-    """Return which polynomials may have a root."""
+    """Return a mask of the polynomials that may have a root."""
     first = np.abs(fits.coefficients[:, 0])
     found: Index = first <= np.maximum(fits.noise, FIT_ERROR * fits.sizes) + (fits.sizes - first)
     return found | ((fits.first < 0.0) != (fits.last < 0.0))
 
 
 def isolated(fits: Fits) -> Roots:
-    """Return all roots, and extrema that may be roots, ascending in time."""
+    """Return all roots, and extrema that may be roots, in order of time."""
     near = np.maximum(fits.noise, FIT_ERROR * fits.sizes)
     smallest = np.maximum(fits.noise / 16.0, 1e-15 * fits.sizes)
     # Points from -1 to 1, sign changes and indices of polynomials.
@@ -235,7 +235,7 @@ def _bracketed(c: Array, low: Array, high: Array, sign: Array) -> Array:
 def _bent(
     rows: Index, *given: Array
 ) -> tuple[Array, Index, list[tuple[Array, Array, Index, Index]]]:
-    """Return extrema that may be roots, their rows, and parts with one root."""
+    """Return extrema that may be roots, indices of their polynomials, and parts with one root."""
     c, first, last, slopes, near = (each[rows] for each in given)
     count = len(c)
     low, high = np.full(count, -1.0), np.ones(count)

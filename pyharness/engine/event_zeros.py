@@ -1,6 +1,6 @@
 """Intervals in which an event's function is 0 to within its error.
 
-One is a root if the function reaches 0 by a kink or a jump, not by decay.
+An interval is a root if the function reaches 0 by a kink or a jump, not by decay.
 """
 
 import math
@@ -25,8 +25,8 @@ _PARTS = np.array([0.1459, 0.382, 0.618, 0.8541, 1.0])
 class ZeroIntervals:
     """The ascending intervals, `low` to `high` (s), in which a function is 0 to within its error.
 
-    Near one, values below `noise` can't be distinguished from 0. `before` and `after` are the
-    function's signs on both sides: 0 where it decays to 0, or at an end of the solution.
+    Near an interval, values below `noise` can't be distinguished from 0. `before` and `after` are
+    the function's signs on both sides: 0 where it decays to 0, or at an end of the solution.
     """
 
     low: Array
@@ -56,7 +56,7 @@ class ZeroIntervals:
         return Roots.bare(time, change.astype(int), lasting=lasting)
 
     def contain(self, g: EventFunction, solution: Solution, roots: Roots) -> Index:
-        """Return which roots are in an interval, or so near that the function is 0 in between."""
+        """Return which roots are in an interval, or separated from one only by zero values."""
         following = np.searchsorted(self.low, roots.time, side="right")
         before = np.append(-math.inf, self.high)[following]
         after = np.append(self.low, math.inf)[following]
@@ -75,7 +75,7 @@ class ZeroIntervals:
         return found
 
     def merged(self, g: EventFunction, solution: Solution) -> "ZeroIntervals":
-        """Return the intervals, joined where the function is 0 between."""
+        """Return the intervals, joined where the function is 0 between them."""
         noise = np.maximum(self.noise[1:], self.noise[:-1])
         is_one = _is_zero_between(g, solution, self.high[:-1], self.low[1:], noise)
         first = np.flatnonzero(np.append(True, ~is_one))
@@ -89,7 +89,7 @@ class ZeroIntervals:
 def _is_zero_between(
     g: EventFunction, solution: Solution, ends: Array, times: Array, noise: Array
 ) -> Index:
-    """Return where a function is 0 to within `noise` between two times each, but for rounding."""
+    """Return where a function is 0, to within `noise` or rounding, between `ends` and `times`."""
     n = len(ends)
     if not n:
         return np.zeros(0, dtype=bool)
@@ -116,7 +116,7 @@ def _begins(fits: Fits, numbers: Index) -> Index:
 
 
 def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroIntervals | None:
-    """Return the intervals in which a function is 0 to within its error, if any."""
+    """Return the intervals in which a function is 0 to within its error, or None."""
     sizes = fits.sizes
     if not sizes.size:
         return None
@@ -166,7 +166,7 @@ def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroInte
 def _refined(
     g: EventFunction, solution: Solution, ends: Array, others: Array, level: Array
 ) -> Array:
-    """Return times from `ends` toward `others`, up to which a function is 0 to within `level`."""
+    """Return the times up to which, from `ends` toward `others`, a function is within `level`."""
     # A polynomial's interval may contain a kink of the function; kinks of the solution are edges.
     inner, outer = ends.copy(), others.copy()
     k = np.flatnonzero(~np.isin(inner, solution.pieces.edges))

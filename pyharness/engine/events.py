@@ -44,7 +44,7 @@ def event_roots(g: EventFunction, solution: Solution) -> Roots:
 
 
 def _distinct(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
-    """Return the roots with their `noise`, without extrema that are not 0."""
+    """Return the roots with their `noise`, without extrema that differ from 0."""
     if not roots.time.size:
         return roots
     value, noise, _ = solution.values_and_noise(g, roots.time)
@@ -74,7 +74,7 @@ def _polished(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
 
 
 def _bisected(g: EventFunction, solution: Solution, times: Array, changes: Index) -> Array:
-    """Return the times (s) of roots; bisection refines inexact sign changes."""
+    """Return the times (s) of roots, with inexact sign changes refined by bisection."""
     # Near a root of odd multiplicity above 1, polynomials are inexact, but signs are not.
     edges = solution.pieces.edges
     bounds = np.concatenate([edges[:1], 0.5 * times[:-1] + 0.5 * times[1:], edges[-1:]])
@@ -146,7 +146,7 @@ def _grouped(roots: Roots, is_same: Index, ends: tuple[float, ...]) -> Roots:
 
 
 def _have_one_extremum(g: EventFunction, solution: Solution, roots: Roots, noise: Array) -> Index:
-    """Return which adjacent roots enclose an extremum of 0 to within noise."""
+    """Return which pairs of adjacent roots enclose one extremum, 0 to within `noise`."""
     found: Index = np.zeros(len(noise), dtype=bool)
     widest = np.sqrt(8.0 * roots.near / np.abs(roots.curvature))
     # A distant root belongs to another extremum, however flat the function is here.
@@ -163,7 +163,7 @@ def _have_one_extremum(g: EventFunction, solution: Solution, roots: Roots, noise
 def _with_extrema(
     g: EventFunction, solution: Solution, roots: Roots, ends: tuple[float, ...]
 ) -> Roots:
-    """Return the roots, each double one at the extremum."""
+    """Return the roots, with each double root moved to its extremum."""
     if roots.change.all():
         return roots
     is_double = (roots.change == 0) & ~np.isin(roots.time, ends)
@@ -178,7 +178,7 @@ def _with_extrema(
 
 
 def _chosen(roots: Roots, group: Index, change: int, ends: tuple[float, ...]) -> int:
-    """Return the index of a group's root at a time in `ends`, else of its middle root."""
+    """Return the index of a group's root at `ends`, else of its middle root."""
     at_end = group[np.isin(roots.time[group], ends)]
     if at_end.size:
         return int(at_end[0])
@@ -190,7 +190,7 @@ def _chosen(roots: Roots, group: Index, change: int, ends: tuple[float, ...]) ->
 def side_events(g: EventFunction, solution: Solution, roots: Roots, side: int) -> Array:
     """Return event times (s) after (`side` 1) or before (-1) time 0, in order away from 0.
 
-    As in SciPy, a root at time 0 is a sign change from 0, at the end one to 0.
+    As in SciPy, a root at time 0 is a sign change from 0, and one at the end a change to 0.
     """
     end = solution.pieces.edges[-1 if side > 0 else 0]
     if side * end <= 0.0 or not roots.time.size:
@@ -213,7 +213,7 @@ def side_events(g: EventFunction, solution: Solution, roots: Roots, side: int) -
 def _repeated(
     g: EventFunction, solution: Solution, times: Array, side: int, period: float
 ) -> Array:
-    """Return event times (s) on one side of 0, periodic beyond the polynomials."""
+    """Return event times (s) on one side of 0, repeated periodically beyond the polynomials."""
     last, end = solution.pieces.edges[-1], solution.sol.t_max
     if side < 0:
         last, end = solution.pieces.edges[0], solution.sol.t_min

@@ -121,8 +121,8 @@ def magnetic_dipole(moment: Numbers, field: TorqueLaw | Numbers) -> StateTorque:
 def magnetic_damping(gain: Number, field: TorqueLaw | Numbers) -> StateTorque:
     """Return the torque m x b of coils that damp the rotation in a magnetic field.
 
-    The coils have the moment m = -k b', where b = R^T B is the field about the body axes, R rotates
-    from body to space, and b' = R^T B' - omega x b. In a constant field the torque is
+    The field B in space is b = R^T B about the body axes, where R rotates from body to space. The
+    coils have the moment m = -k b', with b' = R^T B' - omega x b. In a constant field the torque is
     -k (|b|^2 omega - (omega . b) b), and damps the part of omega perpendicular to the field. In a
     rotating field the body finally rotates with the field.
 

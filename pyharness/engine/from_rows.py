@@ -1,4 +1,4 @@
-"""Attitudes from a table of omega, such as a thesis program writes."""
+"""Attitudes from a table of omega, such as a thesis program's output."""
 
 import math
 
@@ -18,8 +18,9 @@ _MORE, _LESS = 0.25 + math.sqrt(3.0) / 6.0, 0.25 - math.sqrt(3.0) / 6.0
 def attitude_from_rows(scene: Scene, time: Array, omega: Array) -> Array:
     """Return the attitudes, (n, 4), at the times (s) of a table of omega (rad/s).
 
-    A commutator-free step of order 4 (Celledoni, Marthinsen and Owren 2003) leads from row to row,
-    with omega at its Gauss points by Hermite's cubic. After an overflow, attitudes are NaN.
+    A commutator-free step of order 4 (Celledoni, Marthinsen and Owren 2003) leads from each time to
+    the next; Hermite's cubic interpolates omega at its Gauss points. After an overflow, attitudes
+    are NaN.
     """
     times = np.concatenate([[0.0], time])
     rows = np.vstack([scene.omega, omega])

@@ -41,9 +41,8 @@ def gauss(
 
     The step is halved until the estimated relative error of omega meets the tolerance, or the last
     two solutions differ only by rounding. The estimate is 2 d / (r**p - 1), with a safety factor 2.
-    Here d is the largest relative difference of the solutions. The ratio r, at most 2, is the
-    smallest ratio of their numbers of steps between requested times. The exponent p is min(2
-    `stages`, 8), because long steps show no higher order.
+    Here d is the largest relative difference of the solutions, r, at most 2, the smallest ratio of
+    their numbers of steps between requested times, and p = min(2 `stages`, 8).
     """
     given, most = normalized(scene), effort * _MOST_EVALUATIONS / (1.0 + 0.5 * waves(scene))
     if times[-1] == 0.0:
@@ -125,11 +124,7 @@ def gauss(
 
 
 def _blows_up(finer: _Solution, coarser: _Solution, start: float) -> bool:
-    """Return whether two solutions end because omega grows without bound.
-
-    Both must end early and nearly together, above 1e300 rad/s, or far above all earlier values and
-    larger in the finer solution.
-    """
+    """Return whether both solutions end nearly together because omega grows without bound."""
     if COMPLETE in (finer.status, coarser.status):
         return False
     # A slowly growing omega is larger in the finer solution only because this ends later.

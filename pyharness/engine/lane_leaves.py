@@ -1,4 +1,4 @@
-"""C code for Taylor series of many bodies, one per vector lane; see fortran/many/tape_lanes.c.
+"""C code for Taylor series of many bodies, one per vector lane, in fortran/many/tape_lanes.c.
 
 To save loads, sums of products for four successive terms begin together.
 """
@@ -100,7 +100,7 @@ static SHORT reg late_sum(const reg *x, const reg *y, int k, int late, const reg
 
 @lru_cache(maxsize=64)
 def whole_source(tape: Structure) -> str:
-    """Return C source of a tape's functions and their table `leaves` (see tape.h)."""
+    """Return C source of the functions for recorded operations, and of their table (see tape.h)."""
     functions, lines = ["0"] * 4, [HEADER]
     if not _has_parameters(tape):
         functions, lines = names(tape), [source(tape)]
@@ -142,7 +142,7 @@ def _has_parameters(tape: Structure) -> bool:
 
 
 def _inputs(tape: Structure, texts: list[str], letter: str) -> list[int]:
-    """Return the slots of inputs that texts read, such as 5 for t5."""
+    """Return the numbers of inputs that C statements read, such as 5 for t5."""
     read = {int(each) for each in re.findall(rf"\b{letter}(\d+)", " ".join(texts))}
     return sorted(slot for slot in read if slot < _first_result(tape))
 
@@ -212,5 +212,5 @@ def _set_noise(tape: Structure) -> Iterator[str]:
 
 
 def _of_registers(text: str) -> str:
-    """Return a C definition for registers; `zero` converts a plain number."""
+    """Return a C definition for registers; adding `zero` converts a plain number."""
     return _in_lanes(text).replace("= ", "= zero + ", 1)

@@ -1,4 +1,4 @@
-"""Compilation and folder of leaves, C code for recorded torques.
+"""Compilation and cache of C code for recorded torques (leaves).
 
 A file is loaded only if it and the folder belong to the user, nobody else may write them, and its
 name has its content's hash.
@@ -32,7 +32,7 @@ _NATIVE = "-march=native"
 
 
 class LeavesError(Exception):
-    """The reason, in one line, why leaves can't be compiled or loaded."""
+    """A failure to compile or load code, with the reason in one line."""
 
 
 # RuntimeError: no home folder is known.
@@ -40,7 +40,7 @@ _FAILURES = (LeavesError, RuntimeError)
 
 
 def folder() -> Path:
-    """Return the folder of compiled code, which may be missing."""
+    """Return the cache folder of compiled code, which may be missing."""
     home = Path(os.environ.get("XDG_CACHE_HOME", ""))
     return (home if home.is_absolute() else Path("~/.cache").expanduser()) / "pyharness" / "leaves"
 
@@ -51,7 +51,7 @@ def size() -> int:
 
 
 def about_leaves() -> dict[str, str | int]:
-    """Return folder and size (bytes) of compiled code, and the compiler or an error."""
+    """Return the cache's folder and size (bytes), and the C compiler or an error."""
     try:
         return {"folder": str(folder()), "bytes": size(), "compiler": " ".join(compiler())}
     except _FAILURES as error:
@@ -59,7 +59,7 @@ def about_leaves() -> dict[str, str | int]:
 
 
 def leaves_for(scene: Scene, compiled: bool) -> tuple[int, str]:
-    """Return the address of compiled code, or 0, and the text of `Solver.leaves`."""
+    """Return the address of a scene's compiled code, or 0, and the text of `Solver.leaves`."""
     tape = system_of(with_constant_body(scene))
     address, found = leaves_of(tape) if compiled else (0, "interpreter")
     if not address and has_ready_leaves(tape):
@@ -79,7 +79,7 @@ def leaves_of(tape: Tape) -> tuple[int, str]:
 
 
 def leaves_of_many(packed: Array, leaves: str) -> str:
-    """Return the text of `Ensemble.leaves` for a packed scene, from that of `Solver.leaves`."""
+    """Return the text of `Ensemble.leaves` for a packed scene, from `Solver.leaves`."""
     if leaves == "compiled" and not extension().compiled_lanes(number_of_leaves(packed)):
         return "interpreter: the compiler does not use the registers of this processor"
     # Code built with the package is for single bodies.
@@ -88,7 +88,7 @@ def leaves_of_many(packed: Array, leaves: str) -> str:
 
 @cache  # kernels may use a loaded library as long as the process lives
 def loaded(tape: Structure, place: str) -> int:
-    """Return the address of a tape's functions (see tape.h), or raise LeavesError."""
+    """Return the address of the compiled functions (see tape.h), or raise LeavesError."""
     try:
         text = whole_source(tape)
         library = CDLL(str(_found(Path(place), _key(text)) or compiled_file(Path(place), text)))
@@ -160,7 +160,7 @@ def _found(place: Path, key: str) -> Path | None:
 
 
 def compiled_file(place: Path, text: str) -> Path:
-    """Return the compiled file of C code, which enters the folder only when complete."""
+    """Compile C code; return the file, which enters the folder `place` only when complete."""
     from tempfile import TemporaryDirectory
 
     place.mkdir(mode=0o700, parents=True, exist_ok=True)

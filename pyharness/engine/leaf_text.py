@@ -1,4 +1,4 @@
-"""Names, in C code, of slots (inputs, results) of a tape (recorded operations)."""
+"""C names for the slots (inputs and results) of a tape (recorded operations)."""
 
 import re
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ Listed = tuple[int, int, int, int]  # kind, operands x and y, and slot o of an o
 
 
 class Structure(NamedTuple):
-    """The parts of a tape on which its compiled code depends."""
+    """The parts of recorded operations that determine their compiled code."""
 
     n_unknowns: int
     operations: tuple[Listed, ...]
@@ -26,7 +26,7 @@ class Structure(NamedTuple):
 
 
 def structure(tape: "Listing") -> Structure | None:
-    """Return the structure of a tape; None if it can't be compiled."""
+    """Return the structure of recorded operations; None if they can't be compiled."""
     kinds = {operation[0] for operation in tape.operations}
     if not kinds <= {*OPERATIONS, Operations.LINEAR} or len(tape.operations) > _MOST_OPERATIONS:
         return None
@@ -35,7 +35,7 @@ def structure(tape: "Listing") -> Structure | None:
 
 
 def key(tape: Structure) -> int:
-    """Return a 63-bit integer that identifies a tape's structure."""
+    """Return a 63-bit integer that identifies a structure."""
     return int.from_bytes(sha256(repr(tuple(tape)).encode()).digest()[:8]) >> 1
 
 
@@ -52,12 +52,12 @@ def letters(operation: Listed) -> dict[str, int]:
 
 
 def place(slot: int, k: str) -> str:
-    """Return C code for term k of a slot's series."""
+    """Return C code for term k of the Taylor series of a slot."""
     return f"A({slot}, {k})"
 
 
 def with_slots(text: str, operation: Listed) -> str:
-    """Return C code with an operation's slots for letters."""
+    """Return C code in which an operation's slots replace the letters."""
     slots = letters(operation)
 
     def name(match: re.Match[str]) -> str:
@@ -69,20 +69,20 @@ def with_slots(text: str, operation: Listed) -> str:
 
 
 def combined(tape: Structure, number: int, name: str, *, is_value: bool) -> str:
-    """Return C code for a linear combination of variables, `name` followed by a slot."""
+    """Return C code for a linear combination of variables, each named `name` and its slot."""
     parts = [f"d[{number - 1}]"] * is_value
     parts += [f"c[{i}]*{name}{slot}" for i, slot in numbered_terms(tape, number)]
     return " + ".join(parts) or "0.0"
 
 
 def numbered_terms(tape: Structure, number: int) -> Iterator[tuple[int, int]]:
-    """Yield coefficient numbers and slots of a linear combination."""
+    """Yield the number and the slot of each coefficient in a linear combination."""
     begin = sum(map(len, tape.combinations[: number - 1]))
     yield from enumerate(tape.combinations[number - 1], begin)
 
 
 def rates_of(tape: Structure) -> range:
-    """Return the numbers of the combinations that are unknowns' rates."""
+    """Return the numbers of the combinations that are the unknowns' derivatives."""
     return range(len(tape.combinations) - tape.n_unknowns + 1, len(tape.combinations) + 1)
 
 
@@ -92,5 +92,5 @@ def unknowns_of(tape: Structure) -> range:
 
 
 def slots_read(lines: list[str]) -> list[int]:
-    """Return the slots whose term 0 the C code reads."""
+    """Return the slots that C code reads, such as 5 for z5."""
     return sorted({int(each) for each in re.findall(r"\bz(\d+)", " ".join(lines))})

@@ -1,7 +1,7 @@
-"""Compiled leaves: C code for values, series, Jacobian and rounding errors of tapes.
+"""C code (leaves) for values, Taylor series, Jacobian and rounding errors of recorded operations.
 
-They replace the interpreter, fortran/modern/tape_terms.c. Tapes that differ only in coefficients
-share leaves, which read coefficients from memory.
+It replaces the interpreter, fortran/modern/tape_terms.c. Tapes (lists of operations) that differ
+only in coefficients share the code, which reads these from memory.
 """
 
 import re
@@ -62,7 +62,7 @@ static void put(double *to, int nodes, double h, abreast a, abreast b, abreast c
 def source(tape: Structure, suffix: str = "") -> str:
     """Return the C source of the functions of tape.h for one body.
 
-    With a suffix, the functions are static.
+    With a suffix to their names, the functions are static.
     """
     parts = chain(_expand(tape), _set_jacobian(tape), _set_values(tape), _set_noise(tape))
     text = "\n".join([HEADER, *parts]) + "\n"
@@ -72,13 +72,13 @@ def source(tape: Structure, suffix: str = "") -> str:
 
 
 def names(tape: Structure, suffix: str = "") -> list[str]:
-    """Return the names of `source`'s functions in the order of tape.h; 0 for a missing one."""
+    """Return the names of `source`'s functions in the order of tape.h; "0" for a missing one."""
     values = f"set_values{suffix}" if first_values(tape) else "0"
     return [f"expand{suffix}", f"set_jacobian{suffix}", values, f"set_noise{suffix}"]
 
 
 def recurrences(tape: Structure) -> tuple[list[str], list[tuple[int, int]]]:
-    """Return C statements for term k of all results, and slots of the products they sum."""
+    """Return C statements for term k of all results, and slots of the products that they sum."""
     pairs: dict[tuple[int, int], int] = {}
     terms = []
     for operation in tape.operations:
@@ -99,7 +99,7 @@ def recurrences(tape: Structure) -> tuple[list[str], list[tuple[int, int]]]:
 
 
 def rates_of_term(tape: Structure) -> tuple[list[str], list[str]]:
-    """Return C code for terms 0 and k of the unknowns' rates."""
+    """Return C code for terms 0 and k of the unknowns' derivatives."""
     first = [combined(tape, number, "z", is_value=True) for number in rates_of(tape)]
     return first, [combined(tape, number, "t", is_value=False) for number in rates_of(tape)]
 
@@ -173,7 +173,7 @@ def _set_jacobian(tape: Structure) -> Iterator[str]:
 
 
 def first_values(tape: Structure) -> list[str]:
-    """Return C definitions of term 0 of all results; none if the interpreter computes one."""
+    """Return C definitions of all results' term 0; empty if the interpreter must compute one."""
     lines = []
     for operation in tape.operations:
         if operation[0] == Operations.LINEAR:
@@ -198,7 +198,7 @@ def _set_values(tape: Structure) -> Iterator[str]:
 
 
 def kept_values(lines: list[str], rates: list[str], number: str) -> Iterator[str]:
-    """Yield C code that stores term 0 of results, and defines what `rates` read."""
+    """Yield C code that stores term 0 of all results, and defines what `rates` read."""
     results = [int(each[1 : each.index(" ")]) for each in lines]
     for slot in slots_read([each.partition("=")[2] for each in lines] + rates):
         if slot not in results:
@@ -209,10 +209,7 @@ def kept_values(lines: list[str], rates: list[str], number: str) -> Iterator[str
 
 
 def _roundings(tape: Structure) -> tuple[list[str], list[str]]:
-    """Return C code for errors of results and rates, in units of roundoff.
-
-    This is the running error analysis of fortran/modern/tape_noise.h.
-    """
+    """Return C code for errors of results and rates, as in fortran/modern/tape_noise.h."""
     # Inputs have no errors.
     known: set[int] = set()
     lines = []

@@ -83,19 +83,19 @@ def solve_many(
     Parameters
     ----------
     scene : Scene, or sequence of Scene
-        One scene, whose values apply where no array is given; or one scene for each body, and
-        then no arrays.
+        One scene, whose values apply where no array is given; or a scene for each body, without
+        arrays.
     t_end : float, or array of shape (n,)
         Final times, s; positive, negative or 0.
     times : float or iterable of float, shape (m,)
         Strictly monotonic times (s) of the results for all bodies, instead of `t_end`. The arrays
         of the result then have a second axis, of length m. The states are bit for bit as from calls
-        with each time as `t_end`, unless the scene has states of its own.
+        with each time as `t_end`, unless the scene has own states.
     omega : array, shape (n, 3) or (3,)
         Initial angular velocities, rad/s. A single row, here and below, applies to all bodies.
     attitude : array, shape (n, 4) or (4,), or scipy.spatial.transform.Rotation
         Quaternions at time 0, from body to space, scalar first. The default is the scene's
-        attitude; if it has none, no attitudes are returned.
+        attitude; without one, no attitudes are returned.
     moments, coefficients : array, shape (n, 3) or (3,)
         Principal moments (kg m2), or the coefficients A, B, C of Euler's equations; not both.
     inertia : array, shape (n, 3, 3) or (3, 3)
@@ -122,14 +122,14 @@ def solve_many(
         Largest allowed error of a component of omega, relative to the largest |omega| from time 0
         to the end, and of the attitude, an angle (rad). The default depends on the method.
     step : float, optional
-        Step size of Gauss collocation and fixed-step methods, s. The default is the scene's.
+        Step size of Gauss collocation and fixed-step methods, s; by default the scene's.
     effort : float
         Factor on the work limit of a body; beyond it the status is `gave up`.
     estimates : bool
         Whether to return estimated errors and error amplifications.
     compiled : bool
         Whether a C compiler translates a torque that depends on the state, as in `prepare`, for
-        bodies side by side. `Ensemble.leaves` says whether it did.
+        bodies solved side by side. `Ensemble.leaves` says whether it did.
     events : callable, Event, or list of these
         Functions whose roots are computed, as in `solve`; none may be terminal. The method must be
         `auto`, `taylor` or `closed-form`.
@@ -137,7 +137,7 @@ def solve_many(
         Names of parameters, as in `solve`, with respect to which the final states are
         differentiated; the methods are as for `events`.
     threads : int
-        Number of threads. The kernel releases the GIL.
+        Number of threads.
     out : Ensemble, or array of shape (n, 3), optional
         An earlier result for n bodies, or an array for omega, to be overwritten; not with `times`.
     progress : bool
@@ -300,7 +300,7 @@ def _solve(
 
 
 def _kind_of(scene: Scene, row: int) -> int:
-    """Return a number, equal for scenes of one kernel call."""
+    """Return a number that scenes share if one kernel call can solve them."""
     checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True)
     return row if is_solved_alone(scene, {}) else _PLAIN if scene.inertia is None else _TILTED
 
@@ -309,7 +309,7 @@ def _solve_groups(
     scenes: Sequence[Scene], kinds: Sequence[int], t_end: Any, step: Number | None,
     out: "Ensemble | Array | None", **settings: Any,
 ) -> Ensemble:  # fmt: skip
-    """Return the final states of scenes that need several kernel calls."""
+    """Return the final states of scenes, by a kernel call for each kind."""
     check_alike(scenes)
     if scenes[0].attitude is None and any(each.torque.needs_attitude for each in scenes):
         raise InputError(NO_ATTITUDE)

@@ -1,6 +1,7 @@
-"""Solution of bodies one by one: events, sensitivities, and scenes that the kernel refuses.
+"""Solution of bodies one by one: events, sensitivities, and scenes that the vector kernel refuses.
 
-It refuses a changing inertia, and torques that depend on the state or are about axes of space.
+The kernel refuses a changing inertia, and torques that depend on the state or are about axes of
+space.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -149,11 +150,7 @@ def _lanes(
     scene: Scene, rows: Mapping[str, Array], settings: tuple[float, float], attitude: bool,
     compiled: bool,
 ) -> tuple[tuple[Array, Array] | None, str | None]:  # fmt: skip
-    """Return packed equations and parameters of bodies, and the text `Ensemble.leaves`.
-
-    Both are None if one kernel call can't solve all bodies. `settings` are tolerance and effort.
-    The kernel refuses an invalid body's parameters, NaN.
-    """
+    """Return packed equations, parameters and `Ensemble.leaves` for one kernel call, or None."""
     names = [name for name in rows if name.startswith(PARAMETER)]
     kind = next((name for name in ("moments", "coefficients") if name in rows), None)
     if (
@@ -193,7 +190,7 @@ def prepare_details(
 ) -> Callable[[Ensemble], Ensemble]:  # fmt: skip
     """Check the request; return a function that adds events and sensitivities to a result.
 
-    If `has_rows`, `t_end` has all bodies' common times (s).
+    If `has_rows`, `t_end` has the common times (s) of all bodies.
     """
     if method not in _METHODS:
         where = "sensitivities" if events is None else "events"

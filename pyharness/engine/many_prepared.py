@@ -38,7 +38,7 @@ _SIDE_BY_SIDE = (Methods.CLOSED_FORM, Methods.CLOSED_FORM_OR_TAYLOR, Methods.TAY
 def many_starts(
     solver: "Solver[Any]", omega: Any, t_end: Any, *, threads: int = 1, out: Array | None = None
 ) -> tuple[Array, NDArray[np.int8]]:
-    """Return final omegas (rad/s), (n, 3), and statuses."""
+    """Return final omegas (rad/s), (n, 3), and statuses, from n initial omegas."""
     starts, times = rows_of("omega", omega, 3), rows_of("t_end", t_end)
     n = len(starts)
     check_rows("t_end", times, n)
@@ -64,7 +64,7 @@ def many_starts(
 
 
 def times_within(scene: Scene, times: Array) -> Array:
-    """Return times (s), NaN beyond a zero of a changing moment, which kernels refuse."""
+    """Return times (s), NaN beyond a zero of a changing moment; kernels refuse NaN."""
     if scene.changing is None:
         return times
     first, last = scene.changing.span
@@ -75,7 +75,7 @@ def many_states(
     solver: "Solver[Any]", omega: Any, t_end: Any, attitude: Any = None, *, threads: int = 1,
     out: "Ensemble | Array | None" = None,
 ) -> tuple[Array, Array, NDArray[np.int8]]:  # fmt: skip
-    """Return omegas, (n, 3), attitudes, (n, 4), and statuses."""
+    """Return final omegas (rad/s), (n, 3), attitudes, (n, 4), and statuses."""
     usual = solver.scene.attitude or IDENTITY
     given = usual if attitude is None else scalar_first(attitude)
     starts, times = rows_of("omega", omega, 3), rows_of("t_end", t_end)
@@ -102,10 +102,10 @@ def solve_each(
     solver: "Solver[Any]", starts: Array, times: Array, turns: Array | None, found: Ensemble,
     piece: slice, given_up: NDArray[np.int32],
 ) -> None:  # fmt: skip
-    """Solve the bodies in `piece` side by side or by single calls.
+    """Solve the bodies in `piece`, and write their results to `found`.
 
-    Single calls solve bodies whose error can't be measured side by side, or all if the inertia
-    matrix is full, or the torque neither recorded nor about the axes of space.
+    Bodies with recorded equations and a diagonal inertia matrix are solved side by side. Single
+    calls solve the rest, and bodies whose error can't be measured side by side.
     """
     left = list(range(piece.start, piece.stop))
     if solver.packed[Places.METHOD] == Methods.TAPE and solver.scene.inertia is None:
@@ -121,7 +121,7 @@ def solve_row(
     solver: "Solver[Any]", i: int, starts: Array, times: Array, turns: Array | None,
     found: Ensemble,
 ) -> None:  # fmt: skip
-    """Solve body `i` by a single call; a body with invalid numbers is REFUSED."""
+    """Solve body `i` by a single call; the status of invalid numbers is REFUSED."""
     start, time = row_of(starts, i), float(row_of(times, i))
     try:
         if turns is None or found.attitude is None:
@@ -143,10 +143,10 @@ def solve_lanes(
     packed: Array, parameters: Array, starts: Array, times: Array, turns: Array | None,
     found: Ensemble, piece: slice, given_up: NDArray[np.int32],
 ) -> list[int]:  # fmt: skip
-    """Solve bodies side by side into `found`, and return the indices of unsolved ones.
+    """Solve bodies side by side into `found`; return the indices of unsolved bodies.
 
-    `packed` has their recorded equations with `parameters`, (n, k) or (1, k). `turns` are the
-    initial quaternions, if any.
+    `packed` has the recorded equations, `parameters`, (n, k) or (1, k), their parameters. `turns`
+    are the initial quaternions, if any.
     """
     n = piece.stop - piece.start
     sets = parameters if len(parameters) < 2 else parameters[piece]

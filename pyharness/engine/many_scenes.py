@@ -49,7 +49,7 @@ _SHAPES: dict[str, tuple[int, ...]] = {
 
 
 def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Array, Array | None]:
-    """Return the arrays of bodies with inertia matrices about principal axes, and these axes.
+    """Return arrays of `solve_many` about principal axes, and the axes, for inertia matrices.
 
     The arrays have coefficients A, B, C, more accurate than rounded moments; NaN for a matrix that
     is not symmetric and positive definite. The axes are columns of matrices, (n, 3, 3), and, with
@@ -143,9 +143,9 @@ def keep_with(scene: Scene, key: tuple[Any, ...], make: Callable[[], Any]) -> An
 
 
 def rows_of_scene(scene: Scene) -> dict[str, Any]:
-    """Return the read-only arrays of a scene, and its torque with `merged` waves.
+    """Return the read-only arrays of a scene, and its torque with waves `merged` by frequency.
 
-    Both are cached: conversion takes longer than solving few bodies.
+    Both are cached, because conversion takes longer than solving few bodies.
     """
 
     def convert() -> dict[str, Any]:
@@ -157,7 +157,7 @@ def rows_of_scene(scene: Scene) -> dict[str, Any]:
 
 
 def checked_rows(given: Mapping[str, Any]) -> dict[str, Array]:
-    """Return float arrays, one row per body or for all, of checked shapes."""
+    """Return float arrays of checked shapes, with one row per body or one for all."""
     rows = {}
     for name in (*_SHAPES, *(each for each in given if each.startswith(PARAMETER))):
         values = given.get(name)
@@ -204,7 +204,7 @@ def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
 
 
 def checked_copies(arrays: dict[str, Any], *, as_given: bool = False) -> dict[str, Array]:
-    """Return copies of the arrays, one row per body or for all.
+    """Return copies of the arrays, with one row per body or one for all.
 
     Quaternions are normalised unless `as_given`.
     """
@@ -217,7 +217,7 @@ def checked_copies(arrays: dict[str, Any], *, as_given: bool = False) -> dict[st
 
 
 def scene_of_row(scene: Scene, rows: Mapping[str, Array], i: int) -> Scene:
-    """Return `scene` with the values of row `i`."""
+    """Return `scene` with the values of body `i` in `rows`."""
     own = {name: row_of(each, i) for name, each in rows.items()}
     values = {name: own.pop(name) for name in rows if name.startswith(PARAMETER)}
     torque: dict[str, Any] = {
@@ -245,10 +245,10 @@ def solve_bodies(
     method: str = "auto", is_rounded: bool = False, threads: int, out: "Ensemble | Array | None",
     with_estimates: bool = False,
 ) -> tuple[Ensemble, Array, Array]:  # fmt: skip
-    """Return the final states, initial omegas and times, by one kernel call.
+    """Return final states, initial omegas and times of bodies, by one kernel call.
 
-    Arrays in `own` replace those of a scene in `ready`. `settings` are the method's code,
-    tolerance, step and effort.
+    Arrays in `own` replace a scene's arrays `ready`. `settings` are the method's code, tolerance,
+    step (s) and effort.
     """
     code, tolerance, step, effort = settings
     given = checked_rows(own)

@@ -1,7 +1,7 @@
 """Derivatives of a solution with respect to parameters (sensitivities), by Taylor series.
 
-If the torque jumps at a switch, which a parameter may move, or the scene has own unknowns
-(`Scene.states`), central differences are extrapolated (Ridders 1982).
+If a parameter may move a jump of the torque, or the scene has own unknowns (`Scene.states`),
+central differences are extrapolated (Ridders 1982).
 """
 
 import itertools
@@ -60,7 +60,7 @@ States = Callable[[Scene], Array]
 def checked_names(
     scene: Scene, names: Iterable[str], method: str, attitude: bool
 ) -> tuple[str, ...]:
-    """Return distinct parameter names, all known and allowed."""
+    """Return the distinct parameter names, all known and allowed."""
     place = "sensitivities"
     if method not in _METHODS:
         raise InputError(f"{place}: the method is {method}; allowed: {', '.join(_METHODS)}")
@@ -98,7 +98,7 @@ def checked_names(
 def sensitivities_at(
     scene: Scene, found: Trajectory, names: Sequence[str], effort: float, states: States
 ) -> dict[str, Array]:
-    """Return, by parameter name, derivatives of k unknowns at n times, (n, k, m) for m values.
+    """Return the derivatives of k unknowns at n times by m values, (n, k, m), for each parameter.
 
     `states` returns the unknowns of a changed scene. The tolerance is relative to the largest
     derivative by the same value so far.
@@ -138,7 +138,7 @@ def _by_series(
     scene: Scene, names: Sequence[str], attitude: bool, times: Array, tolerance: float,
     effort: float,
 ) -> tuple[dict[str, slice], Array, Array]:  # fmt: skip
-    """Return columns by parameter, the derivatives, (n, 3 or 7, m), and those at time 0."""
+    """Return columns by parameter, derivatives, (n, 3 or 7, m), and derivatives at time 0."""
     equations = varied_equations(scene, names, attitude)
     state, starts = initial_state(scene, equations)
     packed = kernel_tape(equations.tape, len(state))
@@ -244,7 +244,7 @@ def _extrapolate(name: str, moved: Callable[[float], Scene], size: float, states
 
 
 def _moves(scene: Scene, name: str) -> Iterator[tuple[Callable[[float], Scene], float]]:
-    """Yield, by parameter value, a function that changes it by h, and its scale."""
+    """Yield, for each value, a function that returns the scene with it changed, and its size."""
     if name == ATTITUDE:
         for axis in np.eye(3):
             yield lambda h, axis=axis: _turned(scene, h * axis), 1.0  # type: ignore[misc]

@@ -36,9 +36,9 @@ _Body = tuple[Triple | None, Triple | None, Matrix | None, Changing | None]
 class VariedEquations(NamedTuple):
     """The equations of motion of a scene, and their parameter derivatives.
 
-    The outputs of `tape` are the derivatives of the n rates, then the rates. `forcings`, (n, m),
-    has the output numbers, from 1, of d(rate i)/d(value j), or 0 where it is 0. `columns` has the
-    columns j of each parameter.
+    `tape` gives the derivatives of the n rates, then the rates. `forcings`, (n, m), has the number
+    of the output, from 1, that is d(rate i)/d(value j), or 0 for a zero derivative. `columns` has
+    the columns j of each parameter.
     """
 
     tape: Tape
@@ -47,7 +47,7 @@ class VariedEquations(NamedTuple):
 
 
 def parameters_of(scene: Scene) -> dict[str, list[float] | None]:
-    """Return parameters by name, without the initial state; None if summands share one."""
+    """Return values of body and torque parameters by name; None if summands share the name."""
     found: dict[str, list[float] | None] = {}
     if scene.moments is not None:
         found["moments"] = list(scene.moments)
@@ -116,10 +116,10 @@ def tape_of_bodies(
     torque: StateTorque | TorqueLaw, body: tuple[Triple, Triple] | None, names: tuple[str, ...],
     attitude: bool,
 ) -> Tape:  # fmt: skip
-    """Return one tape of bodies that differ in parameters.
+    """Return the recorded equations of bodies that differ in parameters.
 
-    Further inputs are A, B, C and the reciprocal moments, unless in `body`, and the torque's
-    parameters `names`.
+    Inputs after the state are A, B, C and the reciprocal moments, unless `body` has them, and the
+    torque's parameters `names`.
     """
     n_body = 0 if body else 6
     recorder = Recorder(n_inputs=N_INPUTS + n_body + len(names))
@@ -140,7 +140,7 @@ def tape_of_bodies(
 
 
 def initial_state(scene: Scene, equations: VariedEquations) -> tuple[Array, Array]:
-    """Return the initial state, (n,), and its derivatives by m values, (n, m)."""
+    """Return the initial state, (n,), and its derivatives with respect to m values, (n, m)."""
     n, m = equations.forcings.shape
     start = scene.attitude or IDENTITY
     state = np.array([*scene.omega, *start])[:n]
@@ -215,7 +215,7 @@ def _torque(
     part: TorqueLaw | StateTorque, time: Any, omega: Any, q: Any, given: Mapping[str, list[Any]],
     own: Sequence[Any] = (),
 ) -> Any:  # fmt: skip
-    """Return a summand of the torque with the symbols `given` as parameters."""
+    """Return a summand of the torque, with symbols `given` for parameters."""
     if isinstance(part, TorqueLaw):
         law: Any = SimpleNamespace(in_space=part.frame == "space")
         for name in ("constant", "rate"):

@@ -21,7 +21,7 @@ _MARGIN = 1e-6
 
 
 def are_of_omega(functions: Sequence[EventFunction]) -> bool:
-    """Return whether all functions can be recorded, and depend only on omega and its rate."""
+    """Return whether all functions can be recorded, and depend only on omega and its derivative."""
     return all(map(_is_of_omega, functions))
 
 
@@ -39,7 +39,7 @@ def _is_of_omega(g: EventFunction) -> bool:
 def repeated(times: Array, period: float, end: float, where: str) -> tuple[Array, int]:
     """Return the times (s) of events until `end`, and how many precede the repeated period.
 
-    `times` (s) are events of the first three periods.
+    `times` (s) are the events of the first three periods.
     """
     # An event at the end of a period may be found on either side of it.
     margin = _MARGIN * period

@@ -65,7 +65,7 @@ def _exact_remainders(moments: "Exact", found: Triple) -> Triple:
 
 
 def estimate_or_none(estimate: float) -> float | None:
-    """Return a kernel's estimate; None if negative."""
+    """Return a kernel's estimate; None if negative (unknown)."""
     return float(estimate) if estimate >= 0.0 else None
 
 

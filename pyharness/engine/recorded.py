@@ -1,4 +1,4 @@
-"""Conversion of scenes and tapes (recorded equations of motion) to arrays for kernels."""
+"""Conversion of scenes and recorded equations of motion (tapes) to arrays for kernels."""
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -46,13 +46,13 @@ LONGEST_TRIAL = 1e3
 
 
 def inputs_of(times: Array, state: Array) -> list[Array]:
-    """Return a tape's eight inputs, (n,), from states (n, 7), or (n, 3) without attitude."""
+    """Return eight inputs of a tape, each (n,), from states (n, 7), or (n, 3) without attitude."""
     columns = [times, *state.T]
     return columns + [np.zeros(len(times))] * (N_INPUTS - len(columns))
 
 
 def outputs_at(tape: Tape, times: Array, state: Array) -> Array:
-    """Return a tape's m outputs at n states, shape (n, m); not finite where singular."""
+    """Return a tape's m outputs at n states, (n, m); not finite where singular."""
     with np.errstate(all="ignore"):
         found: Sequence[Any] = evaluate(tape, inputs_of(times, state), ARRAYS)
     # A constant output is a number, without a shape.
@@ -135,9 +135,9 @@ def slopes_of(scene: Scene) -> Callable[[float, Sequence[float]], list[float]]:
 class Listing(NamedTuple):
     """A tape as lists, with slots and combinations numbered from 1.
 
-    A slot is an input or a result. An operation is a kind of `Operations`, two operands and a
-    result; a combination is a constant and pairs of slot and coefficient. The last `n_unknowns`
-    combinations are the unknowns' derivatives.
+    A slot is an input or a result. An operation has a kind of `Operations`, two operands and a
+    result. A combination is a constant and pairs of slot and coefficient; the last `n_unknowns` are
+    the unknowns' derivatives.
     """
 
     n_unknowns: int
@@ -153,7 +153,7 @@ _LEAVES = 7
 
 @lru_cache(maxsize=64)
 def listing(tape: Tape, n_unknowns: int | None = None) -> Listing:
-    """Return a tape as lists; the last `n_unknowns` outputs (default: all) are derivatives.
+    """Return a tape as lists; its last `n_unknowns` outputs (default: all) are derivatives.
 
     Sine and cosine of an angle become one operation.
     """
@@ -234,7 +234,7 @@ def kernel_tape(tape: Tape, n_unknowns: int | None = None) -> Array:
 
 
 def number_of_leaves(packed: Array) -> int:
-    """Return the address or number of a packed tape's compiled code (leaves)."""
+    """Return the address or number of the compiled code of a packed tape."""
     at = Places.WAVES + _LEAVES
     return int(packed[at : at + 1].view(np.int64)[0])
 
@@ -256,7 +256,8 @@ def packed_scene(
 ) -> Array:
     """Return a scene and its method's settings as one array, in the order of `Places`.
 
-    `leaves` is the address of a tape's compiled code; 0 if built with the package, or none.
+    `leaves` is the address of compiled code for the torque; 0 if built with the package, or
+    missing.
     """
     if code == Methods.TAPE:
         tape = system_of(with_constant_body(scene))

@@ -87,7 +87,7 @@ def _no_rows(*given: object) -> Trajectory:
 
 
 def _from(room: str, name: str, *arguments: str | int) -> Integrator:
-    """Return a solver that imports `name` when called, and passes `arguments` first."""
+    """Return a function that imports solver `name` at a call, and passes `arguments` first."""
 
     def solve(*given: Any) -> Trajectory:
         solver = getattr(importlib.import_module(f"pyharness.engine.{room}"), name)
@@ -207,13 +207,13 @@ PREPARED_WITH_ATTITUDE = tuple(
 
 
 def requested_tolerance(method: str, tolerance: Number | None) -> float:
-    """Return the tolerance, not checked, or the default if None; InputError if no number."""
+    """Return the tolerance, its range unchecked, or the default of the method for None."""
     chosen = REGISTRY[method]
     return chosen.default if tolerance is None else tolerance_of(tolerance, chosen.finest)
 
 
 def computes_attitude(scene: Scene, method: str, requested: bool | None) -> bool:
-    """Return `requested`; if None, whether the scene has or needs an attitude, if computable."""
+    """Return `requested`; for None, whether the attitude is given or needed, and computable."""
     if requested is None:
         able = REGISTRY[method].attitude
         if method == "closed-form":

@@ -165,7 +165,7 @@ def _picture(title: str, trajectory: Trajectory, numbers: Table) -> Picture:
 
 
 def _dense(trajectory: Trajectory) -> Trajectory:
-    """Return the trajectory with rows of any dense output."""
+    """Return the trajectory at the times of its dense output, if any."""
     sol = trajectory.sol
     if sol is None or sol.t_min == sol.t_max:
         return trajectory
@@ -176,7 +176,7 @@ def _dense(trajectory: Trajectory) -> Trajectory:
 
 
 def mark_end(axes: "Axes", trajectory: Trajectory, row: int) -> None:
-    """Draw a cross at a component's end, or at the diagram's edge if beyond."""
+    """Draw a cross where a component ends, or at the edge if the end is outside."""
     bottom, top = axes.get_ylim()
     axes.plot(trajectory.time[-1:], np.clip(trajectory.omega[-1:, row], bottom, top), **_END)
     axes.set_ylim(bottom, top)

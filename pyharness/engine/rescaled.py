@@ -100,7 +100,7 @@ def integrate(
 def rescaling_factor(scene: Scene, time: float) -> float:
     """Return the power of 2 that brings omega near 1 rad/s; 1 if unnecessary or impossible.
 
-    This omega is the larger of the initial one and a bound (an estimate, if the torque depends on
+    This omega is the larger of the initial omega and a bound (an estimate, if the torque depends on
     the state) of the omega that the torque causes until `time` (s).
     """
     if is_ordinary(scene.omega):
@@ -133,7 +133,7 @@ def rescaling_factor(scene: Scene, time: float) -> float:
 
 
 def _underflowing(law: TorqueLaw, factor: float) -> TorqueLaw:
-    """Return a law's terms that rescaling rounds."""
+    """Return the terms of a law that rescaling rounds."""
     back = _scaled_law(_scaled_law(law, factor), 1.0 / factor)
 
     def rounded(given: Triple, found: Triple) -> Triple:

@@ -18,8 +18,8 @@ from pyharness.model.trajectory import Array
 def rotated(scene: Scene, turn: Callable[[Triple], Triple], body: bool) -> Scene:
     """Return the scene with `turn` applied to omega, torque vectors and, if `body`, moments.
 
-    Attitudes, and torques about the axes of space, are kept. If the torque depends on the state,
-    `turn` must be a rotation.
+    Attitudes, and torques about the axes of space, are unchanged. If the torque depends on the
+    state, `turn` must be a rotation.
     """
 
     def waves(each: tuple[Wave, ...]) -> tuple[Wave, ...]:

@@ -1,8 +1,8 @@
 """The methods of `scipy.integrate.solve_ivp`.
 
-SciPy controls a step's local error, but our tolerance limits the error at the requested times,
-which grows with the phase. The local tolerance follows from |omega|, error amplification and phase
-of a preliminary integration with few digits.
+SciPy controls the local error of a step. Our tolerance limits the error at the requested times,
+which grows with the phase. A preliminary integration with few digits estimates |omega|, error
+amplification and phase, which determine the local tolerance.
 """
 
 import math
@@ -164,7 +164,7 @@ def state_of(scene: Scene) -> tuple[float, ...]:
 
 
 def with_attitude(slopes: RightHandSide) -> RightHandSide:
-    """Return a right-hand side of omega extended by that of the quaternion."""
+    """Return the right-hand side of omega and the quaternion."""
 
     def both(time: float, state: Sequence[float]) -> list[float]:
         x, y, z, *q = state
@@ -190,7 +190,7 @@ class _Run(Run):
 
     @np.errstate(over="ignore", invalid="ignore")
     def ahead(self) -> _Ahead:
-        """Return what determines the local tolerance, by an integration with few digits."""
+        """Return estimates that determine the local tolerance, by a rough integration."""
         # The absolute tolerance is relative to an estimate of the largest |omega|. For a body at
         # rest, the first estimate may be far too large.
         scale = max(map(abs, self.scene.omega)) or self._scale_by_torque()

@@ -50,14 +50,14 @@ _FINEST = 1e-13  # tolerance of the steps that end at switches
 
 
 class NoNumberError(Exception):
-    """An integration can't continue, as after a NaN in Radau."""
+    """An integration can't continue, for example after a NaN in Radau."""
 
 
 class Run:
-    """The integrations of one problem from 0 to `end` (s) by `solve_ivp`, with one work limit.
+    """The integrations of one problem from 0 to `end` (s) by `solve_ivp`.
 
-    The limit is `most` right-hand sides. The state begins with omega (rad/s). The phase (rad) is
-    `rate`, the largest Euler coefficient, times omega and time.
+    Together they may use `most` right-hand sides. The state begins with omega (rad/s). The phase
+    (rad) is `rate`, the largest Euler coefficient, times omega and time.
     """
 
     def __init__(
@@ -78,7 +78,7 @@ class Run:
         self.unit = 1.0 if abs(end) >= _SHORTEST_SPAN else math.ldexp(1.0, math.frexp(end)[1])
 
     def after_step(self, time: float, state: Sequence[float]) -> None:
-        """Do nothing, unless overridden, at time 0, after each step, and within the last."""
+        """Do nothing; subclasses may act at time 0, after each step, and within the last."""
 
     def solved(
         self,
@@ -167,7 +167,7 @@ class Run:
 def rows_of(
     times: Sequence[float], rows: Array, evaluations: int, steps: int, ended: str
 ) -> Trajectory:
-    """Return a trajectory from rows of omega, or omega and a quaternion, which is normalised."""
+    """Return a trajectory from n states, (n, 3) or (n, 7); quaternions are normalised."""
     attitude = None
     if rows.shape[1] > 3:
         attitude = rows[:, 3:] / np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)
@@ -189,7 +189,7 @@ class Beside(NamedTuple):
 
 
 def bounds_of(scene: Scene, end: float) -> list[float]:
-    """Return `end`, and times (s) until `end` at which a table or switch of the torque changes."""
+    """Return `end` and earlier times (s) at which a table or switch of the torque changes."""
     torque = scene.torque
     assert isinstance(torque, StateTorque)
     breaks = [] if torque.tape is None else torque.tape.breaks

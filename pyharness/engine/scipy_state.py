@@ -1,7 +1,7 @@
 """SciPy's methods for torques that depend on the state, recorded or opaque.
 
-The error amplification is unknown; the local tolerance is reduced until two integrations show that
-the second meets the tolerance.
+Because the error amplification is unknown, the local tolerance is reduced until two integrations
+show that the second meets the tolerance.
 """
 
 from collections.abc import Sequence

@@ -38,7 +38,7 @@ _WORK, _OPERATION_WORK, _OPAQUE_WORK = 16.0, 0.7, 16.0
 
 
 class StateRows(NamedTuple):
-    """The rows of an integration."""
+    """The results of an integration."""
 
     state: Array  # shape (n, 3) or (n, 7): omega, and the attitude as a unit quaternion
     is_complete: bool  # whether there is a row for each time
@@ -191,7 +191,7 @@ class StateRun(Run):
         return omega if 0.0 < omega < math.inf else 1.0
 
     def rows(self, times: Sequence[float], local: float, scale: float) -> StateRows:
-        """Return the states at `times` (s); `local` is relative to `scale` (rad/s)."""
+        """Return states at `times` (s); the tolerance `local` is relative to `scale` (rad/s)."""
         self._integrations += 1
         sizes = [local * scale] * 3 + [local] * (len(self.start) - 3)
         longest = abs(self.end) / (_FEWEST_STEPS + _MORE_STEPS * self._integrations)

@@ -1,4 +1,4 @@
-"""Sensitivity of a motion to rounding errors."""
+"""Sensitivity of a solution to rounding errors."""
 
 import math
 from contextlib import suppress
@@ -35,7 +35,7 @@ _LITTLE_WORK = 5e-3
 def is_sensitive(growth: float | None, tolerance: float, noise: float = 0.0) -> bool:
     """Return whether amplified rounding errors exceed 0.3 times the tolerance.
 
-    `growth` is the error amplification, `noise` `torque_noise`'s result.
+    `growth` is the error amplification, and `noise` the result of `torque_noise`.
     """
     return growth is not None and ROUNDING * growth * (1.0 + noise) > _SHARE * tolerance
 
@@ -43,11 +43,11 @@ def is_sensitive(growth: float | None, tolerance: float, noise: float = 0.0) -> 
 def torque_noise(
     scene: Scene, omega0: Triple, t_end: float, steps: float = math.inf, scale: float | None = None
 ) -> float:
-    """Return the rounding error of torque terms that nearly cancel, in units of omega's.
+    """Return the rounding error of nearly cancelling torque terms, relative to omega's.
 
     It is the |omega| that the terms cause one by one until `t_end` (s), rounded in each of `steps`
-    steps, over `scale` (rad/s). This is by default the larger of the initial |omega| and the omega
-    that the whole torque causes. The result is 0 if no terms nearly cancel.
+    steps, divided by `scale` (rad/s). The default scale is the larger of the initial |omega| and
+    the omega that the whole torque causes. The result is 0 if no terms nearly cancel.
     """
     if isinstance(scene.torque, StateTorque) or not (scene.law.sines or scene.law.cosines):
         return 0.0

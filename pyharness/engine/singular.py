@@ -18,10 +18,10 @@ _UNBOUNDED = 1e6
 
 
 class SingularError(TimedError):
-    """No step is possible beyond a time."""
+    """A singularity, beyond which no step is possible."""
 
     def __init__(self, what: str | None, time: float) -> None:
-        """Store a text about the undefined operation, None if omega or torque is infinite."""
+        """Store `what`, a text on the undefined operation; None if omega or torque is infinite."""
         where = "at t = {time} s"
         message = f"omega or its torque becomes infinite {where}; allowed: an earlier time"
         super().__init__(f"the torque is not defined {where}: {what}" if what else message, time)
@@ -35,10 +35,10 @@ class SingularError(TimedError):
 def undefined_operation(
     tape: Tape, begin: Sequence[float], before: Sequence[float], end: Sequence[float]
 ) -> str | None:
-    """Return a text about the operation undefined at the end of an integration, and a remedy.
+    """Return a text on the operation undefined at the end of an integration, and a remedy.
 
-    `begin`, `before` and `end` are the tape's inputs at the beginnings of integration and last
-    step, and at the end. Return None if omega or a quotient becomes infinite.
+    `begin`, `before` and `end` are the tape's inputs at the beginning of the integration and of its
+    last step, and at the end. Return None if omega or a quotient becomes infinite.
     """
     first, last = (max(abs(inputs[slot]) for slot in OMEGA) for inputs in (begin, end))
     if last > _UNBOUNDED * (first or 1.0):

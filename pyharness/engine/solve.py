@@ -90,13 +90,13 @@ def solve(
         Factor on the work limit; 1 means some ten seconds.
     attitude : bool, optional
         Whether to compute the attitude, from the scene's initial attitude, else from (1, 0, 0, 0).
-        By default it is computed if the scene has an attitude and the method can, or the torque
-        needs one.
+        By default it is computed if the torque needs it, or the scene has one and the method can
+        compute it.
     dense_output : bool
         Whether to return `sol`, the solution as a function of time between 0 and `times`, to within
         the tolerance. Closed forms, Taylor series, and `dop853` and `lsoda` under an opaque torque
-        need no further integrations for it; others do. Methods with a fixed step return a cubic
-        polynomial on each step.
+        need no further integrations for it; other methods do. Methods with a fixed step return a
+        cubic polynomial on each step.
     events : callable, Event, or list of these
         Functions of (t, omega) or (t, omega, attitude), or events of `pyharness.events`. Their
         roots between 0 and `times` become `t_events`, and the states there `y_events`. A function
@@ -107,9 +107,9 @@ def solve(
         `omega` (at time 0), `attitude` (small initial rotations about the body axes, rad),
         `moments`, `coefficients`, `inertia` (columns I11, I22, I33, I12, I13, I23) or
         `torque.NAME`. NAME is a constant of a scene file's expressions, or a function's keyword
-        argument with a number as default; for a TorqueLaw, `constant`, `rate`, `sines` or
-        `cosines` (four columns per wave: three amplitudes, frequency). The method must be `auto`,
-        `taylor` or `closed-form`.
+        argument with a number as default; for a TorqueLaw, `constant`, `rate`, `sines` or `cosines`
+        (four columns per wave: three amplitudes, frequency). The method must be `auto`, `taylor` or
+        `closed-form`.
 
     Returns
     -------
@@ -194,7 +194,7 @@ def solve(
 
 
 class _Call(NamedTuple):
-    """The checked arguments of `solve`; `scene` is what is integrated; `axes` are principal."""
+    """The checked arguments of `solve`; `scene` is integrated, about principal `axes` if any."""
 
     given: Scene
     scene: Scene
@@ -258,7 +258,7 @@ class _Call(NamedTuple):
 
 
 def _to_terminal_events(call: _Call, values: list[float]) -> Trajectory:
-    """Return the trajectory, computed little beyond a terminal event."""
+    """Return the trajectory, computed only little beyond a terminal event."""
     spent, low, high = 0, values[0], values[-1]
     for end in _trial_ends(call, max(-low, high)):
         some = [t for t in values if -end < t < end]
@@ -311,7 +311,7 @@ def _states_of_changed(times: Array, effort: float, attitude: bool, scene: Scene
 def finest(method: str, scene: Scene, time: float) -> float:
     """Return the smallest tolerance that a method can meet from 0 to `time` (s).
 
-    For SciPy's methods (local errors of at least 2e-14) it grows with phase and error
+    For SciPy's methods, with local errors of at least 2e-14, it grows with phase and error
     amplification.
     """
     claimed = METHODS[method].finest

@@ -74,9 +74,8 @@ class Solver(BoundKernel[Result]):
     of floats and a unit quaternion. If the kernel could not finish, or an argument is not finite,
     the result is NaN and `status` has the reason.
 
-    Threads may share a solver. The kernel releases the interpreter's lock (GIL), unless the release
-    takes longer than the solution. Solvers can be copied and pickled, without the last call's
-    status.
+    Threads may share a solver. All but the shortest calls release the GIL. Solvers can be copied
+    and pickled, without the last call's status.
 
     Attributes
     ----------
@@ -118,7 +117,7 @@ class Solver(BoundKernel[Result]):
         cls, scene: Scene, chosen: Plan, tolerance: float, asked: str, effort: float,
         with_attitude: bool, compiled: bool = False,
     ) -> Self:  # fmt: skip
-        """Create a solver, for `prepare`."""
+        """Create a solver; users call `prepare`."""
         entry = extension()
         kernel = entry.solve_packed_attitude if with_attitude else entry.solve_packed
         code = _code(chosen, with_attitude)
@@ -236,7 +235,7 @@ class Solver(BoundKernel[Result]):
 
     @property
     def steps(self) -> int:
-        """Return the number of steps, for Gauss collocation right-hand sides, of the last call."""
+        """Return the last call's number of steps; for Gauss collocation, of right-hand sides."""
         return 0 if self._ending is None else abs(self._ending[1])
 
     def _judge(self) -> tuple[str, float | None, float | None]:
@@ -297,16 +296,16 @@ def prepare(
         A name in `pyharness.engine.solver.PREPARED`; `auto` selects the fastest.
     tolerance : float
         Largest allowed error of a component of omega, relative to the largest |omega| from time 0
-        to the end; the default is as in `solve`. It does not affect methods with a fixed step and
-        Gauss collocation. If the motion amplifies perturbations by a factor K, no method has a
-        relative error below some 1e-15 K.
+        to the end; the default is as in `solve`. Methods with a fixed step and Gauss collocation
+        ignore it. If the motion amplifies perturbations by a factor K, no method has a relative
+        error below some 1e-15 K.
     effort : float
         Factor on the work limit of a call (about ten seconds); beyond it the status is `gave up`.
     attitude : bool
         Whether calls return the attitude too, as in `solve`.
     compiled : bool
-        Whether a C compiler translates a recorded torque, mostly within a second, unless the user's
-        cache has the result; without a compiler it is interpreted (see `Solver.leaves`).
+        Whether a C compiler translates a recorded torque, mostly within a second; the result is
+        cached. Without a compiler the torque is interpreted (see `Solver.leaves`).
 
     Returns
     -------

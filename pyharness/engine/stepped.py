@@ -20,7 +20,7 @@ def steps_to(
 ) -> Iterator[tuple[float, Stepper]]:
     """Yield the beginning (s) of each step from 0 to `end` (s), and the stepper after it.
 
-    They end at a singularity, or after `most`.
+    The steps end at a singularity, or after `most` steps.
     """
     stepper = Stepper(with_constant_body(scene), max(tolerance, FINEST), attitude=attitude)
     with suppress(SingularError):
@@ -33,7 +33,7 @@ def steps_to(
 def step_lengths(
     scene: Scene, attitude: bool, end: float, tolerance: float, bounds: Sequence[float]
 ) -> dict[float, float]:
-    """Return the length (s) of each step by its end, except at `bounds`."""
+    """Return each step's length (s) by its end (s), except of steps that end at `bounds`."""
     cuts = frozenset(bounds)
     return {
         stepper.time: abs(stepper.time - before)

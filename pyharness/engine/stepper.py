@@ -173,7 +173,7 @@ class Stepper:
 
     @property
     def states(self) -> Mapping[str, float]:
-        """The scene's own states by name; assign a dict of those to change."""
+        """The scene's own states by name; assign a dict of some or all to change them."""
         names = (each.name for each in self._scene.states)
         own = self._state[self._n : -3].tolist()
         return MappingProxyType(dict(zip(names, own, strict=True)))
@@ -315,7 +315,7 @@ class Stepper:
 
 
 def _equations(scene: Scene, torque: Tape, attitude: bool) -> Tape:
-    """Return the rates of omega, attitude if computed, own states and held torque as a tape."""
+    """Return the recorded rates of omega, attitude if computed, own states and held torque."""
     n = 7 if attitude else 3
     recorder = Recorder(2 * MOST_OPERATIONS, n + len(scene.states) + 4)
     time, *unknowns = recorder.inputs()

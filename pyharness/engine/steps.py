@@ -21,7 +21,7 @@ MOST_STEPS = 20_000  # that `sol` has; it limits the memory
 
 
 def rates(scene: Scene, times: Array, state: Array) -> Array:
-    """Return time derivatives of n states, shape (n, m); not finite at a singular torque."""
+    """Return the time derivatives of n states, (n, m); not finite where the torque is singular."""
     turn = axes_and_turn(scene) if uses_principal_axes(scene) else None
     bare = with_constant_body(integrated(scene))
     torque = bare.torque
@@ -51,7 +51,7 @@ def rates(scene: Scene, times: Array, state: Array) -> Array:
 
 
 def steps_output(scene: Scene, pieces: Pieces) -> DenseOutput:
-    """Return the dense output of a scene from polynomials."""
+    """Return a scene's dense output, of which `pieces` are the states."""
     low, high = pieces.edges[[0, -1]].tolist()
     return DenseOutput(low, high, pieces, partial(rates, scene), len(scene.states))
 
@@ -70,7 +70,7 @@ def up_to(pieces: Pieces, last: float) -> Pieces:
 def transformed_steps(
     sol: DenseOutput | None, states: Callable[[Array], Array], factor: float = 1.0
 ) -> DenseOutput | None:
-    """Return `sol` with times multiplied by `factor`, and rows transformed by `states`."""
+    """Return `sol` with times multiplied by `factor`, and states changed by `states`."""
     if sol is None or not isinstance(sol.states, Pieces):
         return None
     edges, values = sol.states.edges * factor, sol.states.values
@@ -81,7 +81,7 @@ def transformed_steps(
 
 
 def joined_steps(before: DenseOutput | None, after: DenseOutput | None) -> DenseOutput | None:
-    """Return the dense outputs before and after time 0 as one."""
+    """Return the dense outputs before and after time 0 as one; None if either is missing."""
     if before is None or after is None:
         return None
     parts = before.states, after.states

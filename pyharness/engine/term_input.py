@@ -1,4 +1,4 @@
-"""Arguments of torque terms, and terms in scene files; error messages begin with `where`."""
+"""Checked arguments of torque terms, also from scene files; error messages begin with `where`."""
 
 from dataclasses import replace
 from typing import Any
@@ -66,7 +66,7 @@ def inertia_of(where: str, value: object) -> Array:
 
 
 def law_of_vector(where: str, value: object, frame: str) -> TorqueLaw:
-    """Return a vector over time from three numbers or a TorqueLaw with `frame`."""
+    """Return three numbers, or a TorqueLaw with `frame`, as a TorqueLaw."""
     allowed = f'allowed: three numbers, or a TorqueLaw with frame="{frame}"'
     if isinstance(value, TorqueLaw):
         if value.frame != frame:

@@ -91,8 +91,6 @@ def drag(coefficients: Iterable[MatrixLike], per_axis: bool = False) -> StateTor
     >>> from pyharness.torques import drag
     >>> drag([0.0, 0.5]).at(0.0, (1.0, 2.0, 2.0), (1.0, 0.0, 0.0, 0.0))
     (-4.5, -9.0, -9.0)
-    >>> drag([0.0, 0.5], per_axis=True).at(0.0, (1.0, 2.0, 2.0), (1.0, 0.0, 0.0, 0.0))
-    (-0.5, -4.0, -4.0)
     """
     where = "[torque] drag coefficients"
     allowed = f"allowed: a list of 1 to {_MOST_COEFFICIENTS} coefficients"

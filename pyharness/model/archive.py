@@ -1,4 +1,4 @@
-"""Archives of trajectories and ensembles, as of `numpy.savez`.
+"""Archives of trajectories and ensembles, in the format of `numpy.savez`.
 
 The array `header` is JSON with the kind of content and the schema number; `sha256` is a digest of
 the other arrays. Files are not trusted: nothing is unpickled, and no array may exceed the file's
@@ -26,7 +26,7 @@ _OTHERS = (".csv", ".json", ".md", ".toml", ".tsv", ".txt", ".xlsx", ".xml")
 
 
 def checked_path(where: str, path: object) -> str:
-    """Return a path as text; a new file without ending gets .npz."""
+    """Return a path as text; a new file without an ending gets .npz."""
     if not isinstance(path, (str, os.PathLike)):
         raise InputError(f"{where}: {kind_of(path)}; allowed: a path, as text or a Path")
     name = os.fsdecode(path)
@@ -35,7 +35,7 @@ def checked_path(where: str, path: object) -> str:
 
 
 def checked_file(where: str, path: object) -> str:
-    """Return `checked_path`; raise InputError for an unwritable path or a text file's ending."""
+    """Return `checked_path`; raise InputError if not writable, or named like a text file."""
     name = checked_path(where, path)
     ending = os.path.splitext(name)[1].lower()
     if ending in _OTHERS:
@@ -48,7 +48,7 @@ def checked_file(where: str, path: object) -> str:
 
 
 def archive_of(arrays: dict[str, Any]) -> bytes:
-    """Return an archive of the arrays, ending with their SHA-256 digest."""
+    """Return an archive of the arrays; its last entry is their SHA-256 digest."""
     buffer, digest = io.BytesIO(), hashlib.sha256()
     with zipfile.ZipFile(buffer, "w") as archive:
         for name in [*(each for each in arrays if each != DIGEST), DIGEST]:
@@ -63,7 +63,7 @@ def archive_of(arrays: dict[str, Any]) -> bytes:
 
 
 def add_entry(digest: Any, name: str, data: bytes | memoryview) -> None:
-    """Update a digest with an entry's name, length and bytes."""
+    """Update the digest with an entry's name, length and bytes."""
     digest.update(f"{name} {len(data)}\n".encode())
     digest.update(data)
 
@@ -73,8 +73,8 @@ def read_archive(
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return the arrays and the header of an archive.
 
-    `kinds` has the kind of file in header and messages, `known` the allowed arrays. `written`
-    describes a valid file.
+    `kinds` are the kind of file in its header and in messages, `known` the allowed arrays;
+    `written` describes a valid file.
     """
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     content = read_input(name, where, memory // 4, written)

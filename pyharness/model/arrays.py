@@ -25,7 +25,7 @@ FROM_ZERO: Rule = (lambda x: x >= 0.0, "a number from 0")
 def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = None) -> Array:
     """Return a user's row, or n rows, of `shape` as a float array, (n, *shape).
 
-    A letter in `shape`, such as "k", stands for any length. `rule` tests each number.
+    A letter in `shape`, such as "k", means any length. `rule` checks each number.
     """
     if type(values) is float and not shape and rule is None:
         return np.array([values])
@@ -70,7 +70,7 @@ def numbers_of(where: str, values: object) -> Array:
 
 
 def count_bodies(rows: Mapping[str, Array]) -> int:
-    """Return the number of bodies, on which the arrays must agree."""
+    """Return the number of bodies; raise InputError if arrays differ in it."""
     counts = {len(each) for each in rows.values()}
     n = 0 if 0 in counts else max(counts, default=1)
     if not counts <= {1, n}:

@@ -1,4 +1,4 @@
-"""Values that we assume where the thesis has none or can be read in two ways."""
+"""Values that we assume where the thesis has none or is ambiguous."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -29,9 +29,9 @@ def open_starts() -> dict[int, str]:
 
 
 def assumed(scene: Scene, listings: Iterable[Listing] = ()) -> list[dict[str, Any]]:
-    """Return the assumptions on which a scene and its runs of `listings` (program versions) depend.
+    """Return the assumptions that a scene and its runs of `listings` (program versions) need.
 
-    Scenes outside the thesis, and values that a user changed, have none.
+    Scenes outside the thesis, and values that a user changed, need no assumption.
     """
     among = list(listings)
     return [each for each in assumptions() if _is_made(each, scene, among)]
@@ -69,7 +69,7 @@ def case_mark(case: int) -> str:
 
 
 def assumption_records(runs: Runs) -> list[dict[str, Any]]:
-    """Return, for JSON, the assumptions on which runs depend, with their cases."""
+    """Return, for JSON, the assumptions of runs, with their cases."""
     found: dict[tuple[str, str], dict[str, Any]] = {}
     for scene, listings in runs:
         for each in assumed(scene, listings):
@@ -82,7 +82,7 @@ def assumption_records(runs: Runs) -> list[dict[str, Any]]:
 
 
 def claim_records() -> list[dict[str, Any]]:
-    """Return, for JSON, the assumptions on which only verdicts on claims depend."""
+    """Return, for JSON, the assumptions that affect only verdicts on claims."""
     return [_record(each, each["what"]) for each in assumptions() if each["on"] == "claim"]
 
 

@@ -1,6 +1,6 @@
 """Attitudes as unit quaternions from body to space, scalar first, with Hamilton's product.
 
-A vector v about body axes is q v q* in space, with the conjugate q*; q' = q (0, omega)/2.
+A vector v about the body axes is q v q* in space, with the conjugate q*; q' = q (0, omega)/2.
 """
 
 import math
@@ -32,13 +32,13 @@ _PARALLEL = 2.0**-51  # sine of half an angle that is a rounding error
 
 
 def scalar_first(values: object) -> Any:
-    """Return a `Rotation`'s quaternions, scalar first; any other value unchanged."""
+    """Return the quaternions of a `Rotation`, scalar first; any other value unchanged."""
     as_quat = getattr(values, "as_quat", None)
     return values if as_quat is None else np.asarray(as_quat())[..., [3, 0, 1, 2]]
 
 
 def unit_quaternion(where: str, values: object) -> tuple[Quaternion, float]:
-    """Return the unit quaternion of four numbers or a `Rotation`, and their norm.
+    """Return the unit quaternion of four numbers or a `Rotation`, and the numbers' norm.
 
     They must be finite and not all 0.
     """
@@ -97,8 +97,8 @@ def quaternion_rates(omega: Iterable[Any], q: Iterable[Any]) -> list[Any]:
 def angles(attitude: Array, sequence: str) -> Array:
     """Return n attitudes, (n, 4), as angles (degrees) of three successive rotations, (n, 3).
 
-    If first and last axes are parallel, only their angles' sum or difference is determined; the
-    last is then 0.
+    If the first and last axes are parallel, only the sum or difference of their angles is
+    determined, and the last is 0.
     """
     q0, q1, q2, q3 = attitude.T
     if sequence == "3-1-3":
@@ -124,7 +124,7 @@ def matrices(attitude: Array) -> Array:
 
 
 def rows_to_body(attitude: Iterable[Any]) -> tuple[tuple[Any, ...], ...]:
-    """Return the rotation matrix from space to body, for numbers, arrays or symbols."""
+    """Return the rows of the matrix from space to body, for numbers, arrays or symbols."""
     w, x, y, z = attitude
     return (
         (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)),
@@ -173,7 +173,7 @@ def rotated(vectors: Array, matrix: Array) -> Array:
 
 
 def turned_back(attitudes: Array, turn: Any) -> Array:
-    """Return a body's attitudes, given those of a frame and the quaternion from frame to body."""
+    """Return body attitudes from attitudes of a frame and the quaternion from frame to body."""
     w, x, y, z = np.moveaxis(np.asarray(turn), -1, 0)
     first, *rest = np.moveaxis(attitudes, -1, 0)
     parts: Any = product((first, rest[0], rest[1], rest[2]), (w, -x, -y, -z))

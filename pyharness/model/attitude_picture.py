@@ -33,7 +33,7 @@ _EDGES = [
 
 
 def draw_sphere(axes: Any, found: "Trajectory") -> None:
-    """Draw paths in space of the body axes (end: dot) and of omega (end: cross)."""
+    """Draw paths of the body axes and omega in space, with a dot or cross at the end."""
     assert found.attitude is not None
     _frame(axes)
     turned = matrices(found.attitude)
@@ -70,7 +70,7 @@ class _Motion(NamedTuple):
 
 
 def check_animation(path: object, moments: Triple | Changing | None) -> str:
-    """Return `path` as text; raise InputError if no brick with `moments` can be shown there."""
+    """Return `path` as text; raise InputError for another format, or if no brick has `moments`."""
     if not isinstance(path, (str, os.PathLike)):
         raise InputError(f"animate: {kind_of(path)}; allowed: a path, as text or a Path")
     name = os.fsdecode(path)
@@ -191,7 +191,6 @@ def _scene_of_brick(figure: "Figure", motion: _Motion, rate: float) -> Any:
 
 
 def _brick(found: "Trajectory") -> Array:
-    """Return the corners of a brick, (8, 3)."""
     moments = np.array(found.moments)
     sides = np.sqrt(np.maximum(0.0, moments.sum() - 2.0 * moments))
     sides = np.maximum(sides, 0.01 * sides.max())

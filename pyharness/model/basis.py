@@ -1,4 +1,4 @@
-"""The bases of the checks' limits."""
+"""The grounds for the limits of checks."""
 
 from dataclasses import dataclass
 
@@ -12,9 +12,9 @@ MARKS = {
 
 @dataclass(frozen=True)
 class Basis:
-    """The basis of a check's limit: proved, derived or measured.
+    """The ground for a check's limit: proof, derivation or measurement.
 
-    `mark`, a key of `MARKS`, classifies its weakest part; `source`, in Markdown, names theorem,
+    `mark`, a key of `MARKS`, classifies its weakest part; `source`, in Markdown, names a theorem,
     derivation or command.
     """
 

@@ -74,7 +74,7 @@ def build() -> Build:
 
 
 def installation() -> dict[str, Any]:
-    """Return data on the installation and the machine for a bug report; None if unknown.
+    """Return data on installation and machine for a bug report; None if unknown.
 
     "arithmetic" names the option or library that changes the kernels' arithmetic.
     """

@@ -76,14 +76,14 @@ class Changing:
     def momentum(
         self, times: NDArray[np.float64], omega: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Return the angular momentum (kg m2/s) about the body axes, (n, 3)."""
+        """Return the angular momentum (kg m2/s) about the body axes at n times (s), (n, 3)."""
         matrix = self.matrix(times)
         rows = [sum(each * omega[:, k] for k, each in enumerate(row)) for row in matrix]
         return np.stack([np.asarray(row) for row in rows], axis=-1)
 
     @cached_property
     def span(self) -> tuple[float, float]:
-        """The ends (s) of the interval around 0 with positive definite inertia; may be infinite."""
+        """The interval (s) around time 0 with a positive definite inertia; it may be infinite."""
         # Imported only here, because the programs need no exact numbers.
         from pyharness.model.exact_zeros import determinant, first_zeros
 
@@ -112,7 +112,7 @@ class ChangingMoments(Changing):
 
     Mass moves relative to the body, as with booms or propellant, but the principal axes are fixed
     in the body. With the moments I and the torque N, I omega' = N - I' omega - omega x (I omega).
-    Mass that moves is assumed to have no angular momentum relative to the body axes, and mass that
+    Moving mass is assumed to have no angular momentum relative to the body axes, and mass that
     leaves, no angular momentum about the centre of mass.
 
     Parameters
@@ -182,7 +182,7 @@ class ChangingMoments(Changing):
 class ChangingInertia(Changing):
     """An inertia matrix about the body axes that is a polynomial of time.
 
-    The principal axes may rotate in the body. The assumptions and equations are those of
+    The principal axes may rotate in the body. Assumptions and equations are as in
     `ChangingMoments`.
 
     Parameters
@@ -269,7 +269,7 @@ def _derivative(polynomial: Polynomial) -> Polynomial:
 
 
 def rates_of_changing(changing: Changing, time: Any, omega: Any, torque: Any) -> list[Any]:
-    """Return the derivative of omega for a changing inertia."""
+    """Return the derivative of omega (rad/s2) for a changing inertia."""
     matrix, rate, (x, y, z) = changing.matrix(time), changing.matrix_rate(time), omega
     if changing.is_diagonal:
         a, b, c = (matrix[k][k] for k in range(3))
@@ -284,7 +284,7 @@ def rates_of_changing(changing: Changing, time: Any, omega: Any, torque: Any) ->
 
 
 def rates_of_inertia(matrix: Any, omega: Any, torque: Any) -> list[Any]:
-    """Return the derivative of omega for a full inertia matrix."""
+    """Return the derivative of omega (rad/s2) for a full inertia matrix."""
     (x, y, z), (u, v, w) = omega, (_dot(row, omega) for row in matrix)
     products = z * v - y * w, x * w - z * u, y * u - x * v
     return _solved(matrix, [torque[k] + products[k] for k in range(3)])
@@ -295,7 +295,7 @@ def _dot(first: Any, second: Any) -> Any:
 
 
 def _solved(matrix: list[list[Any]], right: list[Any]) -> list[Any]:
-    """Return the solution by L D L^T (Golub and Van Loan 2013, Matrix Computations, 4.1)."""
+    """Solve matrix x = right by L D L^T (Golub and Van Loan 2013, Matrix Computations, 4.1)."""
     (a, f, e), (_, b, d), (_, _, c) = matrix
     l21, l31 = f / a, e / a
     second, below = b - l21 * f, d - l31 * f

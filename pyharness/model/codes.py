@@ -5,7 +5,7 @@ fortran/make_codes.py writes each class as a Fortran module.
 
 
 class Statuses:
-    """The codes with which a kernel reports how its run ended."""
+    """The codes by which a kernel reports how its run ended."""
 
     COMPLETE = 0  # all requested rows are present
     STOPPED = 1  # the Lipschitz test ended the run
@@ -67,7 +67,7 @@ class Series:
 
 
 class Waves:
-    """The largest angle for our sine function in binary128."""
+    """The limit of angles for our sine in binary128."""
 
     ANGLE_BITS = 60  # the angle must be below 2**ANGLE_BITS rad; otherwise its sine is NaN
 
@@ -79,7 +79,7 @@ class Blocks:
 
 
 class Storage:
-    """Lengths of the kernels' arrays for Taylor series of slots (variables)."""
+    """The lengths of the kernels' arrays for Taylor series of slots (variables)."""
 
     SERIES_LENGTH = 40  # terms of a slot's series
     LANE_TERMS = 28  # the same, for many bodies at once
@@ -89,7 +89,7 @@ class Storage:
 
 
 class Operations:
-    """The codes of a tape's recorded operations."""
+    """The codes of recorded operations."""
 
     LINEAR = 1  # a constant plus a linear combination of operands
     PRODUCT = 2

@@ -19,8 +19,8 @@ from pyharness.model.values import Matrix
 def integrated(scene: Scene) -> Scene:
     """Return the scene about the axes about which it is integrated.
 
-    They are principal axes; under a torque with switches they are the body axes, because rounding
-    would move a state off the level on which it begins.
+    These are principal axes. Under a torque with switches they are the body axes, because rounding
+    in a rotation might move the initial state off a switch's threshold.
     """
     torque = scene.torque
     if scene.inertia is None or uses_principal_axes(scene):
@@ -46,10 +46,9 @@ def _rates(tape: Tape, own: tuple[str, ...], inertia: Matrix) -> StateTorque:
 
 
 def rates_about_body_axes(inertia: Matrix, omega: Any, torque: Any) -> Any:
-    """Return omega' of a body with a full inertia matrix; vectors are arrays about the body axes.
+    """Return omega' (rad/s2) for a full inertia matrix; vectors are arrays about the body axes.
 
-    The products are those of principal axes; in products of components about the body axes large
-    terms would cancel.
+    Products are formed about principal axes; about the body axes, large terms would cancel.
     """
     about, axes = principal(Scene("", (0.0, 0.0, 0.0), inertia=inertia))
     x, y, z = omega @ axes
@@ -58,10 +57,10 @@ def rates_about_body_axes(inertia: Matrix, omega: Any, torque: Any) -> Any:
 
 
 def with_constant_body(scene: Scene) -> Scene:
-    """Return a scene of the same solution with a constant inertia and a torque about the body axes.
+    """Return a scene of the same solution, with constant inertia and a torque about the body axes.
 
-    For a changing inertia I and torque N, the new coefficients are 0, and the torque is omega' from
-    I omega' = N - I' omega - omega x (I omega).
+    For a changing inertia I and torque N, its coefficients are 0, and its torque is omega' from I
+    omega' = N - I' omega - omega x (I omega).
     """
     changing, torque = scene.changing, scene.torque
     if changing is None:

@@ -37,7 +37,7 @@ def to_coefficients(count: int) -> Array:
 
 
 def nodes(low: Array, high: Array, at: Array) -> Array:
-    """Return the points `at`, from -1 to 1, mapped to each interval, as rows."""
+    """Return the points `at`, from -1 to 1, mapped to n intervals, as n rows."""
     middle, half = 0.5 * low + 0.5 * high, 0.5 * high - 0.5 * low
     found: Array = middle[:, None] + half[:, None] * at
     found[:, 0], found[:, -1] = low, high
@@ -68,19 +68,19 @@ class Pieces:
 
     @cached_property
     def _contiguous(self) -> tuple[Array, Array]:
-        """The edges and the values, (m, NODES, p), that compiled code reads without a copy."""
+        """The edges, and the values as (m, NODES, p), for compiled code."""
         return np.ascontiguousarray(self.edges), np.asfortranarray(self.values.T)
 
     def numbers(self, times: Array) -> NDArray[np.intp]:
-        """Return the index of each time's interval."""
+        """Return the index of the interval of each time."""
         return np.searchsorted(self.edges[1:-1], times, side="right")
 
 
 def sizes_of(largest: Array, n_own: int) -> Array:
-    """Return the sizes, (..., m), to which errors are relative, from the unknowns' largest values.
+    """Return the sizes, (..., m), to which errors of m unknowns are relative.
 
-    The size is the largest component for omega, 1 for the quaternion, and the value itself for the
-    user's last `n_own` unknowns.
+    From the `largest` values, the size is the largest component for omega, 1 for the quaternion,
+    and the value itself for the last `n_own` unknowns.
     """
     sizes = np.ones_like(largest)
     sizes[..., :3] = largest[..., :3].max(axis=-1, keepdims=True)
@@ -99,8 +99,8 @@ class DenseOutput:
         The times (s) between which the solution can be evaluated.
     states, rates : callable
         `states` is a function of times (s) that returns a row for each time: omega (rad/s), the
-        attitude if requested, and the own states. `rates` is a function of times and such rows; it
-        returns their time derivatives.
+        attitude if requested, and the own states. `rates` takes times and such rows, and returns
+        the time derivatives of the rows.
     n_own : int
         The number of own states (`Scene.states`).
 
@@ -165,7 +165,7 @@ class DenseOutput:
         return self._at(t, self.rates)
 
     def normalized(self, states: Array) -> Array:
-        """Return the states, (..., m), with normalised quaternions, in place."""
+        """Normalise the quaternions in states, (..., m), in place, and return the states."""
         own = states.shape[-1] - self.n_own
         if own > 3:
             q = states[..., 3:own]

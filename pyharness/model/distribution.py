@@ -24,7 +24,7 @@ def install_command(extra: str) -> str:
 
 
 def check_package(name: str, what: str, command: str) -> None:
-    """Raise InputError if package `name` is missing, which `what` needs."""
+    """Raise InputError, with the `command` to install it, if a package is missing."""
     from importlib import import_module
 
     try:
@@ -34,7 +34,7 @@ def check_package(name: str, what: str, command: str) -> None:
 
 
 def checked_axes(ax: object) -> "Axes":
-    """Return `ax`, an Axes, or a new diagram if None."""
+    """Return `ax` if it is an Axes, or a new diagram for None."""
     check_package("matplotlib", "plot", install_command("plots"))
     from matplotlib.axes import Axes
 

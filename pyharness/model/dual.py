@@ -1,4 +1,4 @@
-"""Forward differentiation: dual numbers, and tapes (recorded operations) of derivatives."""
+"""Forward differentiation by dual numbers, and recorded derivatives of recorded operations."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -72,7 +72,7 @@ def dual(value: Any, count: int) -> Dual:
 
 
 def with_derivatives(tape: Tape, slots: Sequence[int]) -> Tape:
-    """Return a tape of the outputs, then of their derivatives with respect to inputs `slots`."""
+    """Return a tape with the outputs, then their derivatives with respect to inputs `slots`."""
     recorder = Recorder(_MORE * MOST_OPERATIONS)
     inputs = [
         Dual(symbol, [float(slot == each) for each in slots])
@@ -83,7 +83,7 @@ def with_derivatives(tape: Tape, slots: Sequence[int]) -> Tape:
 
 
 def with_parameters(tape: Tape, values: Sequence[float]) -> Tape:
-    """Return a tape of the outputs' derivatives with respect to parameters, then the outputs.
+    """Return a tape with the derivatives of the outputs by parameters, then the outputs.
 
     The parameters, the last inputs of `tape`, become the constants `values`.
     """

@@ -1,4 +1,4 @@
-"""Limits of the work of a computation: some ten seconds, times `effort`."""
+"""Limits of the work of a computation, by default some ten seconds, times `effort`."""
 
 import math
 from collections.abc import Sequence
@@ -44,7 +44,7 @@ def advice(instead: str, effort: float, needed: float | None = None) -> str:
 
 
 def suggested(effort: float, needed: float | None = None) -> str:
-    """Return a sufficient effort as text: twice `needed`, or ten times the present one."""
+    """Return a sufficient effort as text: twice `needed`, or ten times the present effort."""
     factor = max(_SLACK * needed, effort) if needed else _UNFORESEEN * effort
     factor = min(1e300, factor)
     digit = 10.0 ** (math.floor(math.log10(factor)) - 1)
@@ -53,17 +53,14 @@ def suggested(effort: float, needed: float | None = None) -> str:
 
 
 def waves(scene: Scene) -> int:
-    """Return the number of sines and cosines in the torque; 0 for a StateTorque."""
+    """Return the number of sines and cosines in a torque law; 0 for a StateTorque."""
     if isinstance(scene.torque, StateTorque):
         return 0
     return len(scene.law.sines) + len(scene.law.cosines)
 
 
 def check_steps(scene: Scene, program: str, implementation: str, effort: float) -> None:
-    """Raise InputError if a program exceeds the work limit of an `implementation`.
-
-    The work is steps times (1 + c w) for w waves in the torque, with c from `_LIMITS`.
-    """
+    """Raise InputError if a program exceeds the work limit of an `implementation`."""
     if implementation not in _LIMITS:
         raise unknown("implementation", implementation, _LIMITS)
     most, a_wave = _LIMITS[implementation]
@@ -72,10 +69,7 @@ def check_steps(scene: Scene, program: str, implementation: str, effort: float) 
 
 
 def check_bodies(scene: Scene, program: str, bodies: int, effort: Number) -> None:
-    """Raise InputError if a compiled program exceeds the work limit on many bodies.
-
-    The work is bodies times steps times (1 + w) for w sines and cosines.
-    """
+    """Raise InputError if a compiled program exceeds the work limit on many bodies."""
     cost = 1.0 + _LIMITS["fortran"][1] * waves(scene)
     needed = bodies * scene.steps * cost / _MOST_STEPS_OF_ALL
     _check_work(scene, program, f" of {bodies} bodies", "use fewer", needed, effort)

@@ -140,14 +140,14 @@ class Ensemble(BatchResult):
     def energy(self, *, moments: Any = None, inertia: Any = None) -> Array:
         """Return the kinetic energy (J) of each body, shape (n,) or (n, m).
 
-        The arguments are those of `angular_momentum`.
+        The arguments are as in `angular_momentum`.
         """
         momentum = self.angular_momentum(moments=moments, inertia=inertia)
         energy: Array = 0.5 * (self.omega * momentum).sum(axis=-1)
         return energy
 
     def with_times(self, times: Array) -> "Ensemble":
-        """Return this result for n * m bodies as views for n bodies at m times."""
+        """Return this result for n * m bodies as a view for n bodies at m times (s)."""
 
         def divided(array: Any) -> Any:
             return None if array is None else array.reshape(-1, len(times), *array.shape[1:])
@@ -276,7 +276,7 @@ class Ensemble(BatchResult):
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the ensemble to a file, from which `Ensemble.load` restores it bit for bit.
 
-        The format is that of `numpy.savez`, with an array for each attribute.
+        The format is as of `numpy.savez`, with an array for each attribute.
 
         Parameters
         ----------

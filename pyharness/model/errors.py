@@ -40,7 +40,7 @@ SLIDING = (
 
 
 class TimedError(InputError):
-    """An InputError that names a time (s), which `slower` converts from rescaled time."""
+    """An InputError that names a time (s), perhaps in rescaled time."""
 
     def __init__(self, message: str, time: float) -> None:
         super().__init__(message.replace("{time}", f"{time:.6g}"))
@@ -111,7 +111,7 @@ def known(what: str, name: object, allowed: Iterable[str]) -> str:
 
 
 def unknown(what: str, name: object, allowed: Iterable[str], where: str = "") -> InputError:
-    """Return the InputError for a `name` that is not `allowed`, with a similar name as a hint.
+    """Return an InputError for a `name` that is not `allowed`; it suggests a similar name.
 
     `what` is the kind of name, such as "case"; `where` begins the message.
     """

@@ -20,7 +20,7 @@ def _product(first: Sequence[Fraction], second: Sequence[Fraction]) -> list[Frac
 
 
 def determinant(elements: Sequence[Sequence[Sequence[float]]]) -> list[Fraction]:
-    """Return the determinant of a symmetric matrix of polynomials, as coefficients."""
+    """Return the determinant of a symmetric matrix of polynomials, as exact coefficients."""
     (a, f, e), (_, b, d), (_, _, c) = ([[Fraction(x) for x in p] for p in row] for row in elements)
     terms = ((1, (a, b, c)), (2, (d, e, f)), (-1, (a, d, d)), (-1, (b, e, e)), (-1, (c, f, f)))
     products = [[sign * each for each in _product(_product(x, y), z)] for sign, (x, y, z) in terms]
@@ -30,7 +30,7 @@ def determinant(elements: Sequence[Sequence[Sequence[float]]]) -> list[Fraction]
 def first_zeros(polynomial: Iterable[float | Fraction]) -> tuple[float, float]:
     """Return a polynomial's zeros (s) nearest to time 0, before and after it.
 
-    It must be above 0 at time 0. A missing zero is -inf or inf.
+    The polynomial must be above 0 at time 0. A missing zero is -inf or inf.
     """
     exact = [Fraction(c) for c in polynomial]
     backward = [-c if n % 2 else c for n, c in enumerate(exact)]
@@ -88,7 +88,7 @@ def _bernstein(polynomial: Sequence[int]) -> list[int]:
 
 
 def _halves(row: list[int]) -> tuple[list[int], list[int]]:
-    """Return coefficients in both halves of an interval, times 2**degree (de Casteljau)."""
+    """Return the coefficients for both halves of an interval, times 2**degree (de Casteljau)."""
     degree = len(row) - 1
     early, late = [row[0] << degree], [row[-1] << degree]
     for n in range(degree - 1, -1, -1):

@@ -1,6 +1,6 @@
 """Torques as three arithmetic expressions of time, omega and attitude, as in scene files.
 
-Only allowed nodes of the syntax tree are evaluated.
+Only permitted nodes of the syntax tree are evaluated.
 """
 
 import ast
@@ -86,7 +86,7 @@ def parsed(
 def components(
     texts: Mapping[str, str], inputs: Sequence[Any], constants: Mapping[str, Any]
 ) -> list[Any]:
-    """Return checked expressions as symbols; `inputs` has the symbols of `INPUTS`."""
+    """Return checked expressions as symbols; `inputs` are the symbols of `INPUTS`."""
     names = {**dict(zip(INPUTS, inputs, strict=True)), "pi": math.pi, **constants}
     return [_component(text, names, place) for place, text in texts.items()]
 

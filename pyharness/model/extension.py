@@ -50,6 +50,6 @@ def _why_missing() -> str:
 
 
 def columns(waves: tuple[Wave, ...], kind: type = float) -> NDArray[Any]:
-    """Return n waves (three amplitudes and a frequency, rad/s), (4, n), in Fortran order."""
+    """Return n waves (three amplitudes and a frequency, rad/s) as columns, (4, n)."""
     rows = [(*amplitude, frequency) for amplitude, frequency in waves]
     return np.array(rows, dtype=kind).reshape(-1, 4).T

@@ -14,13 +14,13 @@ _FOLDER = _PACKAGE / "data"
 
 @cache
 def facts(name: str) -> dict[str, Any]:
-    """Return the content of ``data/<name>.toml``, cached; callers must not change it."""
+    """Return the content of ``data/<name>.toml``, cached, not to be changed."""
     with open(_FOLDER / f"{name}.toml", "rb") as file:
         return tomllib.load(file)
 
 
 def facts_folder() -> Path:
-    """Return the folder `data`; if installed, it also contains `SHIPPED`."""
+    """Return the folder `data`, which in an installed package also contains `SHIPPED`."""
     return _FOLDER
 
 

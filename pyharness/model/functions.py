@@ -1,6 +1,6 @@
 """Elementary functions of floats and of the numbers of `pyharness.thesis.word`.
 
-Floats use the C library; other results are correctly rounded.
+Floats use the C library; results for other numbers are correctly rounded.
 """
 
 import math

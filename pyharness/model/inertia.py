@@ -1,7 +1,7 @@
 """Principal moments and axes of inertia matrices, diagonalised in integers.
 
 In binary64, a small eigenvalue would have few correct digits. Elements are integer multiples of a
-power of 2, u; a regular matrix has an absolute determinant of at least u**3. This bounds the
+power of 2, u, and a regular matrix has an absolute determinant of at least u**3. This bounds the
 smallest eigenvalue, and determines how many bits are enough.
 """
 
@@ -44,7 +44,7 @@ class PrincipalFrame:
     exact_axes: tuple[Exact, Exact, Exact]
 
     def into(self, vector: Exact) -> Exact:
-        """Return a vector's exact components about the principal axes."""
+        """Return the exact components of a vector about the principal axes."""
         return triple(
             sum((x * v for x, v in zip(axis, vector, strict=True)), Fraction(0))
             for axis in self.exact_axes
@@ -64,7 +64,7 @@ def checked_inertia(where: str, values: object) -> Matrix:
 
 
 def symmetric_matrix(where: str, values: object) -> Matrix:
-    """Return a user's symmetric matrix, perhaps not positive definite."""
+    """Return a user's symmetric matrix, which need not be positive definite."""
     allowed = "allowed: three rows of three finite numbers, kg m2"
     rows = list(number_list(where, values, allowed))
     if any(isinstance(converted(row), float) for row in rows):

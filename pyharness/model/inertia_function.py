@@ -30,7 +30,7 @@ class InertiaFunction(Changing):
     """An inertia that is a continuous function of time.
 
     `tape` gives three moments, or nine matrix elements by rows. `written` has a scene file's
-    expressions and numbers, or a table's items.
+    expressions and numbers, or the items of a table.
     """
 
     place: str
@@ -81,11 +81,11 @@ class InertiaFunction(Changing):
 
     @cached_property
     def span(self) -> tuple[float, float]:
-        """Infinite ends, because a moment that reaches 0 ends the integration."""
+        """An infinite interval, because a moment that reaches 0 ends the integration."""
         return -np.inf, np.inf
 
     def check(self, times: Iterable[float]) -> None:
-        """Raise InputError unless moments are above 0 at 1001 times up to each of `times`."""
+        """Raise InputError unless moments are above 0 at 1001 times up to each of `times` (s)."""
         for end in times:
             if not (end and np.isfinite(end)):
                 continue
@@ -156,7 +156,7 @@ def inertia_of_texts(place: str, values: Any) -> InertiaFunction:
 def inertia_of_tables(
     place: str, tables: Iterable[Table], written: tuple[Any, ...]
 ) -> InertiaFunction:
-    """Return the inertia with `tables` of time as elements; `written` is for scene files."""
+    """Return the inertia whose elements are `tables` over time; `written` is for scene files."""
     recorder = Recorder(place=f"[body] {place}")
     time, *_ = recorder.inputs()
     values = [value_of_table(without_equal_constants(each), time) for each in tables]
@@ -164,7 +164,7 @@ def inertia_of_tables(
 
 
 def checked_function(found: InertiaFunction) -> InertiaFunction:
-    """Return an inertia; raise InputError if it jumps, or is asymmetric or invalid."""
+    """Return an inertia; raise InputError if it jumps, is asymmetric or not above 0."""
     # Imported only here, because most scenes need no exact numbers.
     from pyharness.model.inertia import checked_inertia
 
@@ -187,7 +187,6 @@ def checked_function(found: InertiaFunction) -> InertiaFunction:
 
 
 def _check_continuous(tape: Tape, where: str) -> None:
-    """Raise InputError if the inertia, and therefore omega, may jump."""
     jumps = InputError(
         f"{where}: an inertia that may jump; allowed: minimum, maximum, abs, clip, interp, tables "
         "with the interpolation linear or cubic"

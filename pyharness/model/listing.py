@@ -24,8 +24,8 @@ class Listing:
     defects : frozenset of str
         The active defects: mistakes of the printed program that are not corrected.
     readings : frozenset of str
-        The active readings: interpretations of doubtful cards, other than the one that we adopt.
-        None changes a corrected program.
+        The active readings: interpretations of doubtful cards (program lines), other than ours. No
+        reading changes a corrected program.
     conjectures : frozenset of str
         The active assumptions about statements for which no card exists. The argument `defects`
         also accepts the names of conjectures and readings.
@@ -94,13 +94,13 @@ class Listing:
 
     @classmethod
     def original(cls, program: str, readings: Iterable[str] = ()) -> "Listing":
-        """Return the program as printed, with the names of `switches`, and `readings`, active."""
+        """Return the program as printed, with the names in `readings` active."""
         _check_program(program)
         return cls(program, frozenset(switches(program)), frozenset(readings))
 
     @classmethod
     def corrected(cls, program: str) -> "Listing":
-        """Return the listing in which nothing is active."""
+        """Return the program without active defects, readings and conjectures."""
         return cls(program, frozenset())
 
     def has(self, name: str) -> bool:
@@ -109,13 +109,13 @@ class Listing:
 
 
 def flagged() -> list[dict[str, Any]]:
-    """Return the entries of `data/apparatus.toml` with a switch, whose bit number is "flag"."""
+    """Return the entries of `data/apparatus.toml` that have a switch; "flag" is its bit number."""
     return [entry for entry in facts("apparatus")["entry"] if "flag" in entry]
 
 
 @cache
 def names_of(kind: str, program: str | None = None) -> tuple[str, ...]:
-    """Return the names of a kind, such as "defect", in one program or all."""
+    """Return the names of a kind, such as "defect", in one program or in all."""
     return tuple(
         entry["id"]
         for entry in flagged()
@@ -124,7 +124,7 @@ def names_of(kind: str, program: str | None = None) -> tuple[str, ...]:
 
 
 def switchable(program: str | None = None) -> tuple[str, ...]:
-    """Return the names that --fix and --keep accept."""
+    """Return the names that the options --fix and --keep accept."""
     return tuple(name for kind in _FIELDS for name in names_of(kind, program))
 
 

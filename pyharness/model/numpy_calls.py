@@ -1,4 +1,4 @@
-"""Replacements of NumPy's functions, used while a user's function is recorded with symbols.
+"""Replacements of NumPy's functions while a user's function is recorded with symbols.
 
 Symbols do not support choices (such as where), array comparisons, linear algebra, and assignment to
 elements of numpy.zeros. Calls from other threads or without symbols reach the originals.
@@ -29,7 +29,7 @@ _originals: list[tuple[Any, str, Any]] = []
 
 @contextmanager
 def replaced_functions(with_targets: bool) -> Iterator[None]:
-    """Replace functions in this thread; `with_targets` includes numpy.zeros, empty and ones."""
+    """Replace functions in this thread; `with_targets`, also numpy.zeros, empty and ones."""
     global _installed
     before = getattr(_here, "targets", None)
     with _lock:
@@ -304,7 +304,7 @@ def called_once(
 ) -> list[Any]:
     """Return the components that a user's function returns for symbols.
 
-    Raise InputError, with the text `allowed`, for any other outcome.
+    Raise InputError, with the text `allowed`, if the call fails or returns another result.
     """
     for with_targets in (False, True):
         try:

@@ -1,4 +1,4 @@
-"""Own states: a user's unknowns beside omega and attitude, such as integral terms or lags."""
+"""Own states: unknowns of the user beside omega and attitude, such as integral terms."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -19,7 +19,7 @@ _TAKEN = (
 class OwnState(NamedTuple):
     """An own state: its name, and its value at time 0 in any unit.
 
-    Its error is relative to its largest absolute value so far, or to a larger `scale`.
+    Its error is relative to its largest absolute value so far, or to `scale` if larger.
     """
 
     name: str

@@ -18,7 +18,7 @@ from pyharness.model.waves import exact_law
 
 @dataclass(frozen=True)
 class PrincipalScene(Scene):
-    """A scene about the principal axes, with moments in double-double precision.
+    """A scene about principal axes, with moments in double-double precision.
 
     In double precision, differences of nearly equal moments would have large relative errors.
     """
@@ -114,7 +114,7 @@ def in_scene_axes(found: Trajectory, axes: Array) -> Trajectory:
 
 
 def states_in_scene_axes(states: Array, axes: Array, own: int) -> Array:
-    """Return rows of states, transformed from principal `axes` (columns) to the body axes.
+    """Return n states, (n, m), transformed from principal `axes` (columns) to the body axes.
 
     Columns from `own` on are unchanged.
     """
@@ -134,7 +134,7 @@ def _rotate(frame: PrincipalFrame, vector: Triple) -> Triple:
 
 
 def axes_and_turn(scene: Scene) -> tuple[Array, Quaternion]:
-    """Return the principal axes of a full inertia matrix, as columns and quaternion."""
+    """Return the principal axes of a full inertia matrix, as columns and as a quaternion."""
     assert scene.inertia is not None
     axes = principal_frame(scene.inertia).axes
     return axes.copy(), quaternion_of_axes(axes)

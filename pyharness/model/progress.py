@@ -1,4 +1,4 @@
-"""Reports of progress, and the division of many bodies among threads."""
+"""Progress bars, and the division of many bodies among threads."""
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
@@ -44,7 +44,7 @@ def bar_of_bodies(is_shown: bool) -> Iterator[None]:
 
 
 def expect_bodies(n: int) -> None:
-    """Set the total of a progress bar that has none."""
+    """Set the total of the progress bar, if it has none."""
     bar = _bar.get()
     if bar is not None and bar.total is None:
         bar.reset(total=n)
@@ -59,7 +59,7 @@ def count_done(n: int) -> None:
 
 @contextmanager
 def progress_of(choice: bool | Progress, what: str) -> Iterator[Progress]:
-    """Yield `choice`, or a function that updates a bar (True) or nothing (False)."""
+    """Yield a function `choice`, else one that updates a bar (True) or does nothing."""
     if callable(choice):
         yield choice
     elif not boolean("progress", choice):

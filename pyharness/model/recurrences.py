@@ -1,6 +1,6 @@
-"""Recurrences, slopes and rounding errors of recorded operations, as C.
+"""Recurrences, slopes and rounding errors of recorded operations, as C code.
 
-They are for the interpreter (fortran/make_cases.py) and compiled code (`pyharness.engine.leaves`).
+The interpreter (fortran/make_cases.py) and compiled code (`pyharness.engine.leaves`) use them.
 """
 
 from typing import NamedTuple
@@ -9,12 +9,12 @@ from pyharness.model.codes import Operations
 
 
 class Operation(NamedTuple):
-    """The recurrence of an operation's Taylor series and its partial derivatives (slopes), as C.
+    """An operation's recurrence for Taylor series, and its partial derivatives (slopes), as C.
 
     Letters o, p and q are results, x and y operands. For o, for example, t_o is term k of the
     series (l_o for a table), b_o term k - 1, z_o term 0, f_o term 1, and m_o the value at a node. i
     is 1/k. s0 and s1 sum products of terms 1 to k - 1 of the series in `pairs`. A result's rounding
-    error is its own plus the operands' times the absolute slopes.
+    error is its own, plus the errors of the operands times the absolute slopes.
     """
 
     series: tuple[str, ...]

@@ -1,7 +1,4 @@
-"""Reports: the results of a subcommand as data, which `pyharness.views` renders.
-
-Dataclasses would take five times as long as named tuples to create at every start.
-"""
+"""Reports: the results of a subcommand as data, which `pyharness.views` renders."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -40,7 +37,7 @@ def short(x: "float | Decimal | None") -> str:
 
 
 def digits(form: str, scale: float = 1.0) -> Callable[[float | None], str]:
-    """Return a function that formats `scale` times a number by `form`."""
+    """Return a function that formats `scale` times a number by `form`; None becomes a dash."""
     return lambda x: "-" if x is None else f"{scale * x:{form}}"
 
 
@@ -84,7 +81,7 @@ class Column(NamedTuple):
 
 
 def words(heads: str) -> list[Column]:
-    """Return left-aligned columns; blanks separate `heads`."""
+    """Return left-aligned columns; blanks separate their `heads`."""
     return [Column(head, left=True) for head in heads.split()]
 
 

@@ -102,7 +102,7 @@ class Scene:
         The principal moments of inertia (kg m2). A function of the time t (s) must be continuous;
         `inertia_table` makes moments from a table.
     coefficients : three numbers, optional
-        The dimensionless coefficients A, B, C of Euler's equations (13-15 of the thesis).
+        The dimensionless coefficients A, B, C of Euler's equations (13-15 of Jacobs 1982).
     torque : TorqueLaw, three numbers, StateTorque, or function of (t, omega[, attitude])
         The torque in N m; for `coefficients`, torque over moment in rad/s2. The default is zero.
         `pyharness.torques` has functions that return a StateTorque. A function of your own returns
@@ -113,14 +113,14 @@ class Scene:
     inertia : three rows of three numbers, ChangingInertia, or function of t, optional
         A symmetric inertia matrix about the body axes (kg m2).
     changing : ChangingMoments, ChangingInertia, or a recorded function, optional
-        An inertia that changes with time. One given as `moments` or `inertia` is moved here from
-        that field, which becomes None.
+        An inertia that changes with time. If given as `moments` or `inertia`, it is moved here, and
+        that field becomes None.
     states : dict of str to float, or to pair of floats, optional
-        Own states: at most eight unknowns beside omega and attitude, in any unit. The dict has each
-        name with its value at time 0, or with a pair of this value and a scale. The torque is then
+        Own states: at most eight unknowns beside omega and attitude, in any unit. The dict maps
+        each name to its value at time 0, or to a pair of this value and a scale. The torque is then
         a function of ``(t, omega, states)`` or ``(t, omega, attitude, states)``, which returns the
         torque and a dict of the states' time derivatives. The error of a state is relative to its
-        largest absolute value so far, or to a larger scale.
+        largest absolute value so far, or to the scale if larger.
     step_size : float
         The step size (s) of methods with a fixed step, and of the programs of the thesis. The
         arguments below are for these programs only.
@@ -326,7 +326,7 @@ class Scene:
         """Whether no rigid body has the moments of inertia at time 0.
 
         True if the largest moment exceeds the sum of the others by more than 2**-50 of itself,
-        beyond rounding errors.
+        which rounding errors can't explain.
         """
         moments, inertia = self.moments, self.inertia
         if self.changing is not None:
@@ -355,7 +355,7 @@ class Scene:
         return self.law
 
     def times(self) -> list[float]:
-        """Return the times (s) of a program's results."""
+        """Return the times (s) of a thesis program's results."""
         return [n * self.step_size for n in range(1, self.steps + 1)]
 
     def normalized_torque(self, time: float) -> Triple:
@@ -402,7 +402,7 @@ def _warn_of_impossible(scene: Scene) -> None:
 
 
 def most_steps() -> int:
-    """Return the number of steps that half of the memory and 32-bit counters allow."""
+    """Return the largest number of steps for half of the memory and 32-bit counters."""
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     return min(memory // 2 // _BYTES_PER_STEP, _COUNTABLE_STEPS)
 
@@ -425,8 +425,8 @@ def checked_scene(
 ) -> Scene:
     """Return `scene`; raise InputError unless it is a Scene that the flags allow.
 
-    The flags allow a full inertia matrix (`any_axes`), torque about space axes (`any_torque`)
-    or of the state (`any_state`), `changing` inertia, and own `states`.
+    The flags allow a full inertia matrix (`any_axes`), a torque about space axes (`any_torque`) or
+    of the state (`any_state`), a `changing` inertia, and own `states`.
     """
     if isinstance(scene, Scene):
         if scene.states and not states:

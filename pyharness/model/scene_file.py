@@ -208,7 +208,7 @@ def _toml(value: Any) -> str:
 
 
 def body_of(scene: Scene) -> tuple[str, Any]:
-    """Return key and value of the body in a scene file."""
+    """Return the key and the value of the body in a scene file."""
     if isinstance(scene.changing, InertiaFunction):
         return scene.changing.place, scene.changing.values()
     if isinstance(scene.changing, ChangingMoments):
@@ -220,7 +220,7 @@ def body_of(scene: Scene) -> tuple[str, Any]:
 
 
 def as_lists(value: Any) -> Any:
-    """Return a value with lists for tuples and tables for torque laws."""
+    """Return a value with tuples as lists, and torque laws as tables."""
     if isinstance(value, TorqueLaw):
         return law_table(value)
     return list(map(as_lists, value)) if isinstance(value, tuple) else value

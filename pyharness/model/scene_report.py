@@ -20,7 +20,7 @@ _LONGEST_TEXT = 60
 
 
 def scene_title(scene: Scene) -> str:
-    """Return the name of a scene, after the number of its case if it has one."""
+    """Return the name of a scene, after its case number if any."""
     return f"Case {scene.case}: {scene.name}" if scene.case else scene.name
 
 
@@ -163,7 +163,7 @@ def sensitive(growth: float | None, digits: float | None) -> str:
 
 
 def estimates(trajectory: Trajectory) -> list[str]:
-    """Return at most one line, with error estimates."""
+    """Return a line on error estimates in a list, or []."""
     told = []
     if trajectory.error is not None and trajectory.digits is not None:
         of = "of the largest |omega|" + (" or of a state" if trajectory.states else "")

@@ -44,11 +44,11 @@ class StateTorque:
     needs_attitude : bool
         Whether the torque depends on the attitude.
     expression, constants : tuple
-        For a torque from a scene file: its three expressions, followed by one for the rate of each
+        For a torque from a scene file, its three expressions, followed by one for the rate of each
         own state, and pairs of name and value of their constants; else empty.
     terms : tuple
-        The other summands that a scene file has: at most one `TorqueLaw`, and ready terms. A ready
-        term is a torque of `pyharness.torques`, as pairs of key and value.
+        The other summands in a scene file: at most one `TorqueLaw`, and torques of
+        `pyharness.torques`, each as pairs of key and value.
     parameters : tuple of pairs
         Name and value of each keyword argument of the function whose default is a number.
     varied : Tape or None
@@ -157,12 +157,12 @@ class StateTorque:
 
 
 def torque_of(tape: Tape, time: Any, omega: Any, attitude: Any, *own: Any) -> Array:
-    """Return the torque and the rates of `Scene.states` that a tape gives for symbols."""
+    """Return the torque and the rates of `Scene.states` as symbols, from a tape and its inputs."""
     return np.array(evaluate(tape, [time, *omega, *attitude, *own], SYMBOLS), dtype=object)
 
 
 def replayed(function: Function, own: tuple[str, ...] = ()) -> StateTorque:
-    """Return a torque recorded from a function of this project, without checks."""
+    """Return the recorded torque of an internal function, without checks."""
     tape = _recorded_with(Recorder(_MOST_REPLAYED, N_INPUTS + len(own)), function)
     return StateTorque(tape, None, tape.needs_attitude, own=own)
 
@@ -183,7 +183,7 @@ def of_law(law: TorqueLaw) -> StateTorque:
 def turned_law(law: TorqueLaw, time: Symbol, attitude: Any) -> Array:
     """Return the body components of a law about the axes of space.
 
-    Laws with equally many frequencies share compiled code.
+    Compiled code is shared by laws with equally many frequencies.
     """
     angles = [frequency * time for _, frequency in (*law.sines, *law.cosines)]
     terms = [time, *(wave(each) for each in angles for wave in (np.sin, np.cos))]
@@ -291,7 +291,7 @@ def _listed(names: Iterable[str]) -> str:
 
 
 def count_arguments(function: Function, where: str, allowed: str) -> int:
-    """Return the argument count of a torque with own states: 3, or 4 with attitude."""
+    """Return the number of arguments of a torque with own states: 3, or 4 with the attitude."""
     parameters = _parameters(function, where, f"allowed: {allowed}")
     count = sum(each.kind in _POSITIONAL for each in parameters)
     if count not in (3, 4):
@@ -367,7 +367,7 @@ def checked_torque(value: object, states: tuple[str, ...] = ()) -> TorqueLaw | S
 
 
 def law_of(torque: StateTorque) -> TorqueLaw | None:
-    """Return the torque law that equals a recorded torque, or None; laws have faster methods."""
+    """Return the torque law equal to a recorded torque, or None; laws have faster methods."""
     tape = torque.tape
     if tape is None or torque.own or tape.inputs - {TIME}:
         return None
@@ -434,7 +434,7 @@ def _list_summands(torque: StateTorque | TorqueLaw) -> "tuple[StateTorque | Torq
 
 
 def _sum(parts: "Sequence[StateTorque | TorqueLaw]") -> StateTorque:
-    """Return the sum in a scene file's order, so that the file gives the same tape."""
+    """Sum torques in a scene file's order, so that a saved scene has the same operations."""
     torques = [each for each in parts if isinstance(each, StateTorque)]
     torques.sort(key=lambda each: bool(each.expression))
     tapes = [each.tape for each in torques if each.tape is not None]

@@ -1,8 +1,8 @@
-"""Symbols: function arguments that record arithmetic on a tape.
+"""Symbols: function arguments that record arithmetic on a tape (a list of operations).
 
-A symbol is a linear combination of slots, the places of inputs and results on the tape. Sums, and
-products with numbers, only change coefficients; any other operation has a slot for its result, the
-same if repeated.
+A symbol is a linear combination of slots, the inputs and results on the tape. Sums, and products
+with numbers, only change coefficients; any other operation has a slot for its result, the same if
+repeated.
 """
 
 import math
@@ -49,7 +49,7 @@ HAS_MEMORY = (
 
 
 class Recorder:
-    """A tape during its recording."""
+    """A tape (list of operations) during its recording."""
 
     def __init__(
         self,
@@ -71,7 +71,7 @@ class Recorder:
         self.was_converted = False  # whether the function tried to make a symbol a float
 
     def inputs(self) -> list["Symbol"]:
-        """Return symbols for all inputs: time, omega, attitude, and parameters."""
+        """Return symbols for all inputs: time, omega, attitude, and own states or parameters."""
         return [Symbol(self, 0.0, {slot: 1.0}) for slot in range(self._n_inputs)]
 
     def refusal(self, what: str, write: str = _ALLOWED) -> InputError:
@@ -92,7 +92,7 @@ class Recorder:
         return InputError(f"{self.place}: {HAS_MEMORY}")
 
     def slot(self, operation: Operation) -> int:
-        """Return the slot of `operation`, recorded if new."""
+        """Return the slot of the operation's result; record a new operation."""
         if operation not in self._slots:
             if len(self._slots) == self.most:
                 most = self.most
@@ -107,7 +107,7 @@ class Recorder:
         return Symbol(self, 0.0, {self.slot(Operation(*operation)): factor})
 
     def tape(self, outputs: Sequence[Any]) -> Tape:
-        """Return the tape of `outputs`, without unused operations."""
+        """Return the tape that computes `outputs`, without unused operations."""
         linear = [self._output(axis, each) for axis, each in enumerate(outputs, 1)]
         return _without_unused([*self._slots], linear, self._n_inputs)
 
@@ -183,7 +183,7 @@ _COMPOSED: dict[str, Callable[[Any], Any]] = {
 
 
 class Symbol:
-    """A linear combination of slots, which records the operations on it."""
+    """A linear combination of slots (inputs and results), which records operations on it."""
 
     __slots__ = ("_constant", "_terms", "recorder")
     __hash__ = None  # type: ignore[assignment]
@@ -373,7 +373,7 @@ class Symbol:
         return 2.0 * (self > 0.0) - 1.0
 
     def with_terms_of(self, others: "Iterable[Symbol]") -> "Symbol":
-        """Record and return this symbol plus 0 times the terms of `others`; 0 is not recorded."""
+        """Record this symbol plus 0 times the terms of `others`; 0 is returned unchanged."""
         if not (self._terms or self._constant):
             return self
         terms = {slot: 0.0 for each in others for slot in each._terms} | self._terms
@@ -431,7 +431,7 @@ class Symbol:
     __rmod__ = _of_symbols(lambda x, y: y - x * (y / x).floor())
 
     def __getattr__(self, name: str) -> Any:
-        """Return a composed function, which NumPy looks up by name."""
+        """Return a composed function, such as tan, which NumPy looks up by name."""
         if name in _COMPOSED:
             return partial(_COMPOSED[name], self)
         # NumPy's mean works without `dtype`.

@@ -1,7 +1,7 @@
 """The tape: a function of time, omega and attitude, recorded as a list of operations.
 
 It is recorded with `pyharness.model.symbols`, and evaluated with floats, decimal numbers, Taylor
-series or symbols. A slot is the place of an input or result.
+series or symbols. A slot is an input or a result.
 """
 
 import math
@@ -41,7 +41,7 @@ class Table:
     """A piecewise cubic function of time.
 
     Row k of `pieces`, shape (n, 4), has the coefficients of a cubic in the time (s) after
-    breaks[k], constant first. It applies until the next break, the first row also before.
+    breaks[k], constant first. It applies until the next break; the first row also before its break.
     """
 
     def __init__(self, breaks: Any, pieces: Any) -> None:
@@ -62,7 +62,7 @@ class Table:
 
 
 class Operation(NamedTuple):
-    """An operation of a tape: "linear", "table", or another kind on one to three slots.
+    """An operation of a tape: "linear", "table", or another kind with up to three operands (slots).
 
     The second operand of "log", "atan" and "asin" is the derivative. "switch" is 1 where its
     operand is positive, else 0; "select" is its second operand where the first is 1, else its
@@ -109,7 +109,7 @@ class Tape:
 
     @cached_property
     def has_branches(self) -> bool:
-        """Whether there is a "select", whose unused operand may be singular."""
+        """Whether there is a "select", of which an unused operand may be singular."""
         return any(each.kind == "select" for each in self.operations)
 
     @property
@@ -137,7 +137,7 @@ def slots_of(operation: Operation) -> tuple[int, ...]:
 
 @dataclass(frozen=True)
 class Functions(Generic[T]):
-    """The functions that a tape needs beside + - * and /."""
+    """The functions that a tape needs besides + - * and /."""
 
     number: Callable[[float], T]  # converts a constant of the tape
     sqrt: Callable[[T], T]
@@ -203,7 +203,7 @@ def live_slots(
     """Compute the operations that the outputs need, operands first, and return their slots.
 
     Of a "select" only the chosen operand is computed; the other may be singular. `compute` is
-    called for each slot, `is_true` for a condition. Derivatives (`WITH_DERIVATIVE`) are computed
+    called for each slot, `is_true` for each condition. Derivatives (`WITH_DERIVATIVE`) are computed
     only if `for_series`.
     """
     known = set(range(tape.n_inputs))
@@ -325,7 +325,7 @@ def float_outputs(tape: Tape, inputs: Sequence[float]) -> list[float]:
 
 
 def _without_branches(tape: Tape, inputs: Sequence[float]) -> Tape:
-    """Return the tape with 0 for operations not needed."""
+    """Return the tape with 0 in place of unneeded operations."""
     values: list[Any] = [*inputs, *[0.0] * len(tape.operations)]
 
     def compute(slot: int) -> None:

@@ -155,7 +155,7 @@ def _waves(where: str, values: object) -> tuple[Wave, ...]:
 
 
 def law_value(law: TorqueLaw, time: Any) -> Array:
-    """Return a law's components at a time, about its own axes."""
+    """Return a law's components at a time (s), about its own axes."""
     found: list[Any] = [c + r * time for c, r in zip(law.constant, law.rate, strict=True)]
     waves = [(amplitude, np.sin(frequency * time)) for amplitude, frequency in law.sines]
     waves += [(amplitude, np.cos(frequency * time)) for amplitude, frequency in law.cosines]
@@ -165,7 +165,7 @@ def law_value(law: TorqueLaw, time: Any) -> Array:
 
 
 def law_integral(law: TorqueLaw, time: Any) -> Array:
-    """Return the integral of a law's components from 0 to `time`."""
+    """Return the integral of a law's components from 0 to `time` (s)."""
     square = time * time
     found: list[Any] = [
         c * time + 0.5 * r * square for c, r in zip(law.constant, law.rate, strict=True)
@@ -191,10 +191,7 @@ def law_derivative(law: TorqueLaw) -> TorqueLaw:
 
 
 def to_body(vector: Any, attitude: Any) -> Array:
-    """Return the body components of a vector about the axes of space.
-
-    Recorded terms share the products of the rotation matrix.
-    """
+    """Return the body components of a vector about the axes of space."""
     u, v, w = vector
     rows = rows_to_body(attitude)
     return np.array([p * u + q * v + s * w for p, q, s in rows], dtype=object)

@@ -1,9 +1,9 @@
 """Writing of trajectory files, which `pyharness.engine.trajectory_reader` reads.
 
 The archive has an array for each attribute, the text `scene` of a scene file, and the JSON text
-`header` with the rest, such as a tape. A linear combination is a list of its constant and of pairs
-of slot and coefficient; an operation, of its kind and its operands, linear combination, or breaks
-and pieces of its table.
+`header` with the rest, such as recorded operations. A linear combination is a list of its constant
+and of pairs of slot and coefficient. An operation is a list of its kind and its operands, linear
+combination, or breaks and pieces of its table.
 """
 
 import json
@@ -122,7 +122,7 @@ def _moments_record(moments: Any) -> Any:
 
 
 def _scene_record(scene: Scene) -> tuple[dict[str, Any], str]:
-    """Return, for JSON, what a scene file lacks, and its text."""
+    """Return the data that a scene file lacks, for JSON, and the file's text."""
     record: dict[str, Any] = {
         "masses": scene.masses,
         "forces": scene.forces,

@@ -67,7 +67,7 @@ def converted(value: object) -> float | str:
 
 
 def is_no_number(value: object) -> bool:
-    """Return whether a value is text, boolean or array, which float() might take."""
+    """Return whether a value is text, boolean or array, which float() might accept."""
     if isinstance(value, (bool, str, bytes, bytearray, memoryview)):
         return True
     kind = getattr(getattr(value, "dtype", None), "kind", _REAL[0])
@@ -153,7 +153,7 @@ def boolean(where: str, value: object) -> bool:
 
 
 def tolerance_of(value: object, finest: float) -> float:
-    """Return a tolerance as a float, without a check of its range."""
+    """Return a tolerance as a float; its range is not checked."""
     found = converted(value)
     if isinstance(found, float):
         return found

@@ -2,7 +2,7 @@
 
 A solver rounds each quotient of amplitude and moment: if two amplitudes cancel to 1e-10 of their
 size, the sum has only six correct digits. A merged law has at most one sine and one cosine of each
-frequency, none of frequency 0.
+frequency, and no wave of frequency 0.
 """
 
 import math
@@ -90,8 +90,8 @@ def with_merged_waves(scene: Scene) -> Scene:
 def with_merged_rows(constant: Array, sines: Array, cosines: Array) -> tuple[Array, Array, Array]:
     """Return constants, sines and cosines of m torque laws, summed by frequency if finite.
 
-    Shapes are (m, 3), (m, k, 4) and (m, l, 4), or one row for all; a wave is three amplitudes and a
-    frequency (rad/s). Rows are padded with zeros.
+    Shapes are (m, 3), (m, k, 4) and (m, l, 4), or one row for all. A wave is three amplitudes and a
+    frequency (rad/s); waves are padded with zeros.
     """
     concerned = _mergeable_rows(sines, cosines)
     if not concerned.any():
@@ -124,7 +124,7 @@ def with_merged_rows(constant: Array, sines: Array, cosines: Array) -> tuple[Arr
 
 
 def _mergeable_rows(sines: Array, cosines: Array) -> NDArray[np.bool_]:
-    """Return which of m laws `merged` changes, (m,), or (1,) for shared rows."""
+    """Return a mask of the laws that `merged` changes, (m,), or (1,) for shared rows."""
     found = np.zeros(1, bool)
     for waves in (sines, cosines):
         if waves.size:

@@ -28,7 +28,7 @@ class CompiledCall(NamedTuple):
 
 
 def compiled_call(solver: Any) -> CompiledCall:
-    """Return a function that compiled code can call with the solver's `data`."""
+    """Return the function for compiled code, its argument `data`, and the solver."""
     from pyharness import _solver
 
     # PYFUNCTYPE, unlike CFUNCTYPE, raises KeyboardInterrupt after Ctrl-C if Python code calls it.

@@ -76,8 +76,7 @@ def gravity_gradient(inertia: Numbers | Iterable[Numbers] | Changing, rate: Numb
 def magnetic_dipole(moment: Numbers, field: TorqueLaw | Numbers) -> StateTorque:
     """Return the torque m x b on a magnetic dipole that is fixed in the body.
 
-    The field along the body axes is b = R^T B, where B is along the axes of space, and R rotates
-    from body to space.
+    The field B in space is b = R^T B about the body axes, where R rotates from body to space.
 
     Parameters
     ----------

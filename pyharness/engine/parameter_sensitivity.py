@@ -244,7 +244,7 @@ def _extrapolate(name: str, moved: Callable[[float], Scene], size: float, states
 
 
 def _moves(scene: Scene, name: str) -> Iterator[tuple[Callable[[float], Scene], float]]:
-    """Yield, for each value, a function that returns the scene with it changed, and its size."""
+    """Yield, for each of the parameter's values, a function that changes it by h, and its size."""
     if name == ATTITUDE:
         for axis in np.eye(3):
             yield lambda h, axis=axis: _turned(scene, h * axis), 1.0  # type: ignore[misc]

@@ -80,7 +80,7 @@ def solve_state(
 
 
 def finest_of_state(name: str, scene: Scene, time: float, most: float) -> float:
-    """Return an estimate of the smallest tolerance; 0 if `time` (s) is not reached."""
+    """Return an estimate of the smallest possible tolerance; 0 if `time` (s) is not reached."""
     run = StateRun(scene, time, name, 1.0, most)
     scale = 0.0 if run.is_singular() else run.expected_omega()
     if scale == 0.0:

@@ -251,7 +251,7 @@ class StateRun(Run):
 
 
 def with_unit_attitude(rows: Array) -> Array:
-    """Return the rows with normalised quaternions, if any."""
+    """Return states, (n, 3) or (n, 7), with normalised quaternions."""
     if rows.shape[1] == 3:
         return rows
     unit = rows[:, 3:] / np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)

@@ -52,7 +52,7 @@ class _Quantity(NamedTuple):
 class Conversions:
     """The base class of trajectories.
 
-    A changing inertia has, in each row, its value at the row's time.
+    Quantities use the value of a changing inertia at each time.
     """
 
     time: Array
@@ -85,7 +85,7 @@ class Conversions:
         Returns
         -------
         scipy.spatial.transform.Rotation
-            One rotation for each row.
+            One rotation for each time.
 
         Raises
         ------
@@ -97,7 +97,7 @@ class Conversions:
         return Rotation.from_quat(self._attitudes()[:, [1, 2, 3, 0]])
 
     def angular_momentum(self, frame: str = "body") -> Array:
-        """Return the angular momentum in each row.
+        """Return the angular momentum at each time.
 
         Parameters
         ----------
@@ -120,7 +120,7 @@ class Conversions:
         return momentum if frame == "body" else turned_to_space(self._attitudes(), momentum)
 
     def energy(self) -> Array:
-        """Return the kinetic energy of the rotation in each row.
+        """Return the kinetic energy of the rotation at each time.
 
         Returns
         -------
@@ -136,7 +136,7 @@ class Conversions:
         return energy
 
     def power(self) -> Array:
-        """Return the power of the torque, its scalar product with omega, in each row.
+        """Return the power of the torque, its scalar product with omega, at each time.
 
         Returns
         -------
@@ -178,7 +178,7 @@ class Conversions:
         return power
 
     def work(self) -> Array:
-        """Return the work of the torque on the body from time 0 to each row.
+        """Return the work of the torque on the body from 0 to each time.
 
         The work is the change of the kinetic energy, (omega - omega0) . I (omega + omega0)/2, with
         the inertia I and the initial omega0. This formula loses no digits where omega has changed
@@ -242,7 +242,7 @@ class Conversions:
         return self.attitude
 
     def to_pandas(self) -> "DataFrame":
-        """Return the rows as a DataFrame of pandas.
+        """Return the results as a pandas DataFrame.
 
         Returns
         -------
@@ -277,7 +277,7 @@ class Conversions:
         return frame
 
     def to_xarray(self) -> "Dataset":
-        """Return the rows as a Dataset of xarray.
+        """Return the results as an xarray Dataset.
 
         Returns
         -------
@@ -332,8 +332,8 @@ class Conversions:
         Returns
         -------
         matplotlib.axes.Axes
-            The diagram, with legend and units. Its lines connect the rows; with dense output they
-            are smooth curves from `sol.t_min` to `sol.t_max`.
+            The diagram, with legend and units. Its lines connect the results; with dense output
+            they are smooth curves from `sol.t_min` to `sol.t_max`.
 
         Raises
         ------
@@ -365,7 +365,8 @@ class Conversions:
         """Write an animation of a brick that has the moments of the body and moves like it.
 
         The frames are 0.05 s apart. A motion shorter than 2 s is stretched to 2 s, and one longer
-        than 10 s compressed to 10 s. Without dense output, each frame shows the nearest row.
+        than 10 s compressed to 10 s. Without dense output, a frame shows the result at the nearest
+        time.
 
         Parameters
         ----------

@@ -99,8 +99,8 @@ class DenseOutput:
         The times (s) between which the solution can be evaluated.
     states, rates : callable
         `states` is a function of times (s) that returns a row for each time: omega (rad/s), the
-        attitude if requested, and the own states. `rates` takes times and such rows, and returns
-        the time derivatives of the rows.
+        attitude if requested, and the own states. `rates` takes times and these rows, and returns
+        the rows' time derivatives.
     n_own : int
         The number of own states (`Scene.states`).
 

@@ -156,14 +156,14 @@ class Ensemble(BatchResult):
         return replace(self, times=times, **{name: divided(getattr(self, name)) for name in names})
 
     def to_pandas(self) -> "DataFrame":
-        """Return the states as a DataFrame of pandas.
+        """Return the states as a pandas DataFrame.
 
         Returns
         -------
         pandas.DataFrame
             Its index is `body`, from 0, or `body` and `time` (s). Its columns are `omega1` to
-            `omega3` (rad/s), `ended`, and, if present, `q0` to `q3`, `error`, `growth`, and the
-            own states (`Scene.states`) by name. ``attrs["units"]`` has the units.
+            `omega3` (rad/s), `ended`, and, if present, `q0` to `q3`, `error`, `growth`, and the own
+            states (`Scene.states`) by name. ``attrs["units"]`` has the units.
 
         Raises
         ------
@@ -197,7 +197,7 @@ class Ensemble(BatchResult):
         return [(unit, names, array) for unit, names, array in given if array is not None]
 
     def to_xarray(self) -> "Dataset":
-        """Return the states as a Dataset of xarray.
+        """Return the states as an xarray Dataset.
 
         Returns
         -------

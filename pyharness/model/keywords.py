@@ -30,7 +30,7 @@ _HINTS = {
 
 
 def with_hints(function: Callable[P, R]) -> Callable[P, R]:
-    """Return the function; its TypeError for a keyword of SciPy names our keyword."""
+    """Wrap a function, so that its TypeError for a SciPy keyword names our keyword."""
     allowed = [each for each in inspect.signature(function).parameters if each != "self"]
     names = frozenset(allowed)
 

@@ -105,9 +105,9 @@ class Scene:
         The dimensionless coefficients A, B, C of Euler's equations (13-15 of Jacobs 1982).
     torque : TorqueLaw, three numbers, StateTorque, or function of (t, omega[, attitude])
         The torque in N m; for `coefficients`, torque over moment in rad/s2. The default is zero.
-        `pyharness.torques` has functions that return a StateTorque. A function of your own returns
-        the components about the body axes. It is called with symbols, which record its arithmetic;
-        if that fails, pass ``opaque(function)``.
+        `pyharness.torques` has functions that return a StateTorque. Your own function returns the
+        components about the body axes. It is called with symbols, which record its arithmetic; if
+        that fails, pass ``opaque(function)``.
     attitude : four numbers or scipy.spatial.transform.Rotation, optional
         The quaternion from body to space at time 0, scalar first. It is normalised.
     inertia : three rows of three numbers, ChangingInertia, or function of t, optional

@@ -61,7 +61,7 @@ class StateTorque:
     parts : tuple
         The summands, if the torque is a sum.
     is_zero, varies, in_space : bool
-        Always False, True and False; for code that also takes a `TorqueLaw`.
+        Always False, True and False, for code that also takes a `TorqueLaw`.
     """
 
     tape: Tape | None
@@ -302,7 +302,7 @@ def count_arguments(function: Function, where: str, allowed: str) -> int:
 def opaque(function: Any) -> StateTorque:
     """Return a torque that is evaluated by calling a Python function.
 
-    Only SciPy's methods can use it.
+    Only the methods of SciPy accept it.
 
     Parameters
     ----------

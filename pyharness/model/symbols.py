@@ -61,7 +61,7 @@ class Recorder:
     ) -> None:
         """Begin a tape; messages begin with `place`, and suggest `instead`.
 
-        With `has_lines`, messages name the recorded line.
+        With `has_lines`, messages name the line of the function.
         """
         self._has_lines = has_lines
         self.place = place

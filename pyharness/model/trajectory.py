@@ -109,11 +109,11 @@ class Trajectory(Conversions):
         The number of steps, and of evaluations of the right-hand side. For SciPy's methods and the
         method `reference`, `steps` is the number of rows.
     ended : str
-        With all rows: "complete"; "sensitive", if amplified errors may exceed the tolerance; or
-        "unchecked", if SciPy may have stepped over a short change of the torque. Early endings are
-        "overflow"; "stopped", by the Lipschitz test of the Runge-Kutta program; "singular", where
-        the torque is undefined; "sliding", where the torque would jump back and forth without end;
-        and "event", at a terminal event.
+        All rows are present after "complete"; "sensitive", if amplified errors may exceed the
+        tolerance; and "unchecked", if SciPy may have stepped over a short change of the torque.
+        Early endings are "overflow"; "stopped", by the Lipschitz test of the Runge-Kutta program;
+        "singular", where the torque is undefined; "sliding", where the torque would jump back and
+        forth without end; and "event", at a terminal event.
     stop : Stop or None
         Where the Lipschitz test ended the run.
     ier : ndarray of int, shape (n,), or None

@@ -115,7 +115,7 @@ class Solution:
         return found[1], *(errors @ np.abs(found - found[1]))
 
     def changed_values(self, g: EventFunction, times: Array, part: float) -> Array:
-        """Return values, (m, n), at n times (s): unchanged, and with each unknown changed."""
+        """Return values at n times (s), (m, n): unchanged, then with each unknown changed."""
         states = self.states(times)
         n, width = states.shape
         count = 2 * width + 1

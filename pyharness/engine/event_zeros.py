@@ -38,8 +38,8 @@ class ZeroIntervals:
     def roots(self, counts_touches: bool) -> Roots:
         """Return each interval's root, at the end that integration from time 0 reaches first.
 
-        Without `counts_touches`, only intervals without time 0, with opposite signs on both sides,
-        have one.
+        Without `counts_touches`, only intervals that exclude time 0, and have opposite signs on
+        both sides, have a root.
         """
         is_before = self.high < 0.0
         is_first = (self.low <= 0.0) & ~is_before

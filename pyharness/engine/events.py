@@ -213,7 +213,7 @@ def side_events(g: EventFunction, solution: Solution, roots: Roots, side: int) -
 def _repeated(
     g: EventFunction, solution: Solution, times: Array, side: int, period: float
 ) -> Array:
-    """Return event times (s) on one side of 0, repeated periodically beyond the polynomials."""
+    """Return event times (s) on one side of 0, repeated periodically after the polynomials' end."""
     last, end = solution.pieces.edges[-1], solution.sol.t_max
     if side < 0:
         last, end = solution.pieces.edges[0], solution.sol.t_min

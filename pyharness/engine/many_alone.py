@@ -57,7 +57,7 @@ NO_ATTITUDE = "the torque needs the initial attitude; give attitude, or scenes w
 
 
 def is_solved_alone(scene: Scene, arrays: Mapping[str, object]) -> bool:
-    """Return whether the kernel for bodies side by side refuses the scene."""
+    """Return whether the vector kernel refuses the scene; raise InputError for a second torque."""
     named = [name for name, each in arrays.items() if each is not None]
     if isinstance(scene.torque, StateTorque):
         for name in named:

@@ -67,7 +67,7 @@ def repeated(times: Array, period: float, end: float, where: str) -> tuple[Array
 def improved(
     g: EventFunction, times: Array, values: Callable[[EventFunction, Array], Array], period: float
 ) -> Array:
-    """Return the times (s) of events after one Newton step each."""
+    """Return the times (s) of events, each after one step of Newton's method."""
     found, probe = times.copy(), _PROBE * period
     for begin in range(0, len(times), _BLOCK):
         block = times[begin : begin + _BLOCK]

@@ -32,7 +32,7 @@ _SCIPY_DEFAULT = 1e-8
 
 @dataclass(frozen=True)
 class Method:
-    """The properties of a method."""
+    """A method, and the properties that determine its use."""
 
     name: str
     title: str

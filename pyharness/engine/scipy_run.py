@@ -93,8 +93,8 @@ class Run:
     ) -> Any:
         """Return SciPy's result by its method `name`, with times in units of `self.unit` s.
 
-        It has dense output with `with_steps` or without `times`. Raise NoNumberError if Radau's
-        linear algebra refuses a number, or the time is NaN.
+        It has dense output with `with_steps` or without `times`. Raise NoNumberError if the linear
+        algebra of Radau refuses a number, or the time is NaN.
         """
         from scipy.integrate import solve_ivp
 

@@ -111,7 +111,7 @@ def motion_growth(scene: Scene, t_end: float) -> float | None:
 def judge_ending(
     scene: Scene, kind: str, tolerance: float, ending: Any
 ) -> tuple[str, float | None, float | None]:
-    """Return the status, error and error amplification of a prepared solver's call."""
+    """Return the status, error and error amplification of a prepared solver's last call."""
     number, steps, of_kernel, grown, omega0, t_end = ending
     status = ENDS[number]
     if status not in WITH_ALL_ROWS:

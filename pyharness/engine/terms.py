@@ -252,9 +252,6 @@ def wheels(
     >>> from pyharness.torques import wheels
     >>> wheels((1.0, 0.0, 2.0)).at(0.0, (1.0, 3.0, 0.0), (1.0, 0.0, 0.0, 0.0))
     (-6.0, 2.0, 3.0)
-    >>> spinning_up = wheels((1.0, 0.0, 2.0), motor=(0.0, 0.0, 0.5))
-    >>> spinning_up.at(2.0, (1.0, 3.0, 0.0), (1.0, 0.0, 0.0, 0.0))
-    (-9.0, 3.0, 2.5)
     """
     start = np.array(three("[torque] wheels momentum", momentum))
     if callable(motor):

@@ -1,4 +1,4 @@
-"""The grounds for the limits of checks."""
+"""Reasons for the limits of checks."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ MARKS = {
 
 @dataclass(frozen=True)
 class Basis:
-    """The ground for a check's limit: proof, derivation or measurement.
+    """The reason for a check's limit: proof, derivation or measurement.
 
     `mark`, a key of `MARKS`, classifies its weakest part; `source`, in Markdown, names a theorem,
     derivation or command.

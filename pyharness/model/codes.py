@@ -67,7 +67,7 @@ class Series:
 
 
 class Waves:
-    """The limit of angles for our sine in binary128."""
+    """The largest angle for our sine function in binary128."""
 
     ANGLE_BITS = 60  # the angle must be below 2**ANGLE_BITS rad; otherwise its sine is NaN
 

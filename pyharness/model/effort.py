@@ -1,4 +1,4 @@
-"""Limits of the work of a computation, by default some ten seconds, times `effort`."""
+"""Limits of the work of a computation: some ten seconds, times `effort`."""
 
 import math
 from collections.abc import Sequence

@@ -42,8 +42,6 @@ class Listing:
     'custom'
     >>> Listing.original("two-term").label
     'original'
-    >>> Listing.corrected("two-term").label
-    'corrected'
     """
 
     program: str

@@ -290,7 +290,7 @@ class Scene:
 
     @property
     def euler_coefficients(self) -> Triple:
-        """The coefficients A = (I2 - I3)/I1, B, C of Euler's equations (13-15 of the thesis).
+        """The coefficients A = (I2 - I3)/I1, B, C of Euler's equations (13-15 of Jacobs 1982).
 
         Raise InputError for a full inertia matrix or a changing inertia.
         """
@@ -366,7 +366,7 @@ class Scene:
         return first / self.moments[0], second / self.moments[1], third / self.moments[2]
 
     def right_hand_side(self) -> Callable[[float, Sequence[float]], list[float]]:
-        """Return f(t, omega) (rad/s2) of Euler's equations (16-18 of the thesis)."""
+        """Return f(t, omega) (rad/s2) of Euler's equations (16-18 of Jacobs 1982)."""
         a, b, c = self.euler_coefficients
         varies, constant = self.body_torque.varies, self.normalized_torque(0.0)
 
@@ -402,7 +402,7 @@ def _warn_of_impossible(scene: Scene) -> None:
 
 
 def most_steps() -> int:
-    """Return the largest number of steps for half of the memory and 32-bit counters."""
+    """Return the largest number of steps that half of the memory and 32-bit counters allow."""
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     return min(memory // 2 // _BYTES_PER_STEP, _COUNTABLE_STEPS)
 

@@ -31,7 +31,7 @@ def case_numbers() -> list[int]:
 
 
 def case_scene(number: SupportsIndex) -> Scene:
-    """Return the scene of a case of Table 1 of the thesis.
+    """Return the scene of one case in Table 1 of Jacobs 1982.
 
     Parameters
     ----------

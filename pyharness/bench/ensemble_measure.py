@@ -193,7 +193,6 @@ def _ladder(each: EnsembleContender, target: float) -> Iterator[float]:
 def _enough(
     prepare: EnsembleMaker, load: EnsembleLoad, setting: float, threads: int, least: int
 ) -> tuple[EnsembleLoad, Callable[[], Array]]:
-    """Return a part of the load, long enough to time, and its solver."""
     n, before = min(load.n, least), 0.0
     while True:
         part = load.part(slice(0, n))
@@ -236,7 +235,7 @@ class Memory:
 def sizes(seed: str, most: int, progress: Progress = no_progress) -> list[Size]:
     """Return the run times per body (s) for 1, 10, ... up to `most` bodies.
 
-    The closed form runs without torque; "prepared" is the same by a prepared solver.
+    The closed form runs without torque, also as "prepared", by a prepared solver.
     """
     free, pushed = draw(seed, most)
     found: list[Size] = []

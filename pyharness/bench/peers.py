@@ -164,8 +164,8 @@ def _odeint(scene: Scene) -> Maker:
 def heyoka_equations(scene: Scene, formula: Formula | None = None) -> list[tuple[Any, Any]]:
     """Return pairs (unknown, derivative) for omega and, if the scene has one, the attitude.
 
-    A torque that depends on the state is computed by `formula`, or else from its tape. Raise
-    InputError for an unrecorded torque, or one with a table or floor function.
+    A torque that depends on the state is computed by `formula`, or else from its recorded
+    operations. Raise InputError for an unrecorded torque, or one with a table or floor function.
     """
     import heyoka
 
@@ -193,7 +193,7 @@ def heyoka_equations(scene: Scene, formula: Formula | None = None) -> list[tuple
 
 
 def heyoka_functions() -> Functions[Any]:
-    """Return functions that evaluate a tape in heyoka's arithmetic."""
+    """Return functions that evaluate a tape (recorded torque) in heyoka's arithmetic."""
     import heyoka
 
     def table(_: Table, time: Any) -> Any:

@@ -1,1 +1,1 @@
-"""Checks: each compares a value with a limit, and names the command that repeats it."""
+"""Checks, each of which compares a value with a limit and names the command that repeats it."""

@@ -1,11 +1,10 @@
-"""Checks that the Fortran port of each program and its Python twin agree bit for bit.
+"""Checks that the Fortran and Python versions of the thesis's programs agree bit for bit.
 
-A cell is a combination of a program, a case of Table 1 of the thesis, defects and readings
-(interpretations of doubtful cards). Our arithmetic of other number formats, such as the CDC's, is
-checked too.
+A cell is a combination of a program, a case of Table 1, defects and readings (interpretations of
+doubtful cards). Runs in other number formats, such as the CDC's, are checked too.
 
-A deck is compiled from the author's cards and shares no code with port and twin. Its TAPE5 and
-printed page must equal the port's. After an overflow the deck continues, unlike the port, but must
+A deck is compiled from the author's cards and shares no code with our versions. Its TAPE5 and
+printed page must equal our Fortran's. After an overflow the deck continues, unlike ours, but must
 not produce finite omega.
 """
 
@@ -42,7 +41,7 @@ _EVALUATIONS = {"two-term": 3, "four-term": 5, "runge-kutta": 4}
 
 
 def cells(chosen: Selection) -> Iterator[Attempt]:
-    """Yield a check for each listing and case, or for a few if `chosen.thin`."""
+    """Yield a check of each cell, or of a few if `chosen.thin`."""
     divergences = facts("divergences")["divergence"]
     listed = {entry["cell"] for entry in divergences if entry["kind"] == "cross-language"}
     for listing, case in all_cells():
@@ -54,12 +53,12 @@ def cells(chosen: Selection) -> Iterator[Attempt]:
 
 
 def of_cell(suite: str, listing: Listing, case: int) -> Name:
-    """Return the name of a check of the kind `suite`."""
+    """Return the name of a cell's check of the kind `suite`."""
     return Name(suite, listing.program, f"case-{case}", listing_name(listing))
 
 
 def random_programs(chosen: Selection) -> Iterator[Attempt]:
-    """Yield checks of random scenes, listings and stop tests."""
+    """Yield checks of random program versions, with random stop tests, in random scenes."""
     for number in range(chosen.draws):
         yield Attempt(chosen.name_draw(number, "program"), partial(_of_draw, chosen.seed, number))
 
@@ -99,12 +98,11 @@ _VECTORS = Basis(
 
 
 def words(chosen: Selection) -> Iterator[Attempt]:
-    """Yield checks of our arithmetic of machine words, bit for bit.
+    """Yield checks of our simulated machine arithmetic, bit for bit.
 
-    The first check compares CDC instructions with their expected results. Our arithmetic with 53
-    bits must agree with floats; in other arithmetics, compiled programs must agree with their
-    Python versions. By default the original and corrected listings are checked; against floats,
-    also those with a single defect or reading.
+    CDC instructions must give the expected results. Programs in our 53-bit arithmetic must agree
+    with floats; compiled programs in other arithmetics, with their Python versions. By default the
+    original and corrected programs run; against floats, also those with a single defect or reading.
     """
     yield Attempt(Name("words", "vectors"), _vectors)
     for listing, case in all_cells():
@@ -126,7 +124,7 @@ def _vectors(name: Name) -> Check:
 
 
 def _in_word(listing: Listing, case: int, word: str | None, name: Name) -> Check:
-    """Return the check of Python in `word` against Fortran; if None, in binary64 against floats."""
+    """Return the check of Python against Fortran in `word`; if None, of binary64 against floats."""
     scene = case_scene(case)
     ours = in_word.run(scene, listing, WORDS[word or BINARY64])
     if word is None:
@@ -142,7 +140,7 @@ _THIN = ("two-term/case-3/original", "four-term/case-7/corrected", "runge-kutta/
 
 
 def listings(program: str) -> list[Listing]:
-    """Return the original and corrected listings, and each with one defect or reading changed."""
+    """Return the original and corrected program, and each with one defect or reading changed."""
     names = frozenset(switches(program))
     found = [Listing.original(program), Listing.corrected(program)]
     found += [Listing(program, frozenset([name])) for name in switches(program)]

@@ -49,7 +49,7 @@ class Name:
 
     @property
     def id(self) -> str:
-        """Return the id, unique in a run."""
+        """Return the nonempty parts joined by slashes, unique in a run."""
         who = self.subject, self.circumstance
         who = who[::-1] if self.suite in _CIRCUMSTANCE_FIRST else who
         return "/".join(filter(None, (self.suite, *who, self.setting, self.quantity)))
@@ -82,7 +82,7 @@ class Name:
         limit: float | None = None,
         basis: Basis | None = None,
     ) -> "Check":
-        """Return a check decided by the caller; `value` and `limit` are only shown."""
+        """Return a check with the result `passed`; `value` and `limit` are only shown."""
         return Check(self, bool(passed), value, limit, basis, note)
 
     def described(self, value: float | None, note: str = "") -> "Check":
@@ -124,7 +124,7 @@ class Check:
 
     @property
     def mark(self) -> str:
-        """Return how the limit was set: proved, derived, measured, or ""."""
+        """Return how the limit was set: proved, derived, measured, or "" without a limit."""
         return self.basis.mark if self.basis else ""
 
     @property
@@ -202,8 +202,8 @@ def run_suites(
 ) -> Iterator[Check]:
     """Yield the requested checks of all suites (kinds of checks).
 
-    An exception becomes a failed check, except NotBuiltError and, in the suites `of_the_user` (on
-    the user's files), InputError.
+    An exception becomes a failed check, except NotBuiltError and, in the suites `of_the_user`,
+    which read the user's files, InputError.
     """
     for suite, attempts in suites.items():
         raised = (NotBuiltError, InputError) if suite in of_the_user else (NotBuiltError,)
@@ -255,7 +255,7 @@ class Selection:
         return may_hold(id, self.only)
 
     def name_draw(self, number: int, subject: str = "") -> Name:
-        """Return the name of `subject`'s check in draw `number`."""
+        """Return the name of a check of `subject` (program or method) in random scene `number`."""
         draws = f" --draws {self.draws}" if self.draws > DRAWS else ""
         options = f"{draws} --seed {shlex.quote(self.seed)}"
         return Name("random", subject, str(number), options=options)

@@ -1,8 +1,8 @@
 """Amplification of perturbations by the programs, and divergent step sizes.
 
-The measured amplification by a step may differ from that of `theory.amplification` by rounding
-errors only. The step size at which a run diverges is compared with the prediction of linear
-stability. J is the Jacobian of Euler's equations (13-15 of the thesis).
+The amplification by a step, measured in runs, may differ from the matrix of `theory.amplification`
+by rounding errors only. The step size at which a run diverges is compared with the prediction of
+linear stability. J is the Jacobian of Euler's equations (13-15 of the thesis).
 """
 
 import math
@@ -57,7 +57,7 @@ ROUNDED = Basis(
 
 @dataclass(frozen=True)
 class Probe:
-    """A vector or matrix, both measured by running a program and derived from theory."""
+    """A vector or matrix, measured by running a program and derived from theory."""
 
     found: Array  # measured
     derived: Array  # derived, of the same shape
@@ -81,7 +81,7 @@ def steady_scene(coefficients: Triple, omega: Triple, step: float) -> Scene:
 
 
 def jacobian(scene: Scene, omega: Sequence[float]) -> Exact:
-    """Return the exact Jacobian of Euler's equations at `omega`, times the step size."""
+    """Return the exact 3 x 3 Jacobian of Euler's equations at `omega`, times the step size."""
     a, b, c = (Fraction(each) * Fraction(scene.step_size) for each in scene.euler_coefficients)
     x, y, z = map(Fraction, omega)
     return [[Fraction(0), a * z, a * y], [b * z, Fraction(0), b * x], [c * y, c * x, Fraction(0)]]
@@ -93,10 +93,10 @@ def eigenvalues(scene: Scene) -> Array:
 
 
 def first_step(scene: Scene, listing: Listing) -> Probe:
-    """Return the 3 x 3 derivative of the first step at a steady rotation.
+    """Return the 3 x 3 derivative of omega after the first step of a steady rotation.
 
-    A step is a polynomial of omega with known degree, so that differences over enough neighbours
-    give its derivative, except for rounding.
+    It is measured by central differences, exact except for rounding, because a step is a polynomial
+    of omega with known degree.
     """
 
     def stepped(omega: Array) -> Array:
@@ -238,7 +238,7 @@ def _differentiated(
 
 
 def _units(scene: Scene, program: str, sizes: Array, moved: float = 1.0) -> Array:
-    """Return a bound on omega's rounding error in a step (2**-53 rad/s), given bounds on omega."""
+    """Return a bound on omega's rounding error in a step, in 2**-53 rad/s, from bounds on omega."""
     on = Numbers(scene, scene.step_size, sizes=True)
     if program == "runge-kutta":
         # In the original program each stage starts from the previous one, so the terms are larger.
@@ -277,7 +277,7 @@ def divergence(
     """Return measured and predicted step size (s) of divergence, and a bound on their difference.
 
     With the predicted step size, to which the bound is relative, the wobble (omega1, omega2)
-    doubles by linear theory. The body spins for `time` (s) about axis 3, which is stable.
+    doubles within `time` (s) by linear theory. The body spins about axis 3, which is stable.
     """
     found = smallest_divergent(scene, time, runner, smallest)
     a, b, c = scene.euler_coefficients

@@ -1,7 +1,7 @@
 """Checks of every method against results published by others.
 
-The limit is the sum of the number's accuracy, a bound on the method's error, and the effect of
-rounding the problem's numbers to binary64.
+The limit is the sum of the published number's accuracy, a bound on the method's error, and the
+effect of rounding the problem's numbers to binary64.
 """
 
 import math
@@ -122,7 +122,7 @@ def _names(
 
 
 def _without(problem: Problem, name: Name, refusal: str, value: Value) -> Check:
-    """Return a check without result; only a user's problem may be refused."""
+    """Return a check without result, which passes only if a user's problem was refused."""
     given = problem.path is not None and name.subject not in _MAY_NOT_REFUSE
     if refusal:
         return name.judged(given, f"{REFUSED}{refusal}")
@@ -156,7 +156,7 @@ def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -
 
 
 def _turns(scene: Scene, times: Sequence[float]) -> Array:
-    """Return the attitude's change (rad) at each time when the scene's numbers are rounded."""
+    """Return the change of the attitude (rad) at each time by rounding the scene's numbers."""
     # The rounding of quaternions; the changes that follow are added with positive signs.
     turned = np.full(len(times), 8.0 * _HALF_ULP)
     run = method_candidate("auto", METHODS["auto"].finest).rows
@@ -195,7 +195,7 @@ def _side(problem: Problem, values: Sequence[Value], only: Sequence[str]) -> Ite
 def _as_far_as_solved(
     solve: Callable[[Sequence[Value]], list[_Row]], values: Sequence[Value]
 ) -> tuple[list[_Row], str]:
-    """Return the results of the first values that `solve` accepts, and its refusal or ""."""
+    """Return the results of the first values that `solve` accepts, and the first refusal or ""."""
     try:
         return solve(values), ""
     except InputError as refusal:
@@ -278,7 +278,7 @@ def _scale(scene: Scene, omega: Array) -> float:
 
 
 def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
-    """Return, by printed time, omega's change (rad/s) when the scene's numbers are rounded."""
+    """Return, by printed time, the change of omega (rad/s) by rounding the scene's numbers."""
 
     def solve(values: Sequence[Value]) -> list[Array]:
         times = [float(value.time) for value in values]

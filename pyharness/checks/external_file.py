@@ -1,6 +1,6 @@
 """Results published by others, and the files that describe them.
 
-A file has a scene, the results' source, and their printed digits, which set the accuracy.
+A file has a scene, the results' source, and their printed digits, which determine the accuracy.
 """
 
 import math

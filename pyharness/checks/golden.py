@@ -1,8 +1,8 @@
-"""The golden record: recorded trajectories, as exact text.
+"""The golden record of trajectories, as exact text.
 
-Each program or method has a file. An entry describes one trajectory: the command that prints it,
-its ending, a digest of all rows, and the first, tenth and last row and the mean of all rows as
-hexadecimal floats.
+Each program or method has a file. An entry has the command that prints a trajectory, its ending, a
+digest of all rows, and four rows of hexadecimal floats: the first, tenth and last, and the mean of
+all.
 """
 
 import hashlib
@@ -95,7 +95,7 @@ def golden(chosen: Selection) -> Iterator[Attempt]:
 
     Methods with a tolerance must agree within twice the tolerance, because processors and compilers
     round differently. Programs and other methods must agree bit for bit. If another mathematical
-    library computes the torque's sines and cosines, the limit is the amplified rounding error.
+    library computed the torque's sines and cosines, the limit is the amplified rounding error.
     """
     if not chosen.record.is_dir():
         return
@@ -166,7 +166,7 @@ def read_record(folder: Path) -> dict[str, dict[str, Any]]:
 def files_made(folder: Path) -> set[str]:
     """Return the names of the files in `folder` that `verify --update` made.
 
-    If there is such a file, all files with the name of a record are included, even damaged ones.
+    If any was, all files with the name of a record are included, even damaged ones.
     """
     found = set()
     for path in folder.glob("*.toml"):

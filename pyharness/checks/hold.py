@@ -1,7 +1,7 @@
 """Checks of methods against the true solution of a scene, within bounds derived beforehand.
 
 Errors of the thesis's programs are reported without a bound. `auto`, `quick` and methods without a
-tolerance run as prepared solvers, which report a refusal; others raise InputError.
+tolerance run as prepared solvers, which report a refusal; other methods raise InputError.
 """
 
 import math
@@ -100,7 +100,7 @@ def check_all(
     checks: Callable[[Name, float], Iterable[Attempt]] | None = None,
     has_programs: Callable[[Circumstance], bool] = lambda each: True,
 ) -> Iterator[Attempt]:
-    """Yield checks of all methods in a trial's extreme scenes."""
+    """Yield checks of all methods in the extreme scenes of the trial `suite`."""
     for each in EXTREMES[suite]():
         name = named(suite, "", each.name, scene=each.scene)
         yield from (checks or check_methods)(name, each.time)
@@ -120,9 +120,9 @@ def check_methods(
 
     By default, the limit is the sum of the amplified tolerance, the amplified rounding error, and
     the true solution's error. For fixed steps without torque, a bound from the order replaces the
-    tolerance. There is no limit without either, or if the sum leaves fewer than two digits of
-    omega. Without torque, energy and momentum always have a limit, because their errors are not
-    amplified. A refusal fails, unless `refusable` permits it.
+    tolerance. Other runs without tolerance have no limit; nor has a run whose sum leaves fewer than
+    two digits of omega. Without torque, energy and momentum always have a limit, because their
+    errors are not amplified. A refusal fails, unless `refusable` permits it.
     """
     scene = scene_of(name)
     known = cache(partial(truth, scene, time))
@@ -152,8 +152,8 @@ def _steps(scene: Scene, time: float) -> int:
 def refusable(tried: MethodRun, truth: Truth, why: str) -> bool:
     """Return whether a method may refuse a scene.
 
-    `quick` may refuse any scene; `closed-form`, one without a closed form; a series method, one in
-    which the phase of a sine or cosine of the torque exceeds 1e8 rad by the end.
+    `quick` may refuse any scene; `closed-form`, a scene without closed form; a series method, a
+    scene in which the phase of a sine or cosine of the torque exceeds 1e8 rad by the end.
     """
     method, scene = tried.method, tried.scene
     if method == "closed-form":
@@ -164,7 +164,7 @@ def refusable(tried: MethodRun, truth: Truth, why: str) -> bool:
 
 
 def _derived(truth: Truth, tried: MethodRun) -> float | None:
-    """Return the limit of a method's relative error; None without a bound on its steps' errors."""
+    """Return the limit of the relative error, or None if the steps' errors have no bound."""
     made = promised_sum(tried, truth)
     if truth.exact and tried.method in FORMS:
         # A closed form has no steps; only the rounding of A, B and C is added.
@@ -239,7 +239,7 @@ def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:
 
     The error is relative to `largest` (rad/s). Energy and squared momentum are sums of q w**2 over
     the components w, where q is the moment or its square. An error e changes such a sum by at most
-    2 e times the sum of q abs(w), which bounds e from below.
+    2 e times the sum of q abs(w).
     """
     assert scene.moments is not None
     if not np.isfinite(omega).all():
@@ -257,7 +257,7 @@ def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:
 
 
 def describe_programs(name: Name) -> Iterator[Attempt]:
-    """Yield reports of the programs' largest relative errors."""
+    """Yield reports, without limits, of the programs' largest relative errors."""
     scene = scene_of(name)
     every = max(1, scene.steps // _ROWS)
     rows = slice(every - 1, None, every)

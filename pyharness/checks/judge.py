@@ -93,7 +93,7 @@ def by_end(
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """The true solution of a scene at some times, and its conditioning until the last time."""
+    """The true solution of a scene at some times, and its sensitivity until the last time."""
 
     time: Array  # shape (n,), s
     omega: Array  # shape (n, 3), rad/s
@@ -142,7 +142,7 @@ class Truth:
 
 
 def unknown_flow(largest: float) -> Conditioning:
-    """Return a conditioning of infinite amplification, for closed forms."""
+    """Return a conditioning of infinite amplification, for a closed form's `Truth`."""
     return Conditioning(math.inf, MOST, MOST, MOST, largest)
 
 
@@ -175,9 +175,10 @@ class Policy:
 
 
 def allowed(truth: Truth, made: float, growth: float, steps: float = 0.0) -> float:
-    """Return the limit: the steps' error `made` times `growth`, rounding, and the truth's error.
+    """Return an error's limit: errors of the steps, of rounding and of the true solution, added.
 
-    `steps` is the number of uncompensated roundings of omega.
+    `made`, the steps' error, is multiplied by `growth`; `steps` counts uncompensated roundings of
+    omega.
     """
     if truth.attitude is not None:
         return truth.flow.angle_limit(made * growth, truth.end) + truth.angle_error

@@ -1,7 +1,7 @@
 """Checks of methods against the reference in the cases of Table 1 of the thesis.
 
-The limit of an error is the tolerance. Errors of omega are relative to the largest omega; of the
-attitude, they are angles (rad).
+The limit of an error is the tolerance. Errors of omega are relative to the largest omega; those of
+the attitude are angles (rad).
 
 An order is the power of the step size to which errors are proportional. The programs' omega is
 compared with `solve_ivp`; their velocity, and fixed-step methods, with the reference.
@@ -168,7 +168,7 @@ _FEWEST, _MOST = 16, 4096
 
 
 def orders(chosen: Selection) -> Iterator[Attempt]:
-    """Yield checks of orders; the value is the theoretical minus the measured one."""
+    """Yield checks of orders; the value is the theoretical minus the measured order."""
     for case in cases(chosen, (5,)):
         scene = case_scene(case)
         known = cache(partial(reference, scene, scene.times()))
@@ -230,7 +230,7 @@ def order_if_seen(scene: Scene, truth: Callable[[], Reference], name: Name) -> C
 
 
 def judged_order(name: Name, found: Order) -> Check:
-    """Return the check that an order is at most .2 too low, or all errors are rounding."""
+    """Return the check that an order is at most 0.2 too low, or all errors are rounding errors."""
     missing = None if found.value is None else found.due - found.value
     passed = found.state in ("as due", "rounding") and (missing or 0.0) <= _ORDER_SLACK
     return name.judged(passed, str(found), missing, _ORDER_SLACK, _SLACK)

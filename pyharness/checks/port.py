@@ -1,7 +1,7 @@
 """Checks of a port of the programs, in any language, against our Python versions.
 
-Results must agree bit for bit in random scenes and in all cells (program, case, defects and
-readings). Protocol: `docs/how-to/ports.md`.
+Results must agree bit for bit in random scenes and in all cells (combinations of program, case,
+defects and readings). Protocol: `docs/how-to/ports.md`.
 """
 
 import math
@@ -68,7 +68,7 @@ class PortCheck(Check):
 
 
 def port_cells(programs: Sequence[str], cases: Sequence[int], cells: Sequence[str]) -> list[Cell]:
-    """Return the runs whose names begin with an element of `cells`; all if it is empty."""
+    """Return the runs of `programs` in `cases`; `cells`, unless empty, has beginnings of names."""
     found = []
     for listing, case in all_cells():
         name, of = cell_name(listing, case), of_cell("port", listing, case)
@@ -146,7 +146,7 @@ def compared(
 
 
 def differences(twin: Trajectory, answer: Answer) -> list[str]:
-    """Return descriptions of the answer's differences from `twin`."""
+    """Return descriptions of the answer's differences from `twin`, the Python version's run."""
     wanted, given = _rows(twin), answer.rows
     found = []
     if difference := _difference(wanted, given):
@@ -162,7 +162,6 @@ def differences(twin: Trajectory, answer: Answer) -> list[str]:
 
 
 def _difference(wanted: Array, given: Array) -> dict[str, Any] | None:
-    """Return the values in the first step that differs, or None."""
     for step, (due, row) in enumerate(zip(wanted, given, strict=False), 1):
         if ulps(due, row):
             values = []
@@ -198,7 +197,7 @@ _TIMES = (
 
 
 def port_report(command: str, checks: Sequence[PortCheck], asked: int, seed: str) -> Report:
-    """Return the report of a port's checks, at least one."""
+    """Return the report of a port's checks, at least one, of `asked` requested runs."""
     title = [f"{command}: against the twins, bit for bit"]
     title += [f"seed of the random scenes: {seed}"] if seed else []
     if checks[-1].value is None:

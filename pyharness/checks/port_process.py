@@ -29,7 +29,7 @@ class PortError(Exception):
 
 
 def split_command(command: str, option: str = "--port") -> list[str]:
-    """Return program and arguments, split as by a shell."""
+    """Return program and arguments, split as by a shell; raise InputError naming `option`."""
     try:
         words = shlex.split(command)
     except ValueError as error:
@@ -47,7 +47,7 @@ def refuse_other(
 ) -> None:
     """Raise InputError that advises the option `instead` if `command` answers its requests.
 
-    `line` is such a request, and `read` raises PortError for an invalid answer.
+    `line` is one of these requests; `read` raises PortError for an invalid answer.
     """
     with contextlib.suppress(PortError), PortProcess(command, _PROBE, option) as process:
         read(process.ask(line))
@@ -122,7 +122,7 @@ class PortProcess:
     def ask(self, line: bytes) -> bytes:
         """Send a request and return the answer, both without line feed.
 
-        Raise PortError if it is late or longer than one line.
+        Raise PortError if the answer is late or longer than one line.
         """
         end = time.monotonic() + self._patience
         rest = line + b"\n"

@@ -2,7 +2,7 @@
 
 The true omega is from `integer_series`, the true attitude from `reference`. An entry point is
 `solve` or a prepared solver, with one method. The tolerance limits the error of the attitude (rad),
-or of omega relative to its largest until the last time.
+or of omega relative to its largest component until the last time.
 
 Torques that depend on omega or attitude are sums of recorded functions or ready-made terms. The
 reference's series for them (`truth.tape_series`) shares no code with the methods.
@@ -90,9 +90,9 @@ def truth_of(drawn: Draw) -> Truth:
 def may_refuse(tried: MethodRun, truth: Truth, why: str) -> bool:
     """Return whether a method may refuse its run `tried` with the message `why`.
 
-    `auto` never may, `quick` always, a closed form only near the limits of binary64. Others may
-    refuse the kinds in `_MAY_REFUSE`, or an error amplification above 10; SciPy's methods also a
-    tolerance finer than they meet, or one below 1e-9 that takes too much work.
+    `auto` never may, `quick` always, a closed form only near the limits of binary64. Other methods
+    may refuse scenes of `_MAY_REFUSE`, or with an error amplification above 10. SciPy's methods may
+    also refuse tolerances finer than they meet, or below 1e-9 if the work is too much.
     """
     method, kind = tried.method, tried.scene.name
     if method == "auto":
@@ -132,7 +132,7 @@ TORQUE_POLICY = replace(POLICY, may_refuse=_may_refuse_torque)
 
 
 def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
-    """Yield checks of omega by every entry point; scenes of `_MAY_REFUSE` may lack a solution."""
+    """Yield checks of omega by every entry point; `_MAY_REFUSE` scenes may lack a true solution."""
     for number in range(chosen.draws):
         if number // 2 % _EVERY or not chosen.may_ask(f"random/{number}"):
             continue
@@ -155,7 +155,7 @@ def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
 
 
 def random_attitudes(chosen: Selection) -> Iterator[Attempt]:
-    """Yield checks of attitudes, in scenes whose true attitude is known."""
+    """Yield checks of attitudes in scenes whose true attitude is known."""
     for number in range(0, chosen.draws, _EVERY_ATTITUDE):
         if not chosen.may_ask(f"random/{number}"):
             continue

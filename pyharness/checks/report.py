@@ -1,4 +1,4 @@
-"""The report of checks: text, Markdown page, JSON record, and JUnit cases."""
+"""The report of checks, as text, Markdown page, JSON record and JUnit cases."""
 
 import math
 from collections import Counter
@@ -50,7 +50,7 @@ def summary_page(
     depth: int = 1,
     more: Sequence[Section] = (),
 ) -> list[Section]:
-    """Return a Markdown page: verdict, table by the first `depth` parts of ids, failures."""
+    """Return a Markdown page: verdict, table by the first `depth` parts of ids, and failures."""
     failed = [check for check in checks if not check.passed]
     lines: list[str] = []
     for check in failed[:_MOST_ON_PAGE]:
@@ -78,7 +78,7 @@ def _failure(check: Check) -> str:
 
 
 def marks(checks: Sequence[Check]) -> str:
-    """Return how limits were set, as in ``proved, derived``, or a dash."""
+    """Return how limits were set, as in ``proved, derived``, or a dash without limits."""
     found = {check.mark for check in checks}
     return ", ".join(mark for mark in MARKS if mark in found) or "-"
 
@@ -115,7 +115,7 @@ def _groups(checks: Sequence[Check], depth: int) -> Table:
 
 
 def listed_singly(checks: Sequence[Check]) -> list[str]:
-    """Return lines on failed checks, or all if few, with commands to repeat them."""
+    """Return lines on failed checks, or on all if few, with commands to repeat the failed."""
     failed = [check for check in checks if not check.passed]
     lines = []
     for check in failed[:_MOST_FAILURES]:
@@ -143,9 +143,9 @@ _SAMPLES = (
 
 
 def samples(checks: Sequence[Check], rounding: float) -> Section:
-    """Return a table of the worst ratios of error to tolerance.
+    """Return a table of the largest ratios of error to tolerance.
 
-    `rounding` times the error amplification is first subtracted from the error. Rows are entry
+    From the error, `rounding` times the error amplification is first subtracted. Rows are entry
     points and tolerances, columns amplifications.
     """
     cells: dict[tuple[str, str], list[list[float]]] = {}

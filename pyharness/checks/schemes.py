@@ -78,7 +78,6 @@ def _is_whole(scene: Scene, run: Trajectory) -> bool:
 
 
 def _rows(run: Trajectory) -> Array:
-    """Return omega (rad/s) and velocity (m/s) after every step, shape (n, 6)."""
     assert run.velocity is not None
     return np.hstack([run.omega, run.velocity])
 
@@ -146,7 +145,7 @@ _QUOTIENT = Basis(
 
 @dataclass(frozen=True, eq=False)
 class _Quotients:
-    """The quotients that the program compares with its stop constant, in its order."""
+    """The quotients that the program compares with its stop constant, in the program's order."""
 
     values: Array  # shape (n, m) for n steps, 1/s
     rounding: Array  # shape (n, m): bound on the difference of two computations, 1/s

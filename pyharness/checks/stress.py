@@ -50,7 +50,7 @@ def stress(only: Sequence[str] = (), trials: Mapping[str, Trial] | None = None) 
 
 
 def worst(checks: Iterable[Check]) -> dict[str, Check]:
-    """Return, by ``trial/method``, the worst check with a limit and a scene."""
+    """Return, for each ``trial/method``, the worst check with a limit and a scene."""
     found: dict[str, Check] = {}
     for check in checks:
         if check.name.scene is None or check.limit is None:

@@ -85,8 +85,6 @@ def _size(check: Check) -> float:
 
 
 class _Mark(NamedTuple):
-    """A plotted check, with its position and style."""
-
     method: str
     kind: str  # the circumstance up to its first number
     circumstance: str
@@ -113,7 +111,7 @@ def _mark(check: Check) -> _Mark:
 
 
 def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
-    """Return a trial's picture: values and limits, in a panel for each method."""
+    """Return a trial's picture of values and limits, with a panel for each method."""
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
@@ -273,7 +271,7 @@ _LEAST = 1e-13
 
 
 def regions_picture(found: "Regions") -> Picture:
-    """Return a picture of the stability regions in z, step size times eigenvalue."""
+    """Return a picture of the stability regions in the plane of z, step size times eigenvalue."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.0, 5.8), dpi=100, layout="constrained")

@@ -1,7 +1,4 @@
-"""Tolerances at which the checks run each method.
-
-A limit of right-hand sides determines which tolerances are affordable.
-"""
+"""Tolerances at which the checks run each method, within a limit of right-hand sides."""
 
 import math
 
@@ -49,7 +46,7 @@ def finest(name: str, scene: Scene, time: float) -> float:
 
 
 def finest_and_middling(name: str, scene: Scene, time: float) -> list[float]:
-    """Return a method's finest tolerance, and 1e-6 if coarser; for slow methods only 1e-6."""
+    """Return a method's finest tolerance, and 1e-6 if coarser; for slow methods 1e-6 only."""
     if name in _ONLY_MIDDLING:
         return [MIDDLING]
     least = finest(name, scene, time)

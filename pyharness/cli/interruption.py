@@ -110,9 +110,8 @@ def report() -> int:
 def leave(code: int) -> None:
     """Remove temporary files and end the process with exit status `code`.
 
-    Python's own exit would wait for threads and free all memory, and on Ctrl-C ignore the interrupt
-    or end by the signal. If `code` is 130, child processes are killed, and cleanup takes at most
-    two seconds.
+    Python's own exit would wait for threads, and might ignore Ctrl-C or end by its signal. If
+    `code` is 130, child processes are killed, and cleanup takes at most two seconds.
     """
     if code == CODE:
         # Messages of ending threads and finalizers would follow the report of the interrupt.

@@ -400,7 +400,7 @@ def _is_same(one: str, other: str) -> bool:
 
 
 def without_out(options: argparse.Namespace) -> argparse.Namespace:
-    """Return the options without --out, where it names a folder."""
+    """Return the options without --out, for verbs where it names a folder."""
     return argparse.Namespace(**{**vars(options), "out": None})
 
 

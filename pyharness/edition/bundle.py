@@ -33,10 +33,7 @@ def bundle(entry: Path) -> str:
 def _add(
     path: Path, importing: tuple[Path, ...], exports: dict[Path, list[str]], parts: list[str]
 ) -> None:
-    """Append a JavaScript module to `parts` and `exports`, after its imports.
-
-    `importing` are the modules that led to it.
-    """
+    """Append a JavaScript module, which `importing` led to, to `parts` after its imports."""
     text = path.read_text(encoding="utf-8")
 
     def declare(found: re.Match[str]) -> str:

@@ -35,7 +35,7 @@ _ORDER = (
 class Run(NamedTuple):
     """Successive characters of a card or its line in the scan.
 
-    If card and scan differ here, `entry` is the note's.
+    If card and scan differ here, `entry` identifies the note on it.
     """
 
     text: str
@@ -202,7 +202,6 @@ def _phantoms(program: str) -> dict[int, list[Run]]:
 
 
 def _scan(card: Card) -> list[Run] | None:
-    """Return the scanned line as runs (number, dash, text), or None if the scan lacks the card."""
     if card.lost:
         return None
     number = Run(*card.printed) if card.printed else Run(str(card.number))

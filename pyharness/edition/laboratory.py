@@ -124,7 +124,6 @@ def _described(scene: Scene) -> list[str]:
 
 
 def _first() -> dict[str, Any]:
-    """Return the run of `DEFAULTS`; errors are in rad/s."""
     scene = case_scene(DEFAULTS["case"])
     program = DEFAULTS["program"]
     run = run_program(scene, Listing.original(program), "python")

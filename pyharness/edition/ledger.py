@@ -68,7 +68,7 @@ def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
 
 
 def verdicts(judgement: Judgement) -> list[tuple[str, str]]:
-    """Return one or two verdicts, each after a text on the programs."""
+    """Return one or two pairs of a text on the programs and the verdict for them."""
     original, corrected = judgement.original.verdict, judgement.corrected.verdict
     if judgement.claim["kind"] == "result":
         return [("as printed", original), ("corrected", corrected)]

@@ -105,7 +105,6 @@ def _likeness(one: Card, other: Card) -> float:
 
 
 def _compared(row: dict[str, Card]) -> AlignedRow:
-    """Return a row with marks where any two cards differ."""
     marks: dict[str, dict[int, str]] = {program: {} for program in row}
     parts = {program: _split_card(card) for program, card in row.items()}
     for one, other in combinations(row, 2):

@@ -85,7 +85,8 @@ def scan_report(
 ) -> Report:
     """Return the report on whether our text explains every line of a scan.
 
-    `faults` are unexplained lines, `undeclared` disagreements between cards and apparatus.
+    `faults` are unexplained lines, `undeclared` are disagreements between cards and apparatus,
+    `lines` counts the lines, and `digest` is the SHA-256 of the scan.
     """
     cards = [card for program in PROGRAMS for card in deck(program).cards.values()]
     deviating = sum(bool(each.differences or each.lost) for each in cards)

@@ -151,7 +151,7 @@ def run(scene: Scene, member: Member) -> Trajectory:
 def integrate(scene: Scene, members: Sequence[Member]) -> Array:
     """Return omega (rad/s) by each method, shape (members, steps, 3).
 
-    They are not finite after an overflow.
+    Values after an overflow are not finite.
     """
     # The members are sorted, so that those that need another correction are contiguous in memory.
     order = sorted(range(len(members)), key=lambda i: -members[i].corrections)
@@ -233,8 +233,9 @@ def _torque(scene: Scene, times: Array) -> Array:
 class OrderFinding:
     """A method's derived and measured order of convergence in a scene, and its error.
 
-    `measured` is None if too many errors are too large or only rounding, and `settled` if the last
-    two measurements differ by at most 0.1. `error` (rad/s) is omega's with the scene's step size.
+    `measured` is None if too many errors are too large or only rounding. `settled` means that the
+    last two measurements differ by at most 0.1. `error` (rad/s) is omega's with the scene's step
+    size.
     """
 
     member: Member

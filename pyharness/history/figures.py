@@ -292,7 +292,6 @@ def _draw_panel(
 
 
 def _frame(finding: FigureFinding, row: int) -> tuple[float, float]:
-    """Return bottom and top (rad/s) of a component's plot."""
     # A curve leaves the plot where it is outside the reference's range by more than max |omega|.
     truth = finding.reference.omega
     least, largest = float(truth[:, row].min()), float(truth[:, row].max())

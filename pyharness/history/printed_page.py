@@ -35,7 +35,7 @@ class Difference:
 
 @dataclass(frozen=True)
 class Fit:
-    """The comparison of a page from another machine with one of our pages.
+    """The comparison of another machine's page with one of our pages.
 
     `listing` is ``original``, ``corrected`` or ``original with`` a reading; `word` is the
     arithmetic; `fields` counts the compared numbers.

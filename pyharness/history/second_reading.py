@@ -1,8 +1,8 @@
 """An estimate of remaining transcription errors, by capture and recapture.
 
-The first reading of the scan is our text of the cards, the second is of a random sample
-(`data/cards/second-reading.toml`). The numbers of errors of the scanned text that each corrects,
-and that both correct, give an estimate of the others.
+The first reading of the scan is our text of the cards; the second is of a random sample of cards
+(`data/cards/second-reading.toml`). The numbers of errors of the scanned text that each reading
+corrects, and that both correct, give an estimate of the remaining errors.
 """
 
 from collections.abc import Iterator
@@ -99,7 +99,7 @@ def misread_places(scan: str, reading: str) -> dict[int, str]:
 def recaptures() -> Table:
     """Return the table of estimates, with characters and with whole cards as units.
 
-    Only cards are independent, because a machine repeats its misreading of a letter.
+    Only cards are independent units, because a machine repeats its misreading of a letter.
     """
     places: tuple[set[tuple[str, int]], ...] = (set(), set())
     for each in read_cards():

@@ -58,7 +58,7 @@ class Revision(NamedTuple):
     """A change of the edition's text (cards and apparatus).
 
     `digest` identifies the text after the change, and is empty before the cards were data files.
-    `cards` has the changed ones by program, as in ``750-770, 800``.
+    `cards` has the changed cards by program, as in ``750-770, 800``.
     """
 
     date: str

@@ -32,7 +32,7 @@ class Field:
     """A number of a scene or solver that an axis may vary.
 
     `allowed` describes what `takes` accepts. If `looped`, all scenes of a batch (one call) share
-    the value; the thesis's programs may vary step size and Lipschitz constant. If `whole`, values
+    the value, except step size and Lipschitz constant of the thesis's programs. If `whole`, values
     are rounded to integers.
     """
 

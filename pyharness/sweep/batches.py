@@ -32,7 +32,7 @@ Columns = dict[str, Array]
 def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
     """Return an array for each reduction (stored quantity) of a chunk.
 
-    Its shape is that of the chunk, with one more dimension for several components.
+    It has the shape of the chunk, with one more dimension for several components.
     """
     box = sweep.box(chunk)
     shape = tuple(part.stop - part.start for part in box)
@@ -68,8 +68,8 @@ def listing_of(program: str, listing: str, reading: str) -> Listing:
     """Return the version of a program that `listing` and `reading` describe.
 
     `listing` is ``original``, ``corrected``, or ``fix:`` or ``keep:`` with the only defects to
-    correct or to keep. `reading` is ``adopted`` (our readings of doubtful cards), or the other
-    readings to use. Names are joined by ``+``.
+    correct or to keep. `reading` is ``adopted`` (our readings of doubtful cards), or the
+    alternatives to use. Names are joined by ``+``.
     """
     how, _, names = listing.partition(":")
     readings = [] if reading == "adopted" else reading.split("+")

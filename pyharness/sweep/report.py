@@ -158,8 +158,8 @@ def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
 def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
     """Return the picture of a stored quantity over dimensions with several numbers.
 
-    It is a map over the last two dimensions that are not random; over only one, a line, or dots at
-    listed values; over a random one, dots.
+    With two or more that are not random, it is a map over the last two; with one, a line, or dots
+    at listed values; with random ones only, dots.
     """
     from matplotlib.figure import Figure
 
@@ -205,7 +205,6 @@ def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
 def _panels(
     store: Store, asked: ReductionSpec, axis_of: dict[str, Axis], places: dict[str, Array]
 ) -> list[tuple[str, Array]]:
-    """Return title and values of each panel."""
     choices: dict[str, list[int]] = {}
     room = _MOST_PANELS
     for dimension in (d for d in store.sweep.dimensions if d not in places):

@@ -130,7 +130,7 @@ def seconds_per_scene(sweep: Sweep) -> float:
 def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
     """Return sample indices, changed so that many scenes share a batch (one call).
 
-    Along dimensions in which a batch has equal indices, five distinct ones remain, or more if a
+    Along dimensions in which a batch has equal indices, five distinct indices remain, or more if a
     chunk has small batches, so that batches are about as large as in a chunk.
     """
     shared = {axis.dimension for axis in sweep.axes if axis.field in looped_fields(sweep)}
@@ -170,7 +170,7 @@ class Outcome:
 def check_size(sweep: Sweep, path: str, workers: int, missing: int) -> tuple[int, int]:
     """Return the bytes that missing chunks need on disk, and all workers in memory.
 
-    Raises InputError if they exceed what is available.
+    Raise InputError if they exceed what is available.
     """
     disk = os.statvfs(Path(path).absolute().parent)
     scenes = math.prod(sweep.chunk_shape)

@@ -176,7 +176,7 @@ def label(sweep: Sweep) -> Label:
 def labels(folder: Path) -> list[Label]:
     """Return the identities that can be read in a store's metadata and in their checksums.
 
-    An undamaged store has two equal ones.
+    An undamaged store has two equal identities.
     """
     found = []
     with contextlib.suppress(
@@ -207,7 +207,7 @@ def metadata_files(sweep: Sweep) -> list[str]:
 def filled(sweep: Sweep, folder: Path) -> Iterator[Path]:
     """Make an empty store beside `folder`, and yield its temporary path.
 
-    Files that the caller has not moved are removed at the end.
+    Files left there are removed at the end.
     """
     import zarr
 

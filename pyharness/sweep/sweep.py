@@ -137,7 +137,7 @@ def value_columns(sweep: Sweep, where: list[Indices]) -> dict[str, NDArray[Any]]
 def groups(columns: list[NDArray[Any]], n: int) -> list[tuple[Indices, tuple[Any, ...]]]:
     """Return the groups of indices 0 to n - 1 with equal values in all columns.
 
-    Each has its ascending indices and its values.
+    A group is a pair of ascending indices and values.
     """
     if not columns:
         return [(np.arange(n), ())]

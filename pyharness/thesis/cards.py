@@ -26,7 +26,7 @@ PORT = "fortran/original"
 class Difference(NamedTuple):
     """A passage of a card, without blanks, that differs between our text and the scan.
 
-    `entry` in the apparatus explains it.
+    `entry` names its explanation in the apparatus.
     """
 
     ours: str
@@ -151,7 +151,7 @@ class Deck:
 
     @cached_property
     def executable(self) -> frozenset[int]:
-        """Return the numbers of cards with executable statements, no specifications or comments."""
+        """Return the numbers of cards with executable statements."""
         found, computes = set(), False
         for card in self.cards.values():
             if not card.continues:
@@ -293,8 +293,8 @@ def port_file(program: str) -> str:
 def switch_at(place: Place) -> tuple[str, bool] | None:
     """Return the switch on which a Fortran line depends, and whether the line needs it active.
 
-    A switch is the flag of a defect or reading, tested by the innermost ``if`` around the line that
-    tests only one.
+    A switch is the flag of a defect or reading. The innermost ``if`` around the line that tests
+    only a switch decides.
     """
     lines = _lines(shipped(PORT) / place.file)
     depth = _indentation(lines[place.line - 1])

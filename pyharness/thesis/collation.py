@@ -23,8 +23,8 @@ _OF_THE_SCAN = ("misreading", "missing text", "normalization")
 def expected_lines() -> list[tuple[str, str]]:
     """Return the expected lines of the scanned appendix: text without blanks, and name.
 
-    The name is that of a card, such as ``two-term:1660``; ``furniture`` for a heading of the
-    editor; or ``phantom`` for text that belongs to no card at this place.
+    The name is a card's, such as ``two-term:1660``; ``furniture`` for a heading of the editor; or
+    ``phantom`` for text that belongs to no card at this place.
     """
     found = []
     for page in facts("cards/scan")["page"]:
@@ -43,7 +43,7 @@ def expected_lines() -> list[tuple[str, str]]:
 def witness_lines() -> dict[str, str]:
     """Return each card's line in the scan, by the card's name.
 
-    Blanks are from `data/cards/blanks.toml`. Callers must not change it.
+    Blanks are from `data/cards/blanks.toml`. Callers must not change the dictionary.
     """
     blanks = facts("cards/blanks")
     found = {}
@@ -166,8 +166,8 @@ def faults(found: list[Row]) -> list[str]:
     """Return a sentence for each mistake or unexplained disagreement in the rows `found`.
 
     Each entry in a row must be in the apparatus, and name a card of the row. Each card except
-    comments must be in one row, each apparatus entry with cards in any, unless it concerns only the
-    scan.
+    comments must be in one row. Each apparatus entry with cards must be in a row, unless it
+    concerns only the scan.
     """
     told = [f"{row.what}: no entry or reason" for row in found if not row.is_explained]
     known = {entry["id"]: entry for entry in facts("apparatus")["entry"]}

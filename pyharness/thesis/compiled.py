@@ -22,7 +22,7 @@ def run(
 ) -> Trajectory:
     """Run the compiled program of a listing on a scene, and return its trajectory.
 
-    The arguments are `programs.run_program`'s, unchecked.
+    The arguments are as in `programs.run_program`, but not checked.
     """
     given = program_arguments(scene, listing, lipschitz, may_stop, velocity)
     rows, ier, n_rows, *ended = extension().run_program(*given)
@@ -36,9 +36,9 @@ def read_rows(
 ) -> Trajectory:  # fmt: skip
     """Return the output of a compiled program as a trajectory.
 
-    `rows` has shape (n, 8): true time and TIME (s), omega (rad/s) and velocity (m/s). The first n
-    values of `ier` are used. `stop_variable` is the number in `STOP_VARIABLES`, from 1, of the
-    variable that failed the stop test, or 0; `stop_quotient` (1/s) is its quotient.
+    `rows` has shape (n, 8): true time and TIME (s), omega (rad/s) and velocity (m/s).
+    `stop_variable` is the number in `STOP_VARIABLES`, from 1, of the variable that failed the stop
+    test, or 0; `stop_quotient` (1/s) is its quotient.
     """
     n = len(rows)
     return trajectory_of(

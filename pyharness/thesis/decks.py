@@ -1,4 +1,4 @@
-"""Cards as fixed-form FORTRAN programs (decks), their compilation and their runs.
+"""The cards as fixed-form FORTRAN programs (decks), their compilation and their runs.
 
 A compiled deck checks the ports independently, with the author's statements and a separate LEQT1F
 (`data/cards/leqt1f.f`).
@@ -55,7 +55,7 @@ def deck_text(
 
     The published cards have the data of Case 2 with 300 steps (collocation) or Case 5 with 100
     steps (Runge-Kutta); a `scene` of Table 1 replaces these data. The `dialect` "1982" adds
-    nothing, "ftn" cards for the torque of Case 7; "gfortran" also adapts cards to a modern
+    nothing; "ftn" adds cards for the torque of Case 7; "gfortran" also adapts cards to a modern
     compiler. Column 73 marks added and adapted cards. `terms`, 3 or 5, requests the deck of
     `model_cards`.
     """
@@ -157,7 +157,7 @@ def _model(terms: int, listing: Listing, scene: Scene | None) -> dict[int, str]:
 def model_cards(terms: int) -> dict[int, str]:
     """Return the cards of a collocation deck with `terms` terms, by their new numbers.
 
-    The deck is a conjecture: section V.2 of the thesis uses three and five terms in Case 6, but
+    The deck is our conjecture: section V.2 of the thesis uses three and five terms in Case 6, but
     prints no cards. Collocation points are at k/(terms + 1) of the step.
     """
     text = [card.text for card in deck("four-term").cards.values()]
@@ -233,7 +233,7 @@ def _case_cards(program: str, scene: Scene) -> dict[int, str]:
 
 
 def solver_cards() -> int:
-    """Return the number of our LEQT1F's cards, without comments."""
+    """Return the number of cards of our LEQT1F, without comments."""
     return sum(not line.startswith("C") for line in _SOLVER.read_text().splitlines())
 
 
@@ -259,7 +259,7 @@ def run_deck(text: str, folder: Path | None = None) -> Run:
 
 
 def solver_object(folder: Path) -> Path:
-    """Return the path of the solver in `folder`, compiled if missing."""
+    """Return the path of the compiled LEQT1F in `folder`, compiled if missing."""
     found = folder / "leqt1f.o"
     if not found.exists():
         _command([COMPILER, *FLAGS, "-c", str(_SOLVER), "-o", str(found)], folder)

@@ -45,7 +45,7 @@ def initial_torque(scene: Scene) -> Vector | None:
 
 
 def card_torque(scene: Scene) -> Vector | None:
-    """Return the initial torque (N m) of a case in Table 1, or None, as where no torque varies."""
+    """Return the initial torque (N m) of a case in Table 1 with a varying torque, else None."""
     if not scene.law.varies:
         return None
     given = {each["case"]: each["torque"] for each in facts("printer")["initial_torque"]}
@@ -82,7 +82,7 @@ class Record:
     ) -> Trajectory:
         """Return the trajectory of all rows, with the solver's IER if `prints_ier`.
 
-        An overflow has no row, but counts as evaluations.
+        A step that overflows has no row, but its evaluations count.
         """
         given = np.array(self._rows).reshape(-1, 8)
         rows = given.astype(np.float64)

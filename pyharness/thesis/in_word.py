@@ -35,7 +35,7 @@ _BITS = {24: 32, 53: 64, 113: 128}
 def run(
     scene: Scene, listing: Listing, word: Word, lipschitz: float = 500.0, may_stop: bool = True
 ) -> Trajectory:
-    """Run the Python port of a listing in the arithmetic `word`; no argument is checked.
+    """Run the Python port of a listing in the arithmetic `word`, without checks of the arguments.
 
     The results are rounded to floats; `exact` has them unrounded.
     """
@@ -71,7 +71,7 @@ def scene_in(scene: Scene, word: Word) -> Scene:
 def run_compiled(
     scene: Scene, listing: Listing, word: Word, lipschitz: float = 500.0, may_stop: bool = True
 ) -> Trajectory:
-    """Run a listing's compiled program in the arithmetic `word`; the result is that of `run`.
+    """Run a listing's compiled program in the arithmetic `word`, with the same result as `run`.
 
     Raise InputError if the compiler lacks this arithmetic, or an angle in the torque is too large
     for its sine.
@@ -136,7 +136,7 @@ def n_bytes(word: Word) -> int:
 def to_bytes(numbers: Iterable[Any], word: Word, *shape: int) -> Bytes:
     """Return numbers of the format `word` as bytes, in an array of shape (n_bytes(word), *shape).
 
-    Both are in column-major order.
+    Numbers and array are in column-major order.
     """
     size = n_bytes(word)
     written = b"".join(_pattern(each).to_bytes(size, sys.byteorder) for each in numbers)

@@ -249,7 +249,6 @@ def _run(
 
 
 def _pieces(n: int, steps: int, threads: int) -> Iterator[slice]:
-    """Yield the range of bodies of each kernel call."""
     size = n
     if threads > 1:
         fair = -(-n // (_PIECES * threads))

@@ -28,7 +28,7 @@ ALIKE = dict.fromkeys(_OPERATIONS, 1)
 
 
 class Count(NamedTuple):
-    """The number, or time, of additions, subtractions, multiplications and divisions in a step.
+    """The number, or total time, of arithmetic operations in a step.
 
     `written` counts every operation on the cards; `once` omits repetitions.
     """

@@ -97,7 +97,7 @@ def tape5(trajectory: Trajectory) -> bytes:
 
     Each WRITE(5)TIME,U1,U2,U3,V1,V2,V3 makes a record: its length in bytes, seven binary64 numbers,
     and the length again, all little-endian, as with today's compilers and `scipy.io.FortranFile`.
-    The author's tape had other record marks and, as we infer, words of 60 bits.
+    The author's tape had other record marks and, we infer, 60-bit words.
     """
     assert trajectory.velocity is not None
     result = np.empty(len(trajectory.time), dtype=TAPE5)

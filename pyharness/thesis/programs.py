@@ -22,7 +22,7 @@ WORD_NAMES = (*COMPILED_WORDS, "cdc48", "cdc48-rounded")
 class Program:
     """One of the three programs of the appendix.
 
-    The corrected version has a global error of O(h**order), h the step size. `source` is where the
+    With step size h, the corrected version has a global error of O(h**order). `source` is where the
     thesis describes the program.
     """
 

@@ -1,7 +1,7 @@
 """Runge-Kutta: the third program of the appendix, Jacobs 1982, eq. 31 and IV.3.
 
-The stop test (Lipschitz condition, eq. 19) ends a run if the right-hand sides' change in a step
-exceeds a constant times the unknowns'.
+The stop test (Lipschitz condition, eq. 19) ends a run if the change of the right-hand sides in a
+step exceeds a constant times the change of the unknowns.
 """
 
 import math
@@ -104,8 +104,8 @@ def lipschitz_test(
     """Return a variable that violates eq. 19, and its quotient of changes (1/s), or None.
 
     `change_k` and `change_u` are absolute changes of the six right-hand sides and unknowns in a
-    step. Norms or, with the defect `lipschitz-per-component`, components are compared. Only the
-    defect `lipschitz-tests-velocity` includes the velocity. The quotient is infinite if the unknown
+    step. Norms or, with the defect `lipschitz-per-component`, components are compared. The velocity
+    counts only with the defect `lipschitz-tests-velocity`. The quotient is infinite if the unknown
     does not change.
     """
     velocity_counts = listing.has("lipschitz-tests-velocity")

@@ -5,8 +5,8 @@ negative number are complemented. The exponent is the field minus 2000 (octal), 
 field is below 2000.
 
 The test vectors in `data/words/cdc.json` follow from the CYBER 170 hardware reference, CDC
-60463560; a public emulator agrees. Such a file is a JSON object with `schema` and `vectors`, each
-with `name`, `op` (an instruction of `operated`), and `x`, `y` and `result` in octal.
+60463560; a public emulator agrees. A file of vectors is a JSON object with `schema` and `vectors`,
+each with `name`, `op` (an instruction of `operated`), and `x`, `y` and `result` in octal.
 """
 
 import json

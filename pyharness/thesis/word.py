@@ -5,7 +5,7 @@ format, or a float, converted from its shortest decimal representation, like a l
 
 Arithmetic functions take integers m, e for a number m 2**e; m has p bits, fewer if subnormal. In
 results, m may be 0; then e is the value as a float: 0.0, -0.0, inf, -inf or nan. No library has the
-CDC's rules: gmpy2, SoftFloat and numpy round only as IEEE 754, and mpmath does not limit exponents.
+CDC's rules.
 """
 
 import math
@@ -234,7 +234,7 @@ class Number:
     def __eq__(self, other: object) -> bool:
         """Return whether the difference, computed in this format, is zero.
 
-        That of two neighbouring CDC numbers may be.
+        It may be zero for two neighbouring CDC numbers.
         """
         x, y = self, self.word(other)
         if x.m and y.m:

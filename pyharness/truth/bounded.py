@@ -1,4 +1,4 @@
-"""Error of the reference solution: a proved bound where a proof is cheap, else the estimate.
+"""The error of the reference solution, proved where a proof is cheap, else estimated.
 
 A proof encloses the solution in balls (intervals with middle and radius). The largest distance of
 the reference from any point of a ball bounds the error.
@@ -50,7 +50,7 @@ class ErrorBound(NamedTuple):
         return f"{' '.join(filter(None, (at_most(self.value), unit)))} ({self.basis})"
 
     def over(self, scale: float) -> "ErrorBound":
-        """Return the bound for omega over `scale` (rad/s) unless that is 0; the angle is kept."""
+        """Return the bound with omega's divided by `scale` (rad/s), unchanged if `scale` is 0."""
         return self._replace(value=self.value / scale) if scale else self
 
     @property
@@ -93,8 +93,8 @@ def bound_of(
 ) -> ErrorBound:
     """Return the error bound of a scene's reference, `known`.
 
-    With `before_rounding`, it is for omega plus any `known.remainder`. Other options are
-    `error_bound`'s.
+    With `before_rounding`, it bounds the error of omega plus `known.remainder`, if any. The other
+    options are those of `error_bound`.
     """
     exact = before_rounding and known.remainder is not None
     largest = float(np.abs(known.omega).max(initial=0.0))
@@ -128,9 +128,9 @@ def error_bound(
     `omega` (rad/s) and `remainder`, which is added to it, have shape (n, 3), `attitude` (n, 4).
     `claimed` (rad/s) and `claimed_angle` (rad) are estimates, returned where nothing is proved.
 
-    The bound of omega is proved if the scene can have a certificate. With python-flint, both bounds
-    are proved in torque-free motion and, with `any_torque`, under any recorded torque at up to 30
-    times on one side of 0. The work limit of a proof is about half a second times `effort`.
+    The bound of omega is proved in scenes that satisfy `has_certificate`. With python-flint, both
+    bounds are proved in torque-free motion and, with `any_torque`, under any recorded torque at up
+    to 30 times on one side of 0. The work limit of a proof is about half a second times `effort`.
     """
     rows = _exact(omega, remainder)
     order = sorted(range(len(times)), key=lambda k: abs(times[k]))

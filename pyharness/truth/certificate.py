@@ -57,7 +57,7 @@ class Proof:
 
 
 class _AmplifiedError(Exception):
-    """Signal that amplified errors require further digits; the argument is their number."""
+    """Signal that amplified errors require further digits, as many as the argument."""
 
 
 def has_certificate(scene: Scene) -> bool:
@@ -202,7 +202,6 @@ class _Run:
     def _expected_excess(
         self, radius: int, source: int, middle: Sequence[int], share: float
     ) -> float:
-        """Return the excess digits of the final radius, by extrapolation."""
         amplified = self._amplified
         total = amplified[-1][1] + math.log10(radius) - math.log10(source)
         amplified.append((share, total))

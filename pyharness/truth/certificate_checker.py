@@ -10,8 +10,8 @@ h f(p).
 
 The error e = y - p obeys |e|' <= h mu |e| + |d| (Dahlquist 1958), where mu bounds the logarithmic
 norm of the Jacobian of f in a tube around p. The resulting bound on |e|, the radius of the step,
-holds while |e| is less than the tube's radius; if the bound is less too, on the whole step, because
-|e| is continuous.
+holds while |e| is less than the tube's radius. If the bound is less too, it holds on the whole
+step, because |e| is continuous.
 
 A number y is stored as the integer y 2**bits, a time t (s) as t 2**clock. The norm of an error of
 omega is sqrt(sum (e_i / scale_i)**2), with scales in units of 2**-20.
@@ -50,7 +50,7 @@ class System:
 
     They are D y_i' = P y_j y_k + C + R t + sum over f of (S s_f + G c_f), with i, j, k in cyclic
     order. Each frequency f of the torque adds the unknowns s_f (sine) and c_f (cosine), with s_f' =
-    f c_f and c_f' = -f s_f. An entry of `rows` is D, and a list of P, C, R and each frequency's S,
+    f c_f and c_f' = -f s_f. An entry of `rows` is D and a list: P, C, R, and each frequency's S and
     G.
     """
 

@@ -167,7 +167,6 @@ class _Limit:
                 self._before = step, abs(begin)
 
     def _forecast(self, step: int, begin: Decimal, rest: Decimal) -> Decimal:
-        """Return the expected number of steps until the end."""
         # `begin` (s) is the time after `step` steps, `rest` (s) the remaining time. The mean length
         # of a step is assumed to remain. If the number of steps grew with a power of time above
         # 1.3, it is extrapolated with this power, at most 3.
@@ -272,7 +271,7 @@ class _Equations:
     """The equations of one scene as recurrences of Taylor coefficients.
 
     `velocity` adds dV/dt = F/m - omega x V, with force F and mass m; an attitude adds dq/dt = q (0,
-    omega)/2. With a changing inertia I and torque N, (I omega)' = N - omega x (I omega); else
+    omega)/2. With a changing inertia I and torque N, (I omega)' = N - omega x (I omega); otherwise
     `coefficients` are A, B, C. `TapeSeries` explains `change` and `results`.
     """
 

@@ -24,7 +24,7 @@ class Switches:
     """The switches of a tape, with their `results` by slot.
 
     The result of a switch jumps where its operand crosses a level: 0, or an integer for a floor. At
-    a level, `_levels` has the slot: -1 if the result is that above the level, 1 if that below.
+    a level, `_levels` maps the slot to -1 if the result is as above the level, to 1 if as below.
     """
 
     def __init__(self, tape: TapeSeries) -> None:
@@ -57,7 +57,7 @@ class Switches:
     def turns(self, time: Decimal, length: Decimal) -> bool:
         """Change the first result whose operand moves to the other side of its level.
 
-        Return whether there was one. Raise TimedError if either result makes the operand do so.
+        Return whether there was one. Raise TimedError if the operand does so with either result.
         """
         for slot, is_floor, x in self._tape.operands_of_switches():
             level = self._levels.get(slot)

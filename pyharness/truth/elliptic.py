@@ -43,7 +43,6 @@ def _decades(values: Sequence[Fraction]) -> int:
 
 
 def _solution(coefficients: Sequence[Fraction], start: Sequence[Fraction], time: Decimal) -> Row:
-    """Return omega (rad/s) at `time` (s) of an unsteady motion."""
     # In the formulas, the second coefficient is negative and the others are not. The signs of all
     # coefficients and all components of omega may be changed together.
     for first, sign in itertools.product(range(3), (1, -1)):

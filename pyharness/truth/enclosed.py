@@ -92,7 +92,7 @@ def rounded_up(x: Fraction) -> float:
 def largest_radius(omega: Sequence[Balls], digits: int) -> Fraction:
     """Return the largest ratio of a ball's radius to the allowed radius.
 
-    The latter is 10**-digits times the larger of 1 rad/s and the ball's largest component.
+    The allowed radius is 10**-digits times the larger of 1 rad/s and the ball's largest component.
     """
     largest = Fraction(0)
     for middle, radius in omega:

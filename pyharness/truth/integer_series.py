@@ -41,7 +41,7 @@ class Path:
 
 
 class _OtherUnitError(Exception):
-    """Signal that the unit of omega must be multiplied by 2**n, n the argument."""
+    """Signal that the unit of omega must be multiplied by 2 to the power of the argument."""
 
 
 def integer_series(scene: Scene, times: Sequence[float]) -> Path:
@@ -60,7 +60,6 @@ def integer_series(scene: Scene, times: Sequence[float]) -> Path:
 
 
 def _guess(scene: Scene, span: Fraction) -> Fraction:
-    """Return a guess of the largest component of omega (rad/s) until `span` (s)."""
     law = scene.body_torque
     found = [abs(Fraction(w)) for w in scene.omega]
     for axis, moment in enumerate(scene.moments or (1.0, 1.0, 1.0)):
@@ -144,7 +143,7 @@ def exact_body(scene: Scene) -> tuple[list[Fraction], list[Fraction]]:
 class _Equations:
     """Equations 13-15 of the thesis for one scene, as recurrences of Taylor terms.
 
-    The units are `span`, the last time (s), and `unit` (rad/s).
+    Time is in units of `span`, the last time (s), omega in units of `unit` (rad/s).
     """
 
     def __init__(self, scene: Scene, span: Fraction, unit: Fraction) -> None:

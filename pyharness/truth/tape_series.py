@@ -43,7 +43,7 @@ _Sum = tuple[Decimal, list[tuple[Decimal, int]]]
 
 
 def series_products(tape: Tape) -> int:
-    """Return how many products of two series a tape takes in each order.
+    """Return the number of products of two series in each order of a tape (recorded torque).
 
     A sine with its cosine, or a tanh with its derivative, takes two; a table takes none.
     """
@@ -54,12 +54,12 @@ def series_products(tape: Tape) -> int:
 
 
 class TapeSeries:
-    """The Taylor series of a tape's operations around a time.
+    """The Taylor series of the operations on a tape (recorded torque) around a time.
 
     `begin` starts an expansion, and each `next` adds a coefficient to all series. Terms of sums are
-    multiplied by 1 plus or minus `change`, which shows the effect of rounding. The caller sets
-    `results`, those of switches by slot. `least_order` is the lowest order that loses no product
-    whose factors are 0 at that time.
+    multiplied by 1 plus or minus `change`, which shows the effect of rounding. `results`, set from
+    outside, has the results of switches by slot. `least_order` is the lowest order that loses no
+    product whose factors are 0 at that time.
     """
 
     def __init__(
@@ -89,8 +89,8 @@ class TapeSeries:
     ) -> None:
         """Begin an expansion around `time` (s).
 
-        `omega` and `attitude`, which may be empty, are Taylor coefficients that the caller extends.
-        At a break of a table, the later piece is expanded if `forward`, else the earlier.
+        `omega` and `attitude`, which may be empty, are lists of Taylor coefficients, extended from
+        outside. At a break of a table, the later piece is expanded if `forward`, else the earlier.
         """
         self._order = 0
         self._tables = {
@@ -192,7 +192,7 @@ class TapeSeries:
         return new
 
     def _slope(self, operand: int, k: int) -> Row:
-        """Return coefficients 1 to k of a slot, times their numbers."""
+        """Return coefficients 1 to k of a slot, each times its number."""
         slope = self._slopes.setdefault(operand, [])
         if len(slope) < k:
             slope.append(k * self._slots[operand][k])
@@ -277,7 +277,7 @@ class TapeSeries:
 
 
 def _powers(tape: Tape) -> tuple[list[_Power], int]:
-    """Return products of three or more factors, used outside products, and the most factors."""
+    """Return data on the products of three or more factors, and the largest number of factors."""
     factors: dict[int, Counter[int]] = {}
     numbers: dict[int, int] = {}
     scales: dict[int, float] = {}
@@ -304,7 +304,7 @@ def _powers(tape: Tape) -> tuple[list[_Power], int]:
 
 
 def _divisors(tape: Tape) -> dict[int, set[int]]:
-    """Return, by slot, divisors and arguments of roots with the slot."""
+    """Return, for each slot, the divisors and arguments of roots that contain it."""
     found: dict[int, set[int]] = {}
     for slot, (kind, operands, linear, _) in reversed([*enumerate(tape.operations, N_INPUTS)]):
         parts = operands if linear is None else [each for each, _ in linear.terms]

@@ -71,7 +71,6 @@ def _widths(cells: Sequence[Sequence[str]]) -> list[int]:
 
 
 def _parts(columns: Sequence[Column], widths: Sequence[int]) -> list[list[int]]:
-    """Return the numbers of the columns in each part of a table."""
     others = sum(widths) - max(widths) + len(widths) - 1
     if columns[-1].fit or others <= _WIDTH // 2:
         return [[*range(len(widths))]]  # its last or its widest column is wrapped or cut

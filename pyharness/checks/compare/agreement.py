@@ -30,7 +30,7 @@ class Accuracy:
 
     @property
     def angle(self) -> float | None:
-        """The largest error of the attitude (rad), None without one; infinite without times."""
+        """The largest error of the attitude (rad); None without one, infinite without times."""
         return None if self.turned is None else _largest(self.turned)
 
 
@@ -90,7 +90,7 @@ def distance(first: Trajectory, second: Trajectory) -> float:
 
 
 def differences(first: Trajectory, second: Trajectory) -> list[str]:
-    """Return the differing counts and endings or, if none, arrays."""
+    """Return the names of differing counts and endings or, if there are none, of arrays."""
     names = {"steps": "steps", "evaluations": "evaluations", "ended": "ending", "stop": "stop"}
     found = [told for name, told in names.items() if getattr(first, name) != getattr(second, name)]
     if found:

@@ -33,10 +33,10 @@ _EFFORT = 1e9  # factor on the work limit; so large because the caller requested
 
 @dataclass(frozen=True)
 class Solver:
-    """The solver of a batch: a method or a program of the thesis; the other field is None.
+    """The method or program of the thesis that solves a batch; the other field is None.
 
-    `t_end` (s) is by default the step size times the number of steps. `listing` to `may_stop` are
-    for programs; `lipschitz` (1/s) is the limit of their stop test.
+    `t_end` (s) is by default the step size times the number of steps. The fields from `listing` to
+    `may_stop` are for programs; `lipschitz` (1/s) is the limit of their stop test.
     """
 
     method: str | None = "auto"
@@ -52,11 +52,11 @@ class Solver:
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Many scenes that one method or program solves, when a result is first read.
+    """Many scenes, solved by one method or program when a result is first read.
 
-    `scene` has the shared quantities, `arrays` the others, with a row for each scene. The keys of
-    `arrays` are arguments of `solve_many` and `run_many`, and include `omega`. `listing` is None
-    for a method. `t_end` (s) has shape (n,). `attitude`, for methods only, requests attitudes.
+    `scene` has the shared quantities; `arrays` has the others, with a row for each scene, under the
+    argument names of `solve_many` and `run_many`, among them `omega`. `listing` is None for a
+    method. `t_end` (s) has shape (n,). `attitude`, for methods only, requests attitudes.
 
     Checks of the thesis's claims may use `omega0`, `omega`, `status`, `n_rows`, `stop_variable`,
     `rows` and `by_method`.
@@ -125,7 +125,7 @@ class Batch:
     def rows(self, samples: int) -> Array:
         """Return omega (rad/s) at the ends of `samples` equal parts, shape (n, samples, 3).
 
-        A program's ends are the steps of `sample_steps`.
+        For a program, these are the steps from `sample_steps`.
         """
         if not self.is_program:
             return np.stack([each.omega for each in self._samples(samples)], axis=1)
@@ -134,9 +134,9 @@ class Batch:
         return self._rows[samples]
 
     def attitudes(self, samples: int) -> Array:
-        """Return the attitudes at the ends of `samples` equal parts, shape (n, samples, 4).
+        """Return quaternions at the ends of `samples` equal parts, shape (n, samples, 4).
 
-        They are scalar first, from the body's axes to those at time 0.
+        They are scalar first, and rotate from the body's axes to those at time 0.
         """
         ends = [each.attitude for each in self._samples(samples) if each.attitude is not None]
         found = np.stack(ends, axis=1)

@@ -1,7 +1,7 @@
-"""The common interface of methods, prepared solvers and programs: the candidates.
+"""A common interface, `Candidate`, to methods, prepared solvers and programs.
 
-A prepared solver (`prepare`) solves one scene by one method, from many initial states. Tolerances
-are relative to the largest omega; `effort` multiplies the work limit.
+A prepared solver, from `prepare`, solves one scene by one method, from many initial states.
+Tolerances are relative to the largest omega; `effort` multiplies the work limit.
 """
 
 import math
@@ -49,7 +49,7 @@ class End:
 
 @dataclass(frozen=True)
 class Ready:
-    """An integration to one time: `run` is timed, `read` converts its result."""
+    """An integration to one time; `run` is timed, `read` converts its result."""
 
     run: Callable[[], Any]
     read: Callable[[Any], End]

@@ -76,8 +76,8 @@ def compare_programs(
     effort : float
         Factor on the work limits of the programs, the methods and the reference.
     attitude : bool
-        Whether attitudes are compared too. The initial one is the scene's, by default the identity.
-        A program's is integrated from its omega by a method of order 4.
+        Whether attitudes are compared too, from the scene's initial attitude or the identity. A
+        program's attitude is integrated from its omega by a method of order 4.
     word : str
         The arithmetic of the programs, one of `pyharness.thesis.programs.WORD_NAMES`. Without
         compiled programs for it, only the Python ports run. Orders are measured in binary64 only.
@@ -148,8 +148,8 @@ def listings_for(
 ) -> list[Listing]:
     """Return each program's original, selected (if any) and corrected listings.
 
-    `base`, changed by `fix` and `keep`, is the selected one; without a change, a specified `base`
-    is the only one. `readings` and `conjectures` apply to all.
+    `fix` and `keep` select a listing by changing defects of `base`. Without them, a specified
+    `base` is the only listing. `readings` and `conjectures` apply to all.
     """
     chosen = list(programs)
     assumed = [name for name in conjectures or () if name != "none"]

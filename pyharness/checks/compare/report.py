@@ -92,7 +92,7 @@ def comparison_report(comparison: Comparison, numerics: bool = False) -> Report:
 
 
 def verdict(comparison: Comparison) -> list[str]:
-    """Return sentences on expected, unexpected, sensitive and unjudged results."""
+    """Return a sentence for each unexpected or undecided result, and for a sensitive motion."""
     told = [f"UNEXPECTED: {each}" for each in comparison.unexpected] or [_as_expected(comparison)]
     if comparison.is_sensitive:
         told.append(sensitive(comparison.growth, comparison.digits))

@@ -1,6 +1,6 @@
 """Known faults of integrators, each with the motion that a faulty integrator computes.
 
-This motion is computed from a changed scene, or by changing the right states. An integrator that
+The motion is computed from a changed scene, or by changing the right states. An integrator that
 converges to it has the fault.
 """
 
@@ -34,10 +34,10 @@ class State(NamedTuple):
 class Fault:
     """A fault of an integrator: its name, a sentence on it, and its changes.
 
-    `scene` returns the scene that the faulty integrator solves, or None without effect. `times`
-    returns the times (s) of its states, from the requested times and the step size (s). `state`
-    then changes the states; its second argument is the right scene. If `of_step`, the states
-    approach the true ones as the step decreases.
+    `scene` returns the scene that the faulty integrator solves, or None if the fault has no effect.
+    `times` returns the times (s) of its states, from the requested times and the step size (s).
+    `state` then changes the states; its second argument is the right scene. If `of_step`, the
+    states approach the true ones as the step decreases.
     """
 
     name: str
@@ -75,7 +75,7 @@ def _gyroscopic(scene: Scene, omega: Any) -> list[Any]:
 
 
 def _with_gyroscopic(*factors: float, applied: float = 1.0) -> Callable[[Scene], Scene]:
-    """Return a function that scales a torque by `applied`, -omega x (I omega) by `factors`."""
+    """Return a function that scales the torque by `applied` and -omega x (I omega) by `factors`."""
 
     def changed(scene: Scene) -> Scene:
         def torque(t: Any, omega: Any) -> list[Any]:
@@ -132,7 +132,7 @@ def _conjugate(q: Any) -> Any:
 
 
 def _with_space_rates(scene: Scene) -> Scene:
-    """Return the scene of -omega and the conjugate of q, if q' = (0, omega) q/2."""
+    """Return the scene of -omega and the conjugate of q, for the wrong q' = (0, omega) q/2."""
     # Correct is q' = q (0, omega)/2. The conjugate p of q satisfies p' = p (0, -omega)/2, and
     # -omega satisfies Euler's equations with the opposite gyroscopic term and torque.
     start, back = _conjugate(scene.attitude), np.negative(scene.omega).tolist()
@@ -141,7 +141,7 @@ def _with_space_rates(scene: Scene) -> Scene:
 
 
 def _with_doubled_rates(scene: Scene) -> Scene:
-    """Return the scene with doubled omega, so that q' = q (0, omega)."""
+    """Return the scene with doubled omega, for the wrong q' = q (0, omega)."""
     halved = _with_gyroscopic(0.5, 0.5, 0.5, applied=2.0)(scene)
     return replace(halved, omega=np.multiply(2.0, scene.omega).tolist())
 
@@ -154,7 +154,7 @@ def _with_fast_torque(scene: Scene) -> Scene:
 
 
 def _of_thesis(half: State, scene: Scene) -> State:
-    """Return 2 y(t/2) - y(0) for omega and attitude y, from the states `half` at t/2."""
+    """Return 2 y(t/2) - y(0), where y is omega or the attitude, from the states `half` at t/2."""
     attitude = 2.0 * half.attitude - np.array(scene.attitude)
     return State(
         2.0 * half.omega - np.array(scene.omega),
@@ -232,7 +232,7 @@ OUTPUTS = ("quaternion-transposed", "scalar-last", "attitude-from-identity")
 
 
 def motions(scene: Scene, times: Array, step: float) -> Iterator[tuple[Fault, State]]:
-    """Yield each fault with an effect, and its states, NaN if the last time is not reached."""
+    """Yield each fault with an effect, and its states; NaN if the last time is not reached."""
     for fault in FAULTS:
         with np.errstate(all="ignore"):
             try:

@@ -1,7 +1,7 @@
 """Checks of a rigid-body integrator in any language against the true solution.
 
 Errors are measured in random scenes with decreasing steps or tolerances. If results converge to the
-motion of a known fault, it is named (docs/how-to/integrators.md).
+motion of a known fault, the report names it (docs/how-to/integrators.md).
 """
 
 import math
@@ -66,7 +66,7 @@ _FINITE = Basis(
 
 @dataclass(eq=False)
 class Verdict:
-    """The results of all checks of an integrator."""
+    """The results of all checks of an integrator, started by `command`."""
 
     command: str
     again: Callable[[str], str] = lambda name: ""  # the command that repeats the checks in a scene
@@ -94,9 +94,9 @@ def judge_integrator(
 ) -> Verdict:
     """Return the results of all checks of an integrator, started by `command`.
 
-    `chosen` are random scenes; `due` is the required order. ``again(name)`` returns the command
-    that repeats a scene's checks; `told` receives the number of finished problems and the next
-    one's name. An invalid answer ends the checks.
+    `chosen` are random scenes; `due` is the required order of convergence. ``again(name)`` returns
+    the command that repeats a scene's checks. `told` receives the number of finished problems and
+    the next one's name. An invalid answer ends the checks.
     """
     found = Verdict(command, again)
     where = "start"

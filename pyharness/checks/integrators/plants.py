@@ -1,4 +1,4 @@
-"""Faults planted in an integrator's requests and answers, and their self-test."""
+"""Self-test with faults planted in an integrator's requests and answers."""
 
 import itertools
 import json
@@ -33,8 +33,8 @@ Advance = Callable[[Any, Array, Array, float], Any]
 class IntegratorPlant:
     """A fault planted in an integrator, which must be recognised by its name.
 
-    `request` changes the request, `state` the answered states. `advance` computes the attitude
-    after each step.
+    `request` changes the request, `state` the answered states. `advance` replaces the attitude,
+    step by step.
     """
 
     name: str

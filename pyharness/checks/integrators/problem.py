@@ -2,7 +2,7 @@
 
 The drift is the change of conserved quantities in a long torque-free motion: relative for energy
 and |L|, an angle (rad) for the direction of the angular momentum L in space. A level, from 0 to
-`LEVELS` - 1, sets a step size (s) and a tolerance, which decrease with it.
+`LEVELS` - 1, sets a step size (s) and a tolerance, which decrease as the level increases.
 """
 
 import math
@@ -64,7 +64,7 @@ class Problem:
 
     @property
     def name(self) -> str:
-        """The kind of torque and the number."""
+        """The kind of torque and the number, as in ``wave-1``."""
         return self.scene.name
 
     @property
@@ -91,7 +91,7 @@ class Problem:
 
     @cached_property
     def faulty(self) -> list[tuple[Fault, State]]:
-        """The known faults with an effect, and their states at the smallest step."""
+        """The known faults with an effect, and their states with the smallest step."""
         return list(motions(self.scene, self.times, self.step_size(LEVELS - 1)))
 
     def faulty_states(self, fault: Fault, level: int) -> State:
@@ -116,7 +116,7 @@ class Problem:
         return float(self.times[-1] / self.step_size(LEVELS - 1))
 
     def floor(self, rounding: float) -> float:
-        """Return the largest error by roundings of relative size `rounding`."""
+        """Return a bound on the error of omega from roundings of relative size `rounding`."""
         return _ROUNDINGS * rounding * math.sqrt(self.most_steps)
 
     def request(self, level: int, scene: Scene | None = None, times: Array | None = None) -> bytes:
@@ -188,9 +188,8 @@ def convergence(
 ) -> Convergence:
     """Return a part's errors and their order of convergence, measured above `floor`.
 
-    It is the order of the last two settings. If `overall`, for tolerances, with which errors
-    decrease irregularly, it is the smaller of those from the first and from the fourth last setting
-    to the last.
+    The order is measured between the last two settings. If `overall`, for tolerances, with which
+    errors decrease irregularly, it is the smaller of the orders over all and over the last four.
     """
     seen = [k for k in range(1, len(errors)) if not errors[k] <= floor]
     order = None
@@ -227,7 +226,7 @@ class Judged:
     def lost(self) -> int:
         """The number of states that should be finite and are not.
 
-        A level may overflow if an error of 1 or more is predicted.
+        A level (step size or tolerance) may overflow if its predicted error is 1 or more.
         """
         rows = self.finest.lost
         for level in range(LEVELS - 2, -1, -1):
@@ -239,7 +238,7 @@ class Judged:
         return rows
 
     def error(self, level: int) -> float:
-        """Return the larger error of omega (relative) and attitude (rad).
+        """Return the larger of the errors of omega (relative) and attitude (rad).
 
         It is at least the tolerance or, with a step size, the rounding error.
         """
@@ -249,7 +248,7 @@ class Judged:
         return max(least, *(each.errors[level] for each in self.convergences))
 
     def order_of(self, part: str) -> Convergence | None:
-        """Return the measured order of omega or attitude, if any."""
+        """Return the measured order of `part`, "omega" or "attitude", or None."""
         return next((each for each in self.convergences if each.part == part), None)
 
 
@@ -262,7 +261,7 @@ def problems(seed: str, draws: int, names: Sequence[str] = ()) -> list[Problem]:
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """The drifts since time 0 at n `times` (s), and the largest `change` between successive ones.
+    """The drifts since time 0 at n `times` (s), and the largest `change` between successive times.
 
     `named` has the drifts, shape (n,), of "energy", "momentum" and, with an attitude, "direction".
     """
@@ -273,11 +272,11 @@ class Drift:
 
 
 def long_motion(free: Judged) -> tuple[int, Array, float | None]:
-    """Return level and times (s) of the long motion, and the limit of drift between two times.
+    """Return level and times (s) of a long motion, and the limit of drift between successive times.
 
-    A level is a tolerance or step size. Chosen is the coarsest at which the drift over enough times
-    can be limited, else the finest or, if errors do not decrease, the coarsest. The limit is None
-    if errors in `free` are too large.
+    The level, a step size or tolerance, is the coarsest at which enough times have a useful limit.
+    Otherwise it is the finest or, if errors do not decrease, the coarsest. The limit is None if the
+    errors in `free` are too large.
     """
     control = free.finest.control
     levels = range(_FIRST[control], LEVELS)

@@ -26,9 +26,9 @@ class Motion:
     """An integrator's states at the requested times, or its refusal.
 
     `omega` (rad/s) is about the body axes, shape (n, 3). `attitude` is from body to space, scalar
-    first, normalised, shape (n, 4); `norm` is its norm's largest deviation from 1 before
-    normalisation. `control` is the request's field that sets the accuracy; `rounding` is the
-    relative rounding error of the arithmetic.
+    first, normalised, shape (n, 4); before, its norm deviated from 1 by at most `norm`. `control`
+    is the request's field that sets the accuracy; `rounding` is the relative rounding error of the
+    arithmetic.
     """
 
     omega: Array
@@ -69,7 +69,7 @@ def asking_of(process: PortProcess) -> Ask:
 
 
 def refuse_integrator(command: str) -> None:
-    """Raise InputError that advises `--integrator` if `command` is an integrator."""
+    """Raise InputError that advises `--integrator` if `command` answers as an integrator."""
     line = request(draw_moderate("", MODERATE[0], 0), [1.0], 0.5, 1e-3)
     refuse_other(command, "--port", "--integrator", line, lambda answer: read_motion(answer, 1))
 

@@ -45,7 +45,7 @@ class Finding:
 
 
 def recognised(results: Sequence[Judged]) -> list[Finding]:
-    """Return the faults that explain the errors or, if none does, that orders show."""
+    """Return the faults that explain the errors or, failing that, those that orders show."""
     explained = [(judged, _explained(judged)) for judged in results]
     pairs = [(name, judged.problem.name) for judged, names in explained for name in names]
     pairs += _by_orders([judged for judged, names in explained if not names])
@@ -57,7 +57,7 @@ def recognised(results: Sequence[Judged]) -> list[Finding]:
 
 
 def _explained(judged: Judged) -> list[str]:
-    """Return any fault that explains the errors, and faults of the output."""
+    """Return a fault that explains all errors, else one of omega with those of the output."""
     true = judged.convergences
     if judged.lost or all(each.is_higher for each in true):
         return []

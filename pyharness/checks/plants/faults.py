@@ -63,7 +63,7 @@ def in_method(name: str, faulty: Faulty) -> Fault:
 
 
 def changing(change: Change) -> Faulty:
-    """Return a faulty function that changes the right one's result."""
+    """Return a faulty function that applies `change` to the right function's result."""
     return lambda size, right, *rest, **named: change(right(*rest, **named), size)
 
 

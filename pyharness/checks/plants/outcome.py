@@ -14,7 +14,10 @@ CONTROL = "none"
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of one planted fault: whether it was detected, and failed checks."""
+    """The outcome of one planted fault.
+
+    `passed` means that it was detected, `failed` is the number of failed checks.
+    """
 
     name: str
     fault: str

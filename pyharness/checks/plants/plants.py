@@ -165,7 +165,6 @@ def _label_both(
 def _shifted(
     size: float, solve: _Run, scene: Scene, times: Sequence[float], *rest: float
 ) -> Trajectory:
-    """Return results of later times, labelled with `times`."""
     late = size * scene.step_size if times[-1] >= 0.0 else -size * scene.step_size
     found = solve(scene, [t + late for t in times], *rest)
     time = np.array(times[: len(found.time)], dtype=float)
@@ -280,7 +279,7 @@ def self_test(seed: str, record: Path) -> Iterator[Outcome]:
 
 
 def outcome(plant: Plant, chosen: Selection) -> Outcome:
-    """Return whether any check but the golden record's detects a planted fault."""
+    """Return the outcome of a fault, which a check other than the golden record's must detect."""
     with plant.planted(plant.size):
         failed, note = _failed(replace(chosen, only=plant.kinds))
     noticed = failed.total() - failed[_NOT_ENOUGH]
@@ -288,7 +287,6 @@ def outcome(plant: Plant, chosen: Selection) -> Outcome:
 
 
 def _failed(chosen: Selection) -> tuple[Counter[str], str]:
-    """Return the numbers of failed checks by kind, and a note with an example."""
     names = [check.id for check in verify(chosen) if not check.passed]
     failed = Counter(name.partition("/")[0] for name in names)
     example = min(names, key=lambda name: name.startswith(_NOT_ENOUGH), default="")

@@ -1,4 +1,4 @@
-"""Faults planted in a port's requests and answers, and their self-test."""
+"""Self-test with faults planted in a port's requests and answers."""
 
 import copy
 import json
@@ -29,7 +29,7 @@ Change = Callable[[dict[str, Any]], object]
 
 @dataclass(frozen=True)
 class PortPlant:
-    """A fault planted in a port's answer or, if `in_request`, in the request to it."""
+    """A fault planted in a port's answer or, if `in_request`, in the request."""
 
     name: str
     fault: str

@@ -13,7 +13,7 @@ from pyharness.model.scene_file import case_scene
 
 
 class Circumstance(NamedTuple):
-    """A named extreme scene, and the end time (s)."""
+    """A named extreme scene, and its end time (s)."""
 
     name: str
     scene: Scene

@@ -77,7 +77,7 @@ def draw(seed: str, number: int) -> Draw:
 
 
 def text_generator(seed: str) -> np.random.Generator:
-    """Return NumPy's random generator for a text as seed."""
+    """Return NumPy's random generator, seeded by a text."""
     return np.random.default_rng([ord(letter) for letter in seed])
 
 
@@ -90,7 +90,7 @@ def draw_moderate(seed: str, kind: str, number: int) -> Scene:
     """Return scene `number` of a seed, with a torque of `kind`, an element of `MODERATE`.
 
     The moments are possible, and differ by at least a tenth. The body rotates by some radians in 12
-    steps of 0.5 s; torques over moments are some tenths of 1 rad/s2.
+    steps of 0.5 s; torques divided by moments are some tenths of 1 rad/s2.
     """
     source = Random(f"{seed}/moderate/{kind}/{number}")
     size = 10.0 ** source.uniform(-1.0, 1.0)
@@ -148,7 +148,7 @@ def _near_separatrix(source: Random) -> Scene:
 
 
 def _disturbed(source: Random, spin: float, faint: float) -> list[float]:
-    """Return omega (rad/s): `spin` about axis 2, and a perturbation of at most `faint`."""
+    """Return omega (rad/s): `spin` about axis 2, with a perturbation of at most `faint`."""
     return [w + faint * e for w, e in zip((0.0, spin, 0.0), _vector(source, 1.0), strict=True)]
 
 
@@ -175,7 +175,6 @@ def _from_rest(source: Random) -> Scene:
 
 
 def _slow_waves(source: Random) -> Scene:
-    """Return a scene with torque waves of 1e-12 to 0.1 rad/s."""
     scene = _plain(source)
     size = _largest(scene) * 10.0 ** source.uniform(-2.0, 2.0)
     law = _law(source, size, source.choice((4, 8, 12)), (1e-12, 0.1))
@@ -184,7 +183,6 @@ def _slow_waves(source: Random) -> Scene:
 
 
 def _many_speeds(source: Random) -> Scene:
-    """Return a scene with torque waves of 1e-6 to 630 rad/s."""
     scene = _plain(source)
     some: list[list[tuple[list[float], float]]] = [[], []]
     for _ in range(source.randint(2, 6)):
@@ -212,7 +210,7 @@ def _far_scale(source: Random) -> Scene:
 
 
 def _sensitive(source: Random) -> Scene:
-    """Return a scene near a middle axis, where errors may grow by up to 1e6."""
+    """Return a scene of rotation near the middle axis, which amplifies errors by up to 1e6."""
     low, middle, high = body = _body(source)
     spin = source.choice((-1.0, 1.0)) * 10.0 ** source.uniform(-1.0, 1.0)
     rate = abs(spin) * ((high - middle) * (middle - low) / (high * low)) ** 0.5

@@ -7,8 +7,8 @@ program propagates two: the result, and U(1), at which the first stage is evalua
 linearly stable for z where the spectral radius is at most 1.
 
 A collocation program evaluates the right-hand side along its first estimate, a straight line, and
-corrects once. At time s it is F + s J F + s**2 Q(F), with its value F at s = 0 and quadratic part
-Q.
+corrects once. At time s of the step, the right-hand side there is F + s J F + s**2 Q(F), with the
+initial value F and the quadratic part Q.
 """
 
 from dataclasses import dataclass
@@ -67,7 +67,7 @@ class Amplification:
     def moving(self) -> "Amplification":
         """Return the matrix without the row and column of the step's result.
 
-        Return all of it if the old result affects more than the new one.
+        It is returned whole if the old result affects more than the new one.
         """
         column = self.coefficients[:, -1]
         if self.size > 1 and not column[:-1].any() and not column[-1, 1:].any():
@@ -103,13 +103,13 @@ def amplification(listing: Listing, step: int = 1) -> Amplification:
 
 
 def weight_of_squares(listing: Listing, step: int) -> Fraction:
-    """Return the weight of h**3 Q(F) in a collocation step; exact integration gives 1/3."""
+    """Return the weight of h**3 Q(F) in a collocation step, 1/3 for exact integration."""
     points, weights = _quadrature(listing, step)
     return Fraction(weights @ points**2)
 
 
 def _quadrature(listing: Listing, step: int) -> tuple[Fractions, Fractions]:
-    """Return collocation points and weights, in units of the step size."""
+    """Return collocation points and weights, as fractions of the step size."""
     moved = step if listing.has("dt-accumulates") else 1
     points = [part * moved for part in PARTS[listing.program]]
     return np.array(points, dtype=object), inverse(collocation_matrix(points)).sum(axis=0)
@@ -200,7 +200,7 @@ class Regions:
 def regions() -> Regions:
     """Return the stability regions of all programs, original and corrected.
 
-    The Runge-Kutta program also has regions with `stage-base` or `base-not-restored` alone.
+    The Runge-Kutta program also runs with `stage-base` or `base-not-restored` as its only defect.
     """
     real, imaginary = np.linspace(*_REAL), np.linspace(*_IMAGINARY)
     distances = np.geomspace(*_DISTANCES)

@@ -211,7 +211,7 @@ def root_mean_square(found: Array) -> Array:
 
 
 def exponent(steps: Sequence[float] | Array, found: Array) -> float:
-    """Return the fitted p of error ~ steps**p; column j of `found` is after steps[j]."""
+    """Return the p of error ~ steps**p by least squares; column j of `found` is after steps[j]."""
     size = np.log(np.maximum(root_mean_square(found), 1e-300))
     return float(np.polyfit(np.log(np.asarray(steps)), size, 1)[0])
 

@@ -1,4 +1,4 @@
-"""The collocation matrices (eq. 36 of the thesis), and the accuracy of their solution by LEQT1F.
+"""The collocation matrices (eq. 36 of the thesis), and the accuracy of LEQT1F's solutions.
 
 LEQT1F is the linear solver of the two-term and four-term programs. Exact solutions are fractions.
 """
@@ -70,12 +70,12 @@ def fractions(floats: ArrayLike) -> Fractions:
 
 
 def gamma(count: int) -> Fraction:
-    """Return n u / (1 - n u), u = 2**-53, the bound of n roundings (Higham 2002, lemma 3.1)."""
+    """Return n u / (1 - n u) with u = 2**-53, a bound for n roundings (Higham 2002, lemma 3.1)."""
     return count * _UNIT / (1 - count * _UNIT)
 
 
 def norm(matrix: Fractions) -> Fraction:
-    """Return the row-sum norm."""
+    """Return the row-sum norm, the largest sum of magnitudes in a row."""
     return Fraction(abs(matrix).sum(axis=1).max())
 
 
@@ -196,7 +196,7 @@ def solver_roundings(program: str) -> tuple[float, float]:
     """Return two bounds on the rounding error that the solver adds to a step's result.
 
     Both are in units of 2**-53 times step size times rate, and independent of the step size while
-    the largest element of each row is 1. The first is for equal rates at all points, where only the
+    each row's largest element is 1. The first is for equal rates at all points, where only the
     coefficient of t is not zero. The second, for unequal rates, is to be multiplied by their
     relative deviation from equal rates.
     """
@@ -218,8 +218,8 @@ def solver_roundings(program: str) -> tuple[float, float]:
 def singular_below(program: str, bits: int = 53) -> float:
     """Return the largest step size (s) for which LEQT1F must report a singular matrix.
 
-    It reports this if the number of rows plus the last scaled pivot, in `bits` bits, equals the
-    number of rows.
+    It does so if the number of rows plus the last scaled pivot, in `bits` bits, equals the number
+    of rows.
     """
     step, matrix = _small_step(program)
     count = len(matrix)

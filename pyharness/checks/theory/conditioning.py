@@ -1,8 +1,8 @@
 """Error amplification by Euler's equations, which affects all methods.
 
-An error of omega at time s, multiplied by the state-transition matrix Phi(t, s) of the linearised
-equations, is the resulting error at time t. Under a torque that depends on omega or attitude, the
-Jacobian follows from the tape of recorded operations, and Phi includes the scene's attitude.
+The state-transition matrix Phi(t, s) of the linearised equations maps an error of omega at time s
+to the resulting error at time t. Under a torque that depends on omega or attitude, the Jacobian
+follows from the tape of recorded operations, and Phi includes the scene's attitude.
 """
 
 import math
@@ -53,9 +53,8 @@ class Conditioning:
     """The sensitivity of omega at the end of a motion to errors during it.
 
     `limit` and `angle_limit` add rounding errors to `made`, the sum of the steps' allowed errors
-    (relative, or rad). `limit` amplifies `made`, and is at most 2; `steps` is the number of
-    roundings of omega, 0 with compensated summation. `angle_limit` assumes omega's largest rounding
-    error at all times.
+    (relative, or rad). `limit` amplifies `made`; its `steps` is the number of roundings of omega, 0
+    with compensated summation. `angle_limit` assumes omega's largest rounding error at all times.
     """
 
     # Largest factor, at least 1, from an error of omega at any time to the error at the end.
@@ -69,7 +68,7 @@ class Conditioning:
     largest: float  # largest abs(omega) until the end (rad/s)
 
     def limit(self, made: float, steps: float = 0.0) -> float:
-        """Return the largest error of omega at the end, relative to `largest`."""
+        """Return the largest error of omega at the end, relative to `largest`; at most 2."""
         allowed = made * self.amplification + self.rounding + steps * self.storing
         # NaN allows no error.
         return 0.0 if math.isnan(allowed) else min(2.0, allowed)
@@ -108,7 +107,8 @@ def conditioning(scene: Scene, time: float) -> Conditioning:
 def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
     """Return the final sensitivity along `omega` (rad/s), the solution at n `times` (s).
 
-    `omega` has the shape (n, 3), and changes little between times, which begin at 0.
+    `omega` has the shape (n, 3). The times begin at 0, close enough that omega changes little
+    between them.
     """
     with np.errstate(all="ignore"):
         largest = float(np.abs(omega).max()) or 1.0
@@ -121,8 +121,8 @@ def sampled(
 ) -> tuple[Array, _Sample]:
     """Return equally spaced times (s), close enough for the rates, and their results.
 
-    `sample` takes times up to `time`, and returns the largest rate (1/s) and the results. The first
-    attempt has `fewest` intervals, the last at most `most`.
+    `sample` takes times up to `time`, and returns the largest rate (1/s) and the results. It is
+    first called with `fewest` intervals, at last with at most `most`.
     """
     count = fewest
     while True:
@@ -142,8 +142,8 @@ def sampled(
 def of_flow(flow: Array, times: Array, state: Array, source: Array, largest: float) -> Conditioning:
     """Return the sensitivity of a final state, from state-transition matrices.
 
-    `flow` has the matrix from each time to the last, shape (n, m, m). `state` and `source`, the
-    sums of magnitudes of the terms of its derivative, have the shape (n, m). Errors are divided by
+    `flow` has the matrix from each time to the last, shape (n, m, m). `state`, and `source`, the
+    sums of magnitudes of its derivative's terms, have the shape (n, m). Errors are divided by
     `largest`.
     """
     steps, sizes = np.diff(times), np.abs(flow)
@@ -191,9 +191,9 @@ _OF_ANGLE = 0.5
 def conditioning_at(scene: Scene, times: Sequence[float]) -> Conditioning:
     """Return the sensitivity of a scene's solution at `times` (s) to earlier errors.
 
-    Under a torque law it is that at the last time; under other torques, where damping may reduce
-    errors, the largest at any time. Raise InputError as `conditioning` does, or if the torque can't
-    be recorded.
+    Under a torque law, return that of the last time; under other torques, where damping may reduce
+    errors, the largest. Raise InputError as `conditioning` does, or if the torque can't be
+    recorded.
     """
     if not isinstance(scene.torque, StateTorque):
         return conditioning(scene, times[-1])
@@ -223,7 +223,7 @@ def _of_state(scene: Scene, time: float) -> Conditioning:
 
 
 def _path(scene: Scene, times: Array) -> Array:
-    """Return omega and any attitude at `times` (s), which begin at 0."""
+    """Return omega and any attitude, one row for each of `times` (s), which begin at 0."""
     if times[-1] == 0.0:
         return np.tile([*scene.omega, *(scene.attitude or ())], (len(times), 1))
     attitude = scene.attitude is not None
@@ -237,7 +237,7 @@ def _path(scene: Scene, times: Array) -> Array:
 
 
 def _sources(tape: Tape, times: Array, state: Array) -> Array:
-    """Return bounds on the equations' rounding errors (1/s), over the unit roundoff."""
+    """Return bounds on the equations' rounding errors (1/s), divided by the unit roundoff."""
     # Each operation adds the rounding error of its result or, for a sum, of its terms' magnitudes.
     given = [_Bounded(each, np.zeros(len(times))) for each in inputs_of(times, state)]
     with np.errstate(all="ignore"):
@@ -248,7 +248,7 @@ def _sources(tape: Tape, times: Array, state: Array) -> Array:
 
 
 class _Bounded:
-    """Values, and bounds on their rounding errors over the unit roundoff."""
+    """Values, and bounds on their rounding errors divided by the unit roundoff."""
 
     def __init__(self, value: Any, error: Any) -> None:
         self.value, self.error = value, error

@@ -1,9 +1,9 @@
 """Steady rotations under constant torque, and their linear stability.
 
-Grammel's method, equation 32 of the thesis (III.4.a): omega is a steady rotation (a, b, c) plus a
-small perturbation proportional to exp(Q t). With the coefficients A, B, C of Euler's equations, and
-torque over moment M = N / I, (a, b, c) is steady if A bc = -M1, B ca = -M2, C ab = -M3. The rates Q
-(1/s) are the roots of Q**3 - (BC a**2 + CA b**2 + AB c**2) Q - 2 ABC abc = 0.
+Grammel's method, equation 32 of the thesis (III.4.a), adds to a steady rotation (a, b, c) a small
+perturbation proportional to exp(Q t). With the coefficients A, B, C of Euler's equations and M,
+torque over moment, (a, b, c) is steady if A bc = -M1, B ca = -M2, C ab = -M3. The rates Q (1/s) are
+the roots of Q**3 - (BC a**2 + CA b**2 + AB c**2) Q - 2 ABC abc = 0.
 
 `share` is the initial perturbation divided by the rotation. Of a continuous family, only some
 rotations are reported.
@@ -59,14 +59,14 @@ class SteadyRotation:
 
     @property
     def period(self) -> float | None:
-        """The period of the fastest oscillation (s), or None."""
+        """The period of the fastest oscillation (s), or None without oscillation."""
         rate = max(abs(each.imag) for each in self.rates)
         return 2.0 * math.pi / rate if rate > 0.0 else None
 
 
 @dataclass(frozen=True)
 class SteadyRotations:
-    """The steady rotations of a scene, with equal relative perturbations."""
+    """The steady rotations of a scene."""
 
     told: str  # text: which steady rotations exist, and which are shown
     disturbance: float  # perturbation divided by the rotation
@@ -244,7 +244,7 @@ def _axes(coefficients: Triple, spin: float) -> tuple[str, Places]:
 
 
 def _hyperbola(coefficients: Triple, product: float, held: int) -> tuple[str, Places]:
-    """Return a text and places on one branch, for a torque about the axis `held` (from 0)."""
+    """Return a text on one branch and its points, for a torque about the axis `held` (from 0)."""
     # `product` is that of the other components (rad2/s2). The other branch is opposite.
     one, other = (held + 1) % 3, (held + 2) % 3
     told = (
@@ -269,7 +269,7 @@ def _three(components: dict[int, float]) -> Triple:
 
 
 def _across(products: Sequence[float], axis: int) -> tuple[str, Places]:
-    """Return a text and places on one branch, for a torque across the axis of symmetry."""
+    """Return a text on one branch and its points, for a torque across the axis of symmetry."""
     one, other = (axis + 1) % 3, (axis + 2) % 3
     # w_one w_axis and w_other w_axis.
     across = products[other], products[one]

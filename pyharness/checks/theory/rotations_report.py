@@ -74,7 +74,6 @@ def _table(rotations: Sequence[SteadyRotation]) -> Table:
 
 
 def _rates(rates: Rates) -> str:
-    """Return three rates (1/s) as text, with opposite or conjugate pairs as +-."""
     first, second, third = rates
     if not any(rates):
         return "0"
@@ -226,7 +225,7 @@ def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
     """Yield name and points, shape (n, 3), of torque-free curves of L / abs(L).
 
     L is the angular momentum in body axes. The last two curves are the separatrix; with two equal
-    moments their planes are perpendicular to the third axis. A sphere has no curves.
+    moments, both are the circle across the third axis. A sphere has no curves.
     """
     high, middle, low = sorted(range(3), key=lambda axis: moments[axis])
     j = min(moments) / np.array(moments)
@@ -257,7 +256,8 @@ def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
 def growth_of_bodies(first: Array, third: Array) -> Array:
     """Return the growth rate Re Q about each middle axis, divided by the spin.
 
-    Q is the fastest rate of equation 32; `first` and `third` are K1 = A and K3 = -C, from -1 to 1.
+    Q is the root of equation 32 with the largest real part; `first` is A and `third` is -C, both
+    from -1 to 1.
     """
     a, c = first, -third
     # A body has A + B + C + ABC = 0. At two corners, for bodies without extent, B is arbitrary.

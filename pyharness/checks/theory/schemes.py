@@ -1,7 +1,7 @@
 """Independent implementations of the schemes of programs and fixed-step methods.
 
-A scheme computes one step from `omega` under constant torque (equations 16-18 of the thesis), with
-`on` a `Numbers` or, for the terms of the truncation error, a `Series` in the step size.
+A scheme computes one step from `omega` under constant torque (equations 16-18 of the thesis). Its
+argument `on` is a `Numbers` or, for the terms of the truncation error, a `Series` in the step size.
 """
 
 import math
@@ -25,7 +25,7 @@ class Numbers:
     """Euler's equations for numbers; omega (rad/s) has the shape (..., 3)."""
 
     def __init__(self, scene: Scene, step: float = 1.0, sizes: bool = False) -> None:
-        """Store a step size (s), coefficients and torque, with `sizes` their magnitudes."""
+        """Store step size (s), coefficients and torque; with `sizes`, their magnitudes."""
         self._step = step
         size = np.abs if sizes else np.positive
         self._coefficients = size(np.array(scene.euler_coefficients))
@@ -84,14 +84,14 @@ class FixedStep:
 
 
 def constant(omega: Array) -> Array:
-    """Return a constant (..., 3) as a power series."""
+    """Return a constant, shape (..., 3), as a power series, shape (TERMS, ..., 3)."""
     result = np.zeros((TERMS, *omega.shape))
     result[0] = omega
     return result
 
 
 def collocation(program: str) -> Scheme:
-    """Return the scheme of a collocation program: an estimate and one correction."""
+    """Return the scheme of a collocation program, an estimate and one correction."""
     parts = PARTS[program]
     weights = inverse(collocation_matrix(parts)).sum(axis=0).astype(float)
 
@@ -135,8 +135,8 @@ def collocation_singular(program: str) -> Scheme:
 def runge_kutta_4(on: Numbers, omega: Array, punched: bool = False) -> Array:
     """Return omega after a step of classical Runge-Kutta (eq. 31).
 
-    If `punched`, it is the original program's first step, whose third and fourth stage start from
-    the point of the stage before instead of from `omega`.
+    If `punched`, it is the original program's first step, whose third and fourth stages start from
+    the previous stage instead of `omega`.
     """
     first = on.times_step(on.rate(omega))
     at = omega + 0.5 * first
@@ -196,7 +196,7 @@ SCHEMES = {
 
 
 def local_error(scheme: Scheme, scene: Scene, omega: Array) -> Array:
-    """Return the truncation errors of a step from n omegas (rad/s), shape (TERMS, n, 3)."""
+    """Return truncation errors of a step from n omegas (rad/s), as series, shape (TERMS, n, 3)."""
     on = Series(scene)
     return scheme(on, constant(omega)) - on.solution(omega)
 
@@ -204,8 +204,8 @@ def local_error(scheme: Scheme, scene: Scene, omega: Array) -> Array:
 def spacing(count: int) -> Sequence[Fraction]:
     """Return the weights of a central difference for the first derivative.
 
-    Weight i, from 1, multiplies the difference of the values at i and -i spacings. The sum over the
-    spacing is exact up to degree 2 `count`.
+    Weight i, from 1, multiplies the difference of the values at i and -i spacings. The sum divided
+    by the spacing is exact up to degree 2 `count`.
     """
     middle = math.comb(2 * count, count)
     return [

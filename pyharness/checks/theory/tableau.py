@@ -2,8 +2,7 @@
 
 The methods are collocation, subdomain, Galerkin and least squares, with the trial function omega(0)
 + c1 t + ... + cn t**n. Its derivative is a projection of the right-hand side f along the step on
-the polynomials of degree n - 1, computed on the unit interval s = t / h in the well-conditioned
-Legendre basis.
+the polynomials of degree n - 1, computed on the unit interval s = t / h in the Legendre basis.
 """
 
 from dataclasses import dataclass
@@ -21,7 +20,7 @@ from pyharness.model.trajectory import Array
 class Tableau:
     """One correction of a step on the unit interval, as a Runge-Kutta tableau.
 
-    The correction evaluates f along the first estimate or the previous correction.
+    The right-hand side f is evaluated along the first estimate or the previous correction.
     """
 
     # Shape (m,), in units of the step size h: where f is evaluated, the collocation points or the
@@ -36,8 +35,9 @@ def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None =
     """Return the tableau of one weighted residual method.
 
     `weighting` is "collocation", "subdomain", "galerkin" or "least-squares", `terms` is n;
-    `points`, for collocation, is as in `grid`. The other weightings use Gauss-Legendre quadrature,
-    exact under constant torque; else its error is of order 2n + 1 or higher, above the method's.
+    `points`, for collocation, is as in `grid`. Other weightings use Gauss-Legendre quadrature,
+    exact under constant torque; under other torques, its error is of order 2n + 1 or higher, above
+    the method's.
     """
     # Products of two omegas have degree 2n, and the weight functions n (Galerkin), n - 1 (least
     # squares) or 0 (subdomain).
@@ -95,7 +95,7 @@ def _gauss(m: int) -> tuple[Array, Array]:
 
 
 def _legendre(m: int, x: Fraction) -> tuple[Fraction, Fraction]:
-    """Return the Legendre polynomial of degree m and its derivative, inside (-1, 1)."""
+    """Return the Legendre polynomial of degree m and its derivative at x, inside (-1, 1)."""
     before, value = Fraction(1), x
     for k in range(2, m + 1):
         before, value = value, ((2 * k - 1) * x * value - (k - 1) * before) / k

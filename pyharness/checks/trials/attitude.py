@@ -91,7 +91,6 @@ def _limit(truth: Truth, tried: MethodRun) -> float:
 
 
 def _allowed(method: str, tolerance: float, flow: Conditioning, time: float) -> float:
-    """Return the largest allowed error of the attitude (rad) at `time` (s)."""
     made = tolerance * lively(flow.amplification)
     return ATTITUDE if method in FORMS else flow.angle_limit(made, time)
 
@@ -189,7 +188,7 @@ def _montgomery(name: Name) -> Check:
 
 
 def _solid_angle(scene: Scene, period: float) -> float:
-    """Return the solid angle of the angular momentum's path in the body in a period (s)."""
+    """Return the solid angle that the angular momentum encloses in the body in a `period` (s)."""
     moments = np.array(scene.moments)
     before, count, rows = math.inf, 32, np.empty((0, 3))
     while True:  # the trapezoidal rule converges exponentially

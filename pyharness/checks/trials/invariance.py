@@ -1,7 +1,7 @@
 """Trial of invariance: results must transform with a rotated or rescaled problem.
 
-Methods whose operations differ only in axes, signs or exponents must return equal bits, others
-agree within an error bound.
+Methods whose operations differ only in axes, signs or exponents must return equal bits; the rest
+must agree within an error bound.
 """
 
 import random

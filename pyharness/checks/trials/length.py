@@ -1,6 +1,6 @@
 """Trial of length: energy, momentum and phase over a million revolutions, by Brouwer's law.
 
-The phase is the position along the curve of omega; `theory.brouwer` has the law.
+The phase is the position along the curve of omega; `theory.brouwer` states the law.
 """
 
 import math
@@ -70,8 +70,8 @@ class Integrator:
     """A method whose error growth is measured.
 
     `run` returns omega, shape (n, 3), and the number of steps until each time; `noise` bounds the
-    errors of a step of given size (s). `revolutions` is the length of the first run, `others` of
-    runs from other initial conditions. `preference` means biased rounding.
+    errors of a step of given size (s). `revolutions` is the length of the first run, `others` that
+    of runs from other initial conditions. `preference` means biased rounding.
     """
 
     run: Runner
@@ -138,7 +138,7 @@ def _attempts() -> Iterator[Attempt]:
 
 
 def check_growth(integrator: Integrator, name: Name) -> Iterator[Check]:
-    """Yield checks of fitted powers, and of errors after numbers of revolutions."""
+    """Yield checks of the fitted powers of growth, and of errors after numbers of revolutions."""
     motion = name.circumstance
     for what, found, steps, limits in measured(integrator, MOTIONS[motion], orbit_of(motion)):
         horizons = np.array(REVOLUTIONS[: len(steps)])
@@ -186,7 +186,7 @@ def measured(
 ) -> Iterator[tuple[str, Array, Array, list[float]]]:
     """Yield name, errors, numbers of steps and error bounds of each quantity.
 
-    Errors have the shape (initial conditions, numbers of revolutions), NaN after the end of a run.
+    Errors have the shape (initial conditions, times), NaN after the end of a run.
     """
     turn = 2.0 * math.pi / body.largest
     reached = [r for r in REVOLUTIONS if r <= 1.01 * integrator.revolutions]
@@ -208,12 +208,12 @@ def measured(
 
 @cache
 def orbit_of(motion: str) -> Orbit:
-    """Return the Orbit of a motion."""
+    """Return samples and error factors of a motion named in `MOTIONS`."""
     return brouwer.orbit(MOTIONS[motion])
 
 
 def starts(scene: Scene, body: Orbit) -> list[Scene]:
-    """Return scenes that start along one motion, with other phases."""
+    """Return scenes that start at different phases of one motion."""
     times = [0.37 * k / body.frequency for k in range(STARTS)]
     rows = brouwer.floats([torque_free(scene, t, rounded=True) for t in times])
     return [replace(scene, omega=row) for row in rows]

@@ -65,7 +65,6 @@ def _matrix(program: str, step: float, name: Name) -> Iterator[Check]:
 
 
 def _threshold(name: Name) -> Check:
-    """Return the check of LEQT1F's largest singular step against the exact last pivot."""
     program = name.subject
     wanted = singular_below(program)
     found = declared_singular_below(program)
@@ -77,7 +76,6 @@ def _threshold(name: Name) -> Check:
 
 
 def _counted(listing: Listing, name: Name) -> Check:
-    """Return the check of the number of steps with IER = 129."""
     scene = scene_of(name)
     ier = compiled.run(scene, listing, velocity=False).ier
     assert ier is not None

@@ -104,7 +104,7 @@ def _crossing(method: str, case: int, error: Callable[[int], float], name: Name)
 
 
 def _error(scene: Scene, name: str, case: int, listing: Listing | None) -> tuple[float, str]:
-    """Return omega's relative final error, not finite for an incomplete run, and a note."""
+    """Return the final relative error of omega, not finite for an incomplete run, and a note."""
     largest = _path(case).flow.largest
 
     def error(omega: Array) -> float:
@@ -121,7 +121,6 @@ def _error(scene: Scene, name: str, case: int, listing: Listing | None) -> tuple
 
 
 def _divergence(case: int, listing: Listing | None, name: Name) -> Check:
-    """Return the check of the smallest divergent step, by linear stability if it applies."""
     scene, method = case_scene(case), name.subject
     alike = "runge-kutta" if SCHEMES[method].order == 4 else "two-term"
     scheme = listing or Listing.corrected(alike)

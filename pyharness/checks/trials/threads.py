@@ -72,7 +72,7 @@ def _run(only: Sequence[str]) -> Iterator[Check]:
 
 
 def different(jobs: Sequence[Job], repeats: int = _REPEATS) -> list[Job]:
-    """Return the jobs that differ in threads, once for each differing call."""
+    """Return the jobs whose results in threads differ, once for each differing call."""
     alone = [bits(job) for job in jobs]
     order = [index for index in range(len(jobs)) for _ in range(repeats)]
     random.Random("threads").shuffle(order)

@@ -1,6 +1,6 @@
 """Trial of torques: waves too fast for the step, huge and tiny torques, resonance.
 
-A wave is a sine or cosine term of the torque; in resonance it has the precession's frequency.
+A wave is a sine or cosine term of the torque; in resonance it has the frequency of precession.
 """
 
 import math
@@ -72,7 +72,7 @@ def axial(scene: Scene, time: float) -> Truth:
 
 
 def averaged(scene: Scene, time: float) -> Truth:
-    """Return the true omega at `time` (s) without very fast waves, and a bound of their effect."""
+    """Return the true omega at `time` (s) without very fast waves, with a bound on their effect."""
     moments = np.array(scene.moments)
     waves = scene.law.sines + scene.law.cosines
     moved = sum(float((2.0 * np.abs(a) / moments).max()) / f for a, f in waves)
@@ -91,7 +91,6 @@ def summed(scene: Scene, time: float) -> Truth:
 
 
 def _wave(frequency: float) -> Circumstance:
-    """Return a scene with waves of one `frequency` (rad/s), for 500 radians."""
     size = 10.0 * frequency
     sine, cosine = ((4.0 * size, 0.0, 2.0 * size), frequency), ((0.0, 3.0 * size, 0.0), frequency)
     law = TorqueLaw(sines=[sine], cosines=[cosine])
@@ -106,7 +105,6 @@ def _spun(frequency: float, time: float, programs: bool) -> Circumstance:
 
 
 def _huge(size: float, start: Triple = _START) -> Circumstance:
-    """Return a scene whose constant torque (N m) rotates the body by some fifty radians."""
     law = TorqueLaw((size, 0.7 * size, -0.5 * size))
     scene = Scene("huge torque", start, moments=_BODY, torque=law, steps=6)
     return Circumstance(scene, math.sqrt(4e3 / size), programs=size == 1e6)

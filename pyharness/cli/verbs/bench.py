@@ -101,7 +101,6 @@ def run(options: argparse.Namespace) -> int:
 def _present(
     methods: Sequence[_Named], others: Sequence[_Named], named: bool
 ) -> tuple[list[_Named], list[_Named]]:
-    """Return the solvers to measure, and those not installed."""
     missing = [each for each in others if not each.is_installed]
     if missing and named:
         raise InputError(

@@ -84,7 +84,7 @@ EXAMPLE = "verify --only cells,methods"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Check programs and methods with each other and the true solution; return 1 if one fails."""
+    """Check programs and methods against each other and the true solution; return 1 on failure."""
     if options.listing_output is not None:
         return _listing_output(options)
     if options.integrator is not None:

@@ -61,11 +61,11 @@ class Atlas:
     longitudes: Array
 
     def score(self, reading: int = 0, steps: int = 0) -> Array:
-        """Return each start's points, for the given indices of reading and number of steps."""
+        """Return the points of each initial omega, for indices of reading and number of steps."""
         return sum_of_points([codes[reading, steps] for codes in self.codes.values()])
 
     def none_fails(self, reading: int = 0, steps: int = 0) -> NDArray[np.bool_]:
-        """Return, for each start, whether no claim fails; the arguments are as in `score`."""
+        """Return, for each initial omega, whether no claim fails; arguments are as in `score`."""
         held = [codes[reading, steps] != FAILS for codes in self.codes.values()]
         return np.asarray(np.all(held, axis=0))
 
@@ -99,25 +99,25 @@ def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Any], first: Batch) 
 
 
 def sum_of_points(codes: Sequence[Codes]) -> Array:
-    """Return the sum of the claims' points for each start."""
+    """Return the sum of the claims' points for each initial omega."""
     return np.asarray(sum(_POINTS[each] for each in codes))
 
 
 def shares(codes: Codes) -> tuple[float, float, float]:
-    """Return the fractions of HOLDS, IN_PART and FAILS in `codes`."""
+    """Return the fractions of the codes HOLDS, IN_PART and FAILS."""
     whole, part, not_at_all = (float((codes == each).mean()) for each in (HOLDS, IN_PART, FAILS))
     return whole, part, not_at_all
 
 
 def bits(codes: Codes) -> float:
-    """Return the entropy (bits) of a claim's verdict over the starts."""
+    """Return the entropy (bits) of a claim's verdict over the initial omegas."""
     parts = np.array([(codes == code).mean() for code in _CODES])
     parts = parts[parts > 0.0]
     return float(-(parts * np.log2(parts)).sum()) + 0.0
 
 
 def about(names: Sequence[str]) -> dict[int, list[str]]:
-    """Return, by case, the claims in `names` that concern it alone."""
+    """Return, by case, the claims in `names` that concern this case alone."""
     found: dict[int, list[str]] = {}
     for name in names:
         case = claim(name)["parameters"].get("case")

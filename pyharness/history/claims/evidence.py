@@ -90,7 +90,7 @@ def evidence() -> Iterator[Combination]:
 
 
 def combinations() -> list[Assumptions]:
-    """Return all combinations of assumptions; start None stands for the adopted omega(0)."""
+    """Return all combinations of assumptions; a start of None selects our values of omega(0)."""
     # The last name varies fastest.
     readings, conjectures = (
         list(subsets(names_of(kind)[::-1])) for kind in ("reading", "conjecture")

@@ -45,7 +45,7 @@ class Assignment:
     """An initial omega (rad/s) for a case without one in the thesis, with verdicts by claim.
 
     It `holds` if the original programs reproduce, at least in part, all claims about this case
-    whose verdicts depend on the start.
+    whose verdicts depend on it.
     """
 
     case: int
@@ -123,10 +123,10 @@ def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:
 
 
 def assignments() -> list[Assignment]:
-    """Return the verdicts from each start in each case for which the thesis gives no omega(0).
+    """Return the verdicts from each initial omega in each case for which the thesis gives none.
 
-    As claims about a case do not depend on another's start, all can hold at once if each case has a
-    start with which its claims hold.
+    As claims about a case do not depend on omega(0) in another, all can hold at once if each case
+    has an omega(0) with which its claims hold.
     """
     found = []
     for case in open_starts():
@@ -229,7 +229,7 @@ def explanation(judgement: Judgement) -> Report:
 
 
 def assignments_report(assignments: Sequence[Assignment]) -> Report:
-    """Return the report on the starts with which the claims about each case hold."""
+    """Return the report on the initial omegas with which the claims about each case hold."""
     head = (
         "omega(0) of Cases 1, 3, 4, 6 and 7 is not given. With each start that the thesis shows, "
         "and (1, 1, 1), which is ours, the claims about that case alone, for the original "
@@ -265,7 +265,6 @@ def _record(judgements: Sequence[Judgement]) -> dict[str, Any]:
 
 
 def _supplied(judgements: Sequence[Judgement]) -> list[dict[str, Any]]:
-    """Return the assumptions on which the claims may depend."""
     told = [each.claim for each in judgements]
     named = {name.rpartition(" ")[2] for each in told for name in each["assumptions"]}
     others = {name.partition(":")[0] for each in told for name in each.get("otherwise", {})}

@@ -1,7 +1,7 @@
 """Tests of the thesis's claims about several cases.
 
 Arguments and verdicts are as in `verdicts`. The thesis prints no programs for weightings other than
-collocation; for original programs, tests of them return "not testable".
+collocation; tests of these return "not testable" for the original programs.
 """
 
 import math

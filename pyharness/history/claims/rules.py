@@ -131,8 +131,8 @@ def dynamic(bench: Bench, case: int, factor: float) -> Grade:
 def small_step(bench: Bench, cases: Sequence[int], exception: int) -> Grade:
     """Test whether a tenth of the step size improves collocation, except for one run.
 
-    This is the two-term program in case `exception`. In four fifths of the others, errors must be
-    finite and at least halve; in half, for a grade in part.
+    The exception is the two-term program in case `exception`. In four fifths of the other runs,
+    errors must be finite and at least halve; for a grade in part, in half.
     """
     numbers, improved, excepted = {}, [], np.False_
     for program in COLLOCATION:
@@ -166,7 +166,7 @@ def small_step_runge_kutta(bench: Bench, cases: Sequence[int]) -> Grade:
 def largest_error(
     bench: Bench, program: str, case: int, may_stop: bool = True, parts: int = 1
 ) -> Array:
-    """Return the largest error of omega (rad/s) for each start, infinite after an overflow."""
+    """Return the largest error of omega (rad/s) by initial omega, infinite after an overflow."""
     runs = bench.runs(program, case, may_stop, parts)
     error = _farthest(runs.omega, bench.solution(case)).max(axis=-1)
     return np.where(runs.overflow, np.inf, error)

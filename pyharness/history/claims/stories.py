@@ -63,9 +63,9 @@ def power_of_ten(exponent: int) -> str:
 class Sentence(NamedTuple):
     """A sentence of the thesis with its claims.
 
-    `text` has formulas in LaTeX; `quote` is a few words of it, `where` its place. `why` explains a
-    sentence without claims. `laboratory` names the run that shows it best, as in
-    ``case=2&program=two-term``. `command` shows more than `claims --explain`.
+    `text` has formulas in LaTeX; `quote` is a few words of the sentence, `where` its place. `why`
+    explains a sentence without claims. `laboratory` names the run that shows the sentence best, as
+    in ``case=2&program=two-term``. `command` shows more than `claims --explain`.
     """
 
     where: str

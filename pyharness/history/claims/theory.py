@@ -100,10 +100,10 @@ def _hamilton(moments: Triple, state: Array) -> Array:
 
 
 def bounded_not_lipschitz(lab: Laboratory, decades: float, above: float) -> Judged:
-    """Judge whether a bounded function satisfies a Lipschitz condition.
+    """Judge whether every bounded function satisfies a Lipschitz condition.
 
-    The claim is false if a quotient of the square root between x and 2 x exceeds `above`, x from
-    .01 to 10**-decades.
+    The claim is false if a quotient of the square root between x and 2 x exceeds `above`, for x
+    from .01 to 10**-decades.
     """
     points = 10.0 ** -np.arange(2.0, decades + 1.0, 2.0)
     quotients = (np.sqrt(2.0 * points) - np.sqrt(points)) / points
@@ -251,7 +251,7 @@ def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judge
 def trial_form_solves(lab: Laboratory, cases: list[int], limit: float) -> Judged:
     """Judge whether a trial solution of eq. 32 of the thesis solves some case exactly.
 
-    This is a steady rotation about axis 3 plus exponentials of time.
+    The trial solution is a steady rotation about axis 3 plus exponentials of time.
     """
     numbers = {}
     for case in cases:

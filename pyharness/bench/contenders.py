@@ -73,7 +73,7 @@ def refuse_rounding(solver: str, setting: float) -> None:
 
 
 def prepared_maker(name: str, scene: Scene, compiled: bool = False) -> Maker:
-    """Return a maker for the solver `name`; `compiled` is as in `prepare`."""
+    """Return a function that prepares integrations by the solver `name`."""
 
     def make(horizon: float, setting: float) -> Ready:
         attitude = scene.attitude is not None

@@ -56,7 +56,7 @@ class EnsembleLoad:
         return np.asarray(self.torque / np.array(MOMENTS))
 
     def part(self, rows: "slice | list[int]") -> "EnsembleLoad":
-        """Return the load of some bodies."""
+        """Return the load of the bodies in `rows`."""
         given = {name: getattr(self, name) for name in ("omega0", "torque", "attitude0")}
         own: dict[str, Any]
         own = {k: np.ascontiguousarray(x[rows]) for k, x in given.items() if x is not None}

@@ -110,7 +110,7 @@ class Refusal:
 
 @dataclass(frozen=True)
 class Finding:
-    """The results of a run."""
+    """The results of one benchmark."""
 
     workloads: list[Workload]
     rows: list[Row]

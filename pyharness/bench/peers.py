@@ -62,7 +62,7 @@ def peers() -> list[SceneContender]:
 def heyoka_maker(
     scene: Scene, formula: Formula | None = None, *, variational: bool = False
 ) -> Maker:
-    """Return a maker of heyoka integrations, compiled once for each tolerance.
+    """Return a function that prepares heyoka's integrations, compiled once for each tolerance.
 
     `formula` is as in `heyoka_equations`; `variational` adds derivatives by the initial state.
     """
@@ -215,7 +215,7 @@ def heyoka_functions() -> Functions[Any]:
 
 
 def numba_fixed(method: str, scene: Scene) -> Maker:
-    """Return a maker of numba integrations by "rk4" or "dop8" (order 8, in DOP853)."""
+    """Return a function that prepares numba's integrations by "rk4" or "dop8", DOP853's order 8."""
     import numba
 
     formula: Tableau = RK4

@@ -41,7 +41,7 @@ def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
 
     The kind of torque changes with the number. A scene with too large an error amplification, or
     too few or too many revolutions, is drawn again. With `attitude`, the body is initially aligned
-    with the axes of space; there is no `truth`, because `integer_series` has no attitude.
+    with the axes of space, and there is no `truth`.
     """
     source = Random(f"bench/{seed}/{number}")
     place = number - 1

@@ -30,7 +30,7 @@ class Saving:
 
     @property
     def ratio(self) -> float:
-        """Return the time with the part over that without."""
+        """Return the time with the computation divided by the time without it."""
         return self.with_it / self.without
 
 

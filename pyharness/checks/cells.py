@@ -1,7 +1,7 @@
 """Checks that the Fortran and Python versions of the thesis's programs agree bit for bit.
 
 A cell is a combination of a program, a case of Table 1, defects and readings (interpretations of
-doubtful cards). Runs in other number formats, such as the CDC's, are checked too.
+doubtful cards).
 
 A deck is compiled from the author's cards and shares no code with our versions. Its TAPE5 and
 printed page must equal our Fortran's. After an overflow the deck continues, unlike ours, but must
@@ -41,7 +41,7 @@ _EVALUATIONS = {"two-term": 3, "four-term": 5, "runge-kutta": 4}
 
 
 def cells(chosen: Selection) -> Iterator[Attempt]:
-    """Yield a check of each cell, or of a few if `chosen.thin`."""
+    """Yield a check of each program version in each case, or of a few if `chosen.thin`."""
     divergences = facts("divergences")["divergence"]
     listed = {entry["cell"] for entry in divergences if entry["kind"] == "cross-language"}
     for listing, case in all_cells():
@@ -53,7 +53,7 @@ def cells(chosen: Selection) -> Iterator[Attempt]:
 
 
 def of_cell(suite: str, listing: Listing, case: int) -> Name:
-    """Return the name of a cell's check of the kind `suite`."""
+    """Return the name of a check of a program version in a case; `suite` is its kind."""
     return Name(suite, listing.program, f"case-{case}", listing_name(listing))
 
 
@@ -151,7 +151,7 @@ def listings(program: str) -> list[Listing]:
 
 
 def decks(chosen: Selection) -> Iterator[Check]:
-    """Yield checks of the compiled decks against the port; none without a compiler."""
+    """Yield checks that the author's cards, compiled, agree with our Fortran, if possible."""
     every = product(chain.from_iterable(map(listings, PROGRAMS)), case_numbers())
     some = [cell for cell in every if not chosen.thin or cell_name(*cell) in _THIN]
     named = [(of_cell("decks", *cell), *cell) for cell in some]

@@ -108,7 +108,7 @@ class Check:
     )
 
     def __post_init__(self) -> None:
-        """Require limit and basis together."""
+        """Raise ValueError unless limit and basis are both given or both None."""
         if (self.limit is None) != (self.basis is None):
             raise ValueError(f"{self.id}: a limit has a basis, and a basis has a limit")
 

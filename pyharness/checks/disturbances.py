@@ -2,7 +2,7 @@
 
 The amplification by a step, measured in runs, may differ from the matrix of `theory.amplification`
 by rounding errors only. The step size at which a run diverges is compared with the prediction of
-linear stability. J is the Jacobian of Euler's equations (13-15 of the thesis).
+linear stability.
 """
 
 import math
@@ -302,8 +302,8 @@ def divergence(
 def smallest_divergent(scene: Scene, time: float, runner: Runner, smallest: float) -> float:
     """Return the smallest step size (s) with which a run diverges.
 
-    Then a component of omega exceeds twice its largest true value, or the run ends early. Return 0
-    if steps of `smallest` (s) diverge too, infinity if none do.
+    A run diverges if a component of omega exceeds twice its largest true value, or if it ends
+    early. Return 0 if steps of `smallest` (s) diverge too, infinity if none do.
     """
     bounds = 2.0 * np.array(_bounds(scene, time))
 

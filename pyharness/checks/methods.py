@@ -3,8 +3,8 @@
 The limit of an error is the tolerance. Errors of omega are relative to the largest omega; those of
 the attitude are angles (rad).
 
-An order is the power of the step size to which errors are proportional. The programs' omega is
-compared with `solve_ivp`; their velocity, and fixed-step methods, with the reference.
+To measure orders of convergence, the programs' omega is compared with `solve_ivp`; their velocity,
+and fixed-step methods, with the reference.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -168,7 +168,7 @@ _FEWEST, _MOST = 16, 4096
 
 
 def orders(chosen: Selection) -> Iterator[Attempt]:
-    """Yield checks of orders; the value is the theoretical minus the measured order."""
+    """Yield checks of convergence orders; the value is the theoretical minus the measured order."""
     for case in cases(chosen, (5,)):
         scene = case_scene(case)
         known = cache(partial(reference, scene, scene.times()))

@@ -197,7 +197,7 @@ _TIMES = (
 
 
 def port_report(command: str, checks: Sequence[PortCheck], asked: int, seed: str) -> Report:
-    """Return the report of a port's checks, at least one, of `asked` requested runs."""
+    """Return the report of a port's `checks`, at least one; `asked` runs were requested."""
     title = [f"{command}: against the twins, bit for bit"]
     title += [f"seed of the random scenes: {seed}"] if seed else []
     if checks[-1].value is None:

@@ -74,7 +74,7 @@ Entrances = dict[str, Callable[[], MethodRun]]
 
 
 def truth_of(drawn: Draw) -> Truth:
-    """Return the true omega of a draw at 0.4 and 1 of its end time.
+    """Return the true omega of a draw at 0.4 times its end time, and at the end.
 
     Raise InputError if the motion is unbounded or too fast, or rounding leaves no digit of omega.
     """

@@ -1,7 +1,7 @@
 """Checks of the programs' steps and stops, by recomputing every step from its scheme.
 
-Fortran and Python could share a fault too small to change the order. Each step of the corrected
-programs is therefore recomputed from the previous state, to within rounding errors.
+Each step of the corrected programs is recomputed from the previous state, to within rounding
+errors. This detects faults that Fortran and Python share, even too small to change the order.
 
 The stop test of the Runge-Kutta program (equation 19 of the thesis) divides the change of K
 (right-hand side) in a step by the change of U (state). A quotient above the stop constant ends the

@@ -1,4 +1,4 @@
-"""Tolerances at which the checks run each method, within a limit of right-hand sides."""
+"""Tolerances at which the checks run each method, within a work limit."""
 
 import math
 

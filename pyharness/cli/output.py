@@ -67,7 +67,7 @@ def write_folder(path: str, contents: dict[str, bytes], option: str) -> None:
 def check_tree(path: str, mark: str, option: str, kind: str = "edition") -> None:
     """Raise InputError if `write_tree` may not replace the folder.
 
-    It may contain only the JSON file `mark`, of schema `kind`, and the files listed there.
+    The folder may contain only the JSON file `mark`, of schema `kind`, and the files listed there.
     """
     check_replaceable(path, lambda folder: {mark, *_listed(folder / mark, kind)}, option)
 

@@ -91,7 +91,7 @@ class Parser(argparse.ArgumentParser):
         return [name for name in self._option_string_actions if name.startswith("--")]
 
     def read(self, verb: str, arguments: Sequence[str]) -> argparse.Namespace:
-        """Return the parsed options."""
+        """Return the parsed options, or raise InputError."""
         options, rest = self.parse_known_args(self._joined(arguments))
         if rest:
             raise unknown("option", rest[0], self.option_names(), verb)

@@ -1,6 +1,6 @@
 """The edition as plain data: cards, apparatus, verdicts, runs and printed pages.
 
-It is an RO-Crate without times and paths of the machine, the same bytes in every run.
+The RO-Crate has no times and paths of the machine, and is the same in every run.
 """
 
 from collections.abc import Iterator, Mapping

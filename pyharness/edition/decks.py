@@ -75,10 +75,10 @@ class CardView(NamedTuple):
 
     `card` is our text, in brackets if the scan lacks it. `witness` is our text with the scan's
     names: None if equal to `card`, empty if the scan lacks it. `scan` is the scan's line, or None;
-    `after` has the next lines of no card. `port` has each line of the Fortran port, the defect or
-    reading that switches it, and whether it is executed if this is active. `notes` begin with the
-    most important kind; `begins` has the notes on a range of cards that begins here, each with only
-    this range.
+    `after` has the following lines that belong to no card. `port` has each line of the Fortran
+    port, the defect or reading that switches it, and whether it is executed if this is active.
+    `notes` begin with the most important kind; `begins` has the notes on a range of cards that
+    begins here, each with only this range.
     """
 
     number: int
@@ -96,7 +96,7 @@ class CardView(NamedTuple):
 class Sheet(NamedTuple):
     """A printed page, with its number from 1.
 
-    `moved` is the entry on an unexpected place in the scan, or None.
+    `moved` is the apparatus entry on an unexpected place in the scan, or None.
     """
 
     number: int

@@ -56,8 +56,8 @@ class Effect:
 class CaseEffects:
     """The outcomes of four program versions in one case, which show an apparatus entry's effect.
 
-    `corrected_alone` is the original listing without this entry, `kept_alone` the corrected listing
-    with it.
+    `corrected_alone` is the original listing without this entry (such as a defect), `kept_alone`
+    the corrected listing with it.
     """
 
     program: str

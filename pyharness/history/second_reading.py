@@ -36,7 +36,7 @@ class ReadCard(NamedTuple):
 
 
 def chapman(first: int, second: int, both: int) -> float:
-    """Return Chapman's estimate of a population's size."""
+    """Return Chapman's estimate of a population's size from sample sizes and common members."""
     return (first + 1) * (second + 1) / (both + 1) - 1
 
 

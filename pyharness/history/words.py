@@ -58,8 +58,8 @@ _STYLES: dict[str, dict[str, Any]] = {
 class WordRun(NamedTuple):
     """A run in one arithmetic, compared with binary64.
 
-    `rule` is ``nearest-even``, ``chop`` (towards zero), or the CDC 6600's ``FX`` (unrounded) or
-    ``RX`` (rounded). `stop` has reason and step of an early end, as in ``V2 at 25``. Of the longer
+    `rule` is ``nearest-even``, ``chop`` (towards zero), or the CDC 6600's ``FX`` (truncating) or
+    ``RX`` (rounding). `stop` has reason and step of an early end, as in ``V2 at 25``. Of the longer
     page's `fields` numbers, `different` differ. `error` is omega's largest error (rad/s).
     `singular` counts the steps with a singular matrix (IER = 129).
     """

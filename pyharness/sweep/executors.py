@@ -125,10 +125,7 @@ def _by_pool(sweep: Sweep, chunks: list[int], workers: int) -> Results:
 
 @contextlib.contextmanager
 def deaf_children() -> Iterator[None]:
-    """Block Ctrl-C in this thread, and in processes and threads started within this context.
-
-    Only the parent should react to a terminal's SIGINT.
-    """
+    """Block Ctrl-C in this thread, and in processes and threads started within this context."""
     # Children inherit a blocked signal. Python would start the resource tracker with the first
     # child, and then unblock the signal.
     warning = "ignore:resource_tracker"

@@ -109,7 +109,7 @@ class Card(NamedTuple):
 
     @property
     def text_with_scanned_names(self) -> str:
-        """Return our text with the scan's form of names that we normalised."""
+        """Return our text with normalised names as in the scan."""
         kinds = {each["id"]: each["kind"] for each in facts("apparatus")["entry"]}
         return "".join(
             each.scans if each and kinds[each.entry] == "normalization" else text

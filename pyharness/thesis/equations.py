@@ -37,7 +37,7 @@ def accelerations(scene: Scene, listing: Listing) -> list[float]:
 
 
 def initial_torque(scene: Scene) -> Vector | None:
-    """Return the torque over moments (rad/s2) of the conjecture `initial-torque`, or None."""
+    """Return the torque over moments (rad/s2) by the conjecture `initial-torque`, or None."""
     given = card_torque(scene)
     if given is None or scene.moments is None:
         return None

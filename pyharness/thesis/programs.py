@@ -83,7 +83,7 @@ def work_of(word: str, implementation: str) -> str:
 
 
 def checked_word(word: object, implementation: str) -> str:
-    """Return `word`, which the implementation must support."""
+    """Return `word`; raise InputError if the implementation does not support it."""
     if not isinstance(word, str) or word not in WORD_NAMES:
         raise unknown("word", word, WORD_NAMES, "--word")
     if word not in COMPILED_WORDS and implementation == "fortran":

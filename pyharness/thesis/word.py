@@ -151,8 +151,8 @@ def framed(p: int, rounds: bool, xm: int, xe: int, ym: int, ye: int) -> tuple[in
     """Return the sum of xm 2**xe and ym 2**ye before normalisation, as a pair (frame, e).
 
     The frame, a register of 2 p bits, is in units of 2**(e - p), where e is the larger exponent.
-    The other operand is shifted and truncated. If `rounds`, RX first adds half a unit in the last
-    place to each operand.
+    The operand with the smaller exponent is shifted and truncated. If `rounds`, RX first adds half
+    a unit in the last place to each operand.
     """
     if xe <= ye:
         xm, xe, ym, ye = ym, ye, xm, xe

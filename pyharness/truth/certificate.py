@@ -153,7 +153,7 @@ class _Run:
         self.omega: list[Balls] = []
 
     def prove(self, limit: float, effort: float, progress: Progress, early: float) -> None:
-        """Compute all steps; raise _AmplifiedError if radii grow too fast after `early`."""
+        """Compute all steps; raise _AmplifiedError if, after part `early`, radii grow too fast."""
         system, clock = self._system, self._clock
         middle = [int(Fraction(x) * (1 << self._bits)) for x in self._record["omega"]]
         waves = [0, 1 << self._bits] * len(system.frequencies)

@@ -169,7 +169,7 @@ class _Attitude:
     psi' has the periods 2K and 4iK' in complex u. Its poles, where dn(u) = -1/c, are at u = 2iK' +
     iy and 2iK' - iy; the residues of psi'/(2 rate) are 1/2i and -1/2i, or opposite. The derivative
     of the phase of theta4((u - iy)/2K | 2 tau), or of its conjugate, has the same periods, poles
-    and residues. The difference is therefore constant.
+    and residues. The two therefore differ by a constant.
     """
 
     def __init__(

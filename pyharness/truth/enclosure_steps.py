@@ -136,7 +136,7 @@ class Equations:
         self._push = [arb(force) / arb(scene.masses[0]) for force in scene.forces]
 
     def at(self, begin: Fraction, forward: bool) -> Rates:
-        """Return the right-hand side for a step from `begin` (s), `forward` or not."""
+        """Return the right-hand side for a step from `begin` (s), forward or backward in time."""
         functions = functions_at(begin, forward)
 
         def rates(time: Any, state: Sequence[Any]) -> list[Any]:

@@ -258,7 +258,7 @@ class TapeSeries:
         return max(Decimal(self._order) / 2, 2 * abs(x) - _INVISIBLE) / 2
 
     def next_change(self, time: Decimal, forward: bool) -> Decimal | None:
-        """Return the time (s) of a table's next change or, unless `forward`, its last."""
+        """Return the time (s) of a table's next change or, unless `forward`, the previous one."""
         place = (bisect_right if forward else bisect_left)(self._changes, time) - (not forward)
         return self._changes[place] if 0 <= place < len(self._changes) else None
 

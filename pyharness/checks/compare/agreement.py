@@ -90,7 +90,7 @@ def distance(first: Trajectory, second: Trajectory) -> float:
 
 
 def differences(first: Trajectory, second: Trajectory) -> list[str]:
-    """Return the names of differing counts and endings or, if there are none, of arrays."""
+    """Return the names of differing counts and endings or, without any, of differing arrays."""
     names = {"steps": "steps", "evaluations": "evaluations", "ended": "ending", "stop": "stop"}
     found = [told for name, told in names.items() if getattr(first, name) != getattr(second, name)]
     if found:

@@ -93,7 +93,7 @@ class Comparison:
 
     @property
     def digits(self) -> float | None:
-        """Return the decimal digits that remain after amplified rounding in binary64, or None."""
+        """Return the number of decimal digits that amplified binary64 rounding leaves, or None."""
         return None if self.growth is None else digits_left(ROUNDING * self.growth)
 
     @property

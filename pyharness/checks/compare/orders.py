@@ -1,4 +1,4 @@
-"""Measured orders of convergence: powers of the step size to which errors are proportional."""
+"""Measurement of orders of convergence."""
 
 import math
 from collections.abc import Callable, Iterator

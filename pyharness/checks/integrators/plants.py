@@ -33,8 +33,8 @@ Advance = Callable[[Any, Array, Array, float], Any]
 class IntegratorPlant:
     """A fault planted in an integrator, which must be recognised by its name.
 
-    `request` changes the request, `state` the answered states. `advance` replaces the attitude,
-    step by step.
+    `request` changes the request, `state` the answered states. `advance` computes the attitude
+    after each step.
     """
 
     name: str

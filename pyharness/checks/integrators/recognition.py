@@ -45,7 +45,7 @@ class Finding:
 
 
 def recognised(results: Sequence[Judged]) -> list[Finding]:
-    """Return the faults that explain the errors or, failing that, those that orders show."""
+    """Return the faults that explain errors or, failing that, fit the orders of convergence."""
     explained = [(judged, _explained(judged)) for judged in results]
     pairs = [(name, judged.problem.name) for judged, names in explained for name in names]
     pairs += _by_orders([judged for judged, names in explained if not names])

@@ -165,6 +165,6 @@ def gradient(t: Any, q: Any, inertia: Any, rate: float) -> Any:
 
 
 def to_body(q: Any, vector: Any) -> Any:
-    """Return the body-axis components of a vector about the axes of space."""
+    """Return the components about body axes of a vector given about space axes."""
     w, v = q[0], q[1:]
     return (w * w - v @ v) * vector + 2.0 * (v @ vector) * v - 2.0 * w * np.cross(v, vector)

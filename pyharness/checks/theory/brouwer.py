@@ -40,7 +40,7 @@ POWER = Basis(
 
 @dataclass(frozen=True)
 class Noise:
-    """Bounds on the errors of a step, over the largest abs(omega)."""
+    """Bounds on the errors of a step, divided by the largest abs(omega)."""
 
     step: float  # s
     rounding: float  # bound of the rounding error, of random sign

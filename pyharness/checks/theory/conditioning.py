@@ -122,7 +122,7 @@ def sampled(
     """Return equally spaced times (s), close enough for the rates, and their results.
 
     `sample` takes times up to `time`, and returns the largest rate (1/s) and the results. It is
-    first called with `fewest` intervals, at last with at most `most`.
+    first called with `fewest` intervals, finally with at most `most`.
     """
     count = fewest
     while True:

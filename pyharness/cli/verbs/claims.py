@@ -38,8 +38,8 @@ EXAMPLE = "claims --explain abstract-superior"
 def run(options: argparse.Namespace) -> int:
     """Print verdicts on whether the programs reproduce the claims of the thesis.
 
-    With --assignments, --evidence or --atlas, print for which values that the thesis omits the
-    claims hold.
+    With --assignments, --evidence or --atlas, print the values, omitted in the thesis, with which
+    the claims hold.
     """
     if options.assignments:
         shared.refuse(options, "--assignments", ("explain", "evidence", "word"))

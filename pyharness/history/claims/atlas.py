@@ -78,7 +78,7 @@ class Atlas:
 
 
 def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Any], first: Batch) -> Atlas:
-    """Return the atlas of a sweep, which must be complete and have its axes."""
+    """Return the atlas of a sweep, which must be complete and have the atlas's axes."""
     if tuple(axes) != (*CHOSEN, *WHERE) or not all(map(len, axes.values())) or not codes:
         allowed = ", ".join((*CHOSEN, *WHERE))
         raise InputError(

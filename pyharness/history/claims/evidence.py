@@ -57,7 +57,7 @@ class Combination:
 
     @property
     def score(self) -> float:
-        """Return the sum of the points of all verdicts."""
+        """Return the sum of the verdicts' points, 1 if reproduced, 1/2 if in part."""
         return sum(POINTS.get(each, 0.0) for each in self.verdicts.values())
 
     @property

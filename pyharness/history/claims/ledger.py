@@ -22,7 +22,7 @@ from pyharness.thesis.programs import BINARY64
 
 @dataclass(frozen=True)
 class Survival:
-    """The verdicts with one assumption changed; `survives` if both are unchanged."""
+    """The verdicts with one assumption changed; `survives` if neither verdict changes."""
 
     assumption: str
     original: str

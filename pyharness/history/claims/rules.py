@@ -6,7 +6,7 @@ divides the step size; rows are at the undivided steps. Arrays of omega have the
 holds, and when in part.
 
 An error is the largest deviation of any omega component from the reference solution, over the
-completed steps. The range of a component is its largest minus its smallest value.
+completed steps.
 """
 
 import functools

@@ -4,9 +4,8 @@ Each function is the `test` of claims in `data/claims.toml`, where a claim's `ru
 decision, and `parameters` are the keyword arguments; further tests are in `methods`, `theory` and
 `rules`. `lab` runs the programs, original or corrected; `case` is a number of Table 1.
 
-Errors and ranges are defined in `rules`. The amplitude is half the largest range of a component of
-the reference omega. A claim that fails is "not reproduced" or, if the test passes `otherwise`,
-"false".
+Errors are defined in `rules`. The amplitude is half the largest range of a component of the
+reference omega. A claim that fails is "not reproduced" or, if the test passes `otherwise`, "false".
 """
 
 from dataclasses import dataclass, replace
@@ -128,7 +127,7 @@ def error_constant(lab: Laboratory, case: int) -> Judged:
 def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
     """Judge whether the stop test ended the Runge-Kutta run at step `step`.
 
-    The numbers describe the subsets of defects with which it stops there.
+    The numbers describe the subsets of defects with which the run stops there.
     """
     stop = lab.run("runge-kutta", case).stop
     name, readings = "runge-kutta", lab.listing("runge-kutta").readings

@@ -71,7 +71,7 @@ class PortProcess:
     """The process of a port, as a context manager; entering raises PortError if it can't start."""
 
     def __init__(self, command: str, patience: float = PATIENCE, option: str = "--port") -> None:
-        """Store the command, the longest wait (s), and the option that named the command."""
+        """Store the split command and the longest wait (s); an error message names `option`."""
         self._words = split_command(command, option)
         self._patience = patience
 

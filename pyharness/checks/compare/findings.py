@@ -62,7 +62,7 @@ class Comparison:
     Attributes
     ----------
     scene : Scene
-        With the initial attitude if attitudes were requested.
+        The scene, with the initial attitude if attitudes were requested.
     lipschitz : float or None
         The constant of the Runge-Kutta program's stop test, 1/s; None without programs.
     reference : Reference

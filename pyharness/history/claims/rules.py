@@ -84,7 +84,8 @@ def concur(bench: Bench, case: int, share: float) -> Grade:
 def fails(bench: Bench, case: int, share: float) -> Grade:
     """Test whether the Runge-Kutta program ends early and is wrong in a case.
 
-    Omega must deviate by over `share` of a component's range.
+    Omega must deviate by over `share` of a component's range. One of the two conditions gives a
+    grade in part.
     """
     runs = bench.runs("runge-kutta", case)
     error = share_of_range(runs.omega, bench.solution(case))

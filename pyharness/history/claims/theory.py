@@ -114,7 +114,7 @@ def bounded_not_lipschitz(lab: Laboratory, decades: float, above: float) -> Judg
 def local_error(
     lab: Laboratory, cases: list[int], method: str, power: float, within: float
 ) -> Judged:
-    """Judge whether the error of one step is proportional to a `power` of the step size."""
+    """Judge whether the error of one step is O(h**p), with step size h and p = `power`."""
     stepped = partial(_stepped, method=method)
     numbers = {f"case {n}: power of the step": _power(lab.scene(n), stepped) for n in cases}
     near = [abs(each - power) <= within for each in numbers.values()]

@@ -33,12 +33,13 @@ module tape
     real(dp), pointer, contiguous :: breaks(:)       !! s
     real(dp), pointer, contiguous :: pieces(:, :)    !! (4, :): coefficients in ascending order
     type(c_ptr) :: leaves                            !! compiled operations; null: interpreted
+    logical :: has_attitude = .false. !! whether perturbations are those of omega and the attitude
   end type tape_t
 
   ! What C reads of a tape, and the terms that it computes.
   type, bind(c), public :: tape_arrays_t
     integer(c_int) :: n_unknowns, n_operations, n_combinations
-    integer(c_int) :: has_attitude !! not 0: perturbations are those of omega and the attitude
+    integer(c_int) :: has_attitude
     type(c_ptr) :: operations, starts, slots, coefficients, constants, a, v, work, leaves
   end type tape_arrays_t
 
@@ -126,7 +127,8 @@ contains
     type(c_ptr), intent(in) :: a, v  !! the terms of the slots and of perturbations, as in series_t
     type(c_ptr), intent(in) :: work  !! storage, as begin_work of tape_terms.c divides it
 
-    arrays_of = tape_arrays_t(tape%n_unknowns, tape%n_operations, size(tape%constants), 0, &
+    arrays_of = tape_arrays_t(tape%n_unknowns, tape%n_operations, size(tape%constants), &
+                              merge(1, 0, tape%has_attitude), &
                               c_loc(tape%operations), c_loc(tape%starts), c_loc(tape%slots), &
                               c_loc(tape%coefficients), c_loc(tape%constants), a, v, work, &
                               tape%leaves)

@@ -121,11 +121,8 @@ contains
     !! Compute the terms of the operations of a tape alone.
     type(tape_t), intent(in) :: live
     type(series_t), intent(inout) :: s
-    integer :: has_attitude
 
-    has_attitude = s%arrays%has_attitude
     s%arrays = arrays_of(live, c_loc(s%a), s%arrays%v, s%arrays%work)
-    s%arrays%has_attitude = has_attitude
     call begin_work(s%arrays, live%n_slots)
   end subroutine use_operations
 

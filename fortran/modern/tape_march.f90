@@ -138,7 +138,6 @@ contains
     first_own = n + 1
     if (associated(solution%own)) first_own = n + 2 - size(solution%own, 1)
     y(4:first_own - 1) = attitude(:first_own - 4)
-    s%arrays%has_attitude = merge(1, 0, n == 7 .and. first_own > n)
     call begin_own()
     y_low = 0.0_dp
     t = 0.0_dp
@@ -430,7 +429,7 @@ contains
           s%blocks(1:SIDE_BY_SIDE, 0, FIRST_UNKNOWN - 1 + i, block) = lanes(:, i, block)
         end do
       end do
-      if (s%arrays%has_attitude == 0) return
+      if (.not. tape%has_attitude) return
       associate (v => s%blocks(:, 0, FIRST_UNKNOWN + 3:FIRST_UNKNOWN + 6, 1))
         call rotate(y(4), -y(5), -y(6), -y(7), v(:, 1), v(:, 2), v(:, 3), v(:, 4))
         v = v/dot_product(y(4:7), y(4:7))
@@ -792,7 +791,7 @@ contains
       do i = 1, n
         call two_sum((y(i)), change(i) + y_low(i), y(i), y_low(i))
       end do
-      if (s%arrays%has_attitude /= 0) then
+      if (tape%has_attitude) then
         call rotate(y(4), y(5), y(6), y(7), lanes(:, 4, 1), lanes(:, 5, 1), lanes(:, 6, 1), &
                     lanes(:, 7, 1))
       end if
@@ -815,7 +814,7 @@ contains
           error(i) = part*error(i) + s%blocks(1, k, FIRST_UNKNOWN - 1 + i, 1)
         end do
       end do
-      if (s%arrays%has_attitude /= 0) then
+      if (tape%has_attitude) then
         call rotate(y(4) + change(4), y(5) + change(5), y(6) + change(6), y(7) + change(7), &
                     error(4), error(5), error(6), error(7))
       end if
@@ -902,7 +901,7 @@ contains
         do i = 1, n
           errors(:, i) = errors(:, i) + s%blocks(1, 0, FIRST_UNKNOWN - 1 + i, 1)
         end do
-        if (s%arrays%has_attitude /= 0) then
+        if (tape%has_attitude) then
           call rotate(y(4) + changes(:, 4), y(5) + changes(:, 5), y(6) + changes(:, 6), &
                       y(7) + changes(:, 7), errors(:, 4), errors(:, 5), errors(:, 6), errors(:, 7))
         end if

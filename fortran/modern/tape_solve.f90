@@ -39,7 +39,8 @@ contains
     !! The status is COMPLETE, OVERFLOW, GAVE_UP, INTERRUPTED or SENSITIVE.
     ! Addresses of a tape_t, a request_t and a solution_t, passed through C.
     type(c_ptr), intent(in), value :: tape_at, request_at, solution_at
-    type(tape_t), pointer :: tape
+    type(tape_t), pointer :: given
+    type(tape_t), target :: tape
     type(request_t), pointer :: request
     type(solution_t), pointer :: solution
     real(dp), allocatable, target :: memory(:)
@@ -53,7 +54,7 @@ contains
     real(dp) :: at_end ! amplification that is expected there
     logical :: again, fits
 
-    call c_f_pointer(tape_at, tape)
+    call c_f_pointer(tape_at, given)
     call c_f_pointer(request_at, request)
     call c_f_pointer(solution_at, solution)
     solution%status = GAVE_UP
@@ -74,6 +75,8 @@ contains
       solution%growth = 1.0_dp
       return
     end if
+    tape = given
+    tape%has_attitude = tape%n_unknowns == 7 .and. .not. associated(solution%own)
     call allocate_series(tape, 1 + tape%n_unknowns/SIDE_BY_SIDE, &
                          FIRST_UNKNOWN - 1 + tape%n_unknowns, memory, s, fits)
     if (.not. fits) return

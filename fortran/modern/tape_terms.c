@@ -510,12 +510,12 @@ void OF_LEVEL(slot_gradient, LEVEL)(const struct tape *tape, int slot, double *g
 
 /* Compute term k + 1 of the perturbations of the unknowns, with the Jacobian as a polynomial of the
    part of the step. */
-static ALWAYS_INLINE void perturb_with(const int n, const int columns, const int nodes,
-                                       perturbations *v, const matrix *jacobian, int k)
+static ALWAYS_INLINE void perturb_with(const int n, const int nodes, perturbations *v,
+                                       const matrix *jacobian, int k)
 {
   const double part = 1.0 / (k + 1);
   const int degree = k < nodes - 1 ? k : nodes - 1;
-  for (int p = 0; p < columns; p += IN_REGISTER) {
+  for (int p = 0; p < SIDE_BY_SIDE; p += IN_REGISTER) {
     reg sums[MOST_UNKNOWNS];
 #pragma GCC unroll 7
     for (int i = 0; i < n; i++) sums[i] = (reg){0.0};
@@ -702,7 +702,7 @@ static ALWAYS_INLINE void perturb_all(const struct tape *tape, const int nodes, 
 {
   if (tape->n_unknowns == 3) perturb_omega(nodes, v, jacobian, k);
   else if (tape->has_attitude) perturb_attitude(nodes, v, jacobian, h, k);
-  else perturb_with(tape->n_unknowns, SIDE_BY_SIDE, nodes, v, jacobian, k);
+  else perturb_with(tape->n_unknowns, nodes, v, jacobian, k);
 }
 
 /* Expand eight perturbations, from number `number` on, to as many terms as the part `factor` of the

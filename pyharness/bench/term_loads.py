@@ -235,7 +235,7 @@ def term_leaves(scenes: Sequence[TermScene], compiled: bool) -> Counter[str]:
 def term_peers(scenes: Sequence[TermScene]) -> list[SceneContender]:
     """Return heyoka, heyoka with variational equations, and DOP853, installed or not.
 
-    heyoka computes a ready-made torque by its formula, others from recorded operations.
+    heyoka computes a torque by the scene's formula, or else from its recorded operations.
     """
     formulas = {each.scene.name: each.formula for each in scenes}
 

@@ -94,9 +94,9 @@ class CardView(NamedTuple):
 
 
 class Sheet(NamedTuple):
-    """A printed page, with its number from 1.
+    """A printed page, numbered from 1.
 
-    `moved` is the apparatus entry on an unexpected place in the scan, or None.
+    `moved` is the text of the note that the page is out of place in the scan, or None.
     """
 
     number: int

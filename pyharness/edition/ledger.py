@@ -99,7 +99,7 @@ def counted(judged: Sequence[Judgement]) -> str:
 
 
 def account() -> dict[str, Markup]:
-    """Return HTML by id: texts of `data/account.toml`, effects of single defects."""
+    """Return HTML by id: the statements of `data/account.toml`, and the effect of each defect."""
     texts = {each["id"]: each["text"] for each in facts("account")["statement"]}
     texts |= {each["id"]: each["part"] for each in entries() if "part" in each}
     return {name: inline(text) for name, text in texts.items()}

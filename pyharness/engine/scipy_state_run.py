@@ -155,7 +155,7 @@ class StateRun(Run):
             )
 
     def after_step(self, time: float, state: Sequence[float]) -> None:
-        """Record the step; raise NoNumberError after over 50 steps at the same time."""
+        """Record the step; raise NoNumberError if the time has not advanced in over 50 steps."""
         self._stuck = self._stuck + 1 if time == self._reached else 0
         if self._stuck > _MOST_STUCK:
             raise NoNumberError

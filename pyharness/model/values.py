@@ -153,7 +153,7 @@ def boolean(where: str, value: object) -> bool:
 
 
 def tolerance_of(value: object, finest: float) -> float:
-    """Return a tolerance as a float; its range is not checked."""
+    """Return a tolerance as a float of any range; `finest` is for the message alone."""
     found = converted(value)
     if isinstance(found, float):
         return found

@@ -169,7 +169,7 @@ _HEAD = re.compile(
 
 
 def label(sweep: Sweep) -> Label:
-    """Return the identity of a store that this version makes."""
+    """Return the identity of the store that this version of the package makes of a sweep."""
     return Label(SCHEMAS["sweep store"], version(), sweep.fingerprint)
 
 

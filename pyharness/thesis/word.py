@@ -44,10 +44,10 @@ class Rules(NamedTuple):
 
 
 def rounding(p: int, least: int, most: int, cut: bool, gradual: bool) -> Rounding:
-    """Return a function that rounds m 2**e to p bits and an exponent from `least` to `most`.
+    """Return a function that rounds m 2**e to a p-bit integer times 2**k, `least` <= k <= `most`.
 
-    Rounding is towards zero if `cut`, else to nearest, ties to even. A larger exponent gives
-    infinity, a smaller one zero or, if `gradual`, a subnormal number or zero as in IEEE 754.
+    Rounding is towards zero if `cut`, else to nearest, ties to even. A result above the range is
+    infinite; one below it is zero or, if `gradual`, a multiple of 2**`least` as in IEEE 754.
     """
     shortened = _cut if cut else _to_even
 

@@ -26,11 +26,12 @@ _MOST_BITS = 20_000
 def enclose_free(
     scene: Scene, times: Sequence[float], digits: int, attitude: bool = False
 ) -> list[Balls]:
-    """Return balls that contain omega (rad/s) without torque at each of `times` (s).
+    """Return balls that contain the torque-free omega (rad/s) at each of `times` (s).
 
     With `attitude`, four more balls contain the unit quaternion from body to space, scalar first
-    and continuous in time. Each radius is at most 10**-`digits`, for omega times the larger of 1
-    rad/s and the largest initial component. The motion must be bounded; an attitude needs moments.
+    and continuous in time; the scene must then have moments of inertia. A quaternion's radii are at
+    most 10**-`digits`; omega's are at most that times the larger of 1 rad/s and the largest initial
+    component. The motion must be bounded.
     """
     scale = max(Fraction(1), *(abs(Fraction(w)) for w in scene.omega))
     bits = min(64 + math.ceil(digits * math.log2(10)), _MOST_BITS)

@@ -192,7 +192,7 @@ class Equations:
 
 
 def _tapes(scene: Scene) -> list[Tape]:
-    """Return tapes whose sum is the torque: one per wave of a law, because tapes round sums."""
+    """Return tapes whose exact sum is the torque; a sum within a tape would be rounded."""
     law = scene.torque
     if isinstance(law, TorqueLaw):
         laws = [TorqueLaw(law.constant, law.rate, frame=law.frame)]
@@ -258,7 +258,7 @@ class _Proof:
         return _upper(sum((_upper(abs(x) / s) ** 2 for x, s in parts), arb(0)).sqrt())
 
     def balls(self, attitude: bool) -> list[Balls]:
-        """Return the balls of each group of unknowns, with the attitude normalised."""
+        """Return the balls of each group of unknowns; with `attitude`, group 1 is normalised."""
         found = []
         for n, (block, radius) in enumerate(zip(self.blocks, self.radii, strict=True)):
             pairs = zip(self.middle[block], self.scales[block], strict=True)

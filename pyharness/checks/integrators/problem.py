@@ -120,7 +120,7 @@ class Problem:
         return _ROUNDINGS * rounding * math.sqrt(self.most_steps)
 
     def request(self, level: int, scene: Scene | None = None, times: Array | None = None) -> bytes:
-        """Return the JSON line that requests states at a level, by default of this problem."""
+        """Return the JSON line that requests states with a level's step size and tolerance."""
         asked = (self.times if times is None else times).tolist()
         return request(scene or self.scene, asked, self.step_size(level), self.tolerance(level))
 

@@ -159,7 +159,7 @@ def orbit(t: Any, rate: float) -> Any:
 
 
 def gradient(t: Any, q: Any, inertia: Any, rate: float) -> Any:
-    """Return r x I r, like a gravity-gradient torque; r is the direction to the satellite."""
+    """Return r x I r, a gravity-gradient torque without its factor; r is the local vertical."""
     r = to_body(q, orbit(t, rate))
     return np.cross(r, inertia * r)
 

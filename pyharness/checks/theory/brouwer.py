@@ -167,7 +167,7 @@ def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
 
 
 def _terms(body: Orbit, scene: Scene, step: float, order: int) -> list[Array]:
-    """Return the Taylor terms of a step (s) from n states, each of shape (n, 3)."""
+    """Return the Taylor terms of omega, of shape (n, 3), from n states for a step in seconds."""
     a = np.array(scene.euler_coefficients)
     terms = [body.states]
     for k in range(1, order + 1):

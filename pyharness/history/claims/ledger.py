@@ -32,7 +32,10 @@ class Survival:
 
 @dataclass(frozen=True)
 class Judgement:
-    """The verdicts on a claim, as adopted and with each assumption changed alone."""
+    """The verdicts on a claim, from runs of the original and of the corrected program.
+
+    `survivals` has the verdicts with each assumption changed alone.
+    """
 
     claim: dict[str, Any]
     original: Judged

@@ -62,11 +62,11 @@ EFFORT = {"--effort F": _EFFORT.format(10, " (30 for a program of the thesis)")}
 EFFORT_WITHOUT_PROGRAMS = {"--effort F": _EFFORT.format(10, "")}
 EFFORT_OF_PROGRAMS = {"--effort F": _EFFORT.format(30, "")}
 STRICT = {
-    "--strict": "Exit with status 1 also if amplified rounding errors of a method may exceed its "
-    "tolerance, or a method ends before the last requested time. Even without --strict, the exit "
-    "status is 1 if the Fortran and Python versions of a program differ, a corrected program "
-    "misses its order of convergence, or a method of --method misses its tolerance or ends "
-    "although the true solution continues."
+    "--strict": "Exit with status 1 also if a method ends before the last requested time, or if "
+    "its amplified rounding errors may exceed its tolerance. Without --strict, the exit status is "
+    "1 only if the Fortran and Python versions of a program differ, a corrected program misses its "
+    "order of convergence, or a method of --method misses its tolerance or ends although the true "
+    "solution continues."
 }
 ALSO = {
     "--also FILE,...": "Write the result to these files too, each in the format of its ending: "

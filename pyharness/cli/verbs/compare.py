@@ -27,8 +27,8 @@ OPTIONS = {
     f"{WORD_NAMES[0]}). cdc48 is the arithmetic of CDC computers, which truncates results; "
     "cdc48-rounded rounds them.",
     "--tolerance E": "Largest allowed error of omega, relative to its largest component, at most 1 "
-    "(default: each method's own). It applies to the methods of --method; without them, to SciPy's "
-    "solve_ivp.",
+    "(default: each method's own). Without --method, it applies to SciPy's solve_ivp (see "
+    "--numerics).",
     "--attitude": "Compare the attitude (orientation) of the body too; its error is an angle in "
     "rad.",
     "--ablate": "Run each program with every subset of its defects, and list the subsets, largest "

@@ -1,10 +1,10 @@
 """Errors of trajectories against the reference, and differences between Fortran and Python."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pyharness.model.attitude import angle_between
 from pyharness.model.scene import Scene
@@ -48,7 +48,7 @@ def accuracy(scene: Scene, trajectory: Trajectory, truth: Reference) -> Accuracy
         energy = momentum = turned = in_space = None
         is_free = scene.moments is not None and scene.torque.is_zero and len(trajectory.omega) > 0
         if is_free:
-            inertia = np.array(scene.moments)
+            inertia = _scaled(np.array(scene.moments))
             energy = _drift(scene, trajectory, inertia)
             momentum = _drift(scene, trajectory, inertia * inertia)
         if trajectory.attitude is not None and truth.attitude is not None:
@@ -65,20 +65,33 @@ def _largest(errors: Array) -> float:
 
 
 def _drift(scene: Scene, trajectory: Trajectory, weights: Array) -> float:
-    start = float(weights @ np.square(scene.omega))
+    exponent = _exponent(scene.omega)
+    start = float(weights @ np.square(np.ldexp(scene.omega, -exponent)))
     if start == 0.0:
         return 0.0
-    return float(np.abs(np.square(trajectory.omega) @ weights / start - 1.0).max(initial=0.0))
+    rows = np.square(np.ldexp(trajectory.omega, -exponent)) @ weights
+    return float(np.abs(rows / start - 1.0).max(initial=0.0))
 
 
 def _drift_in_space(scene: Scene, trajectory: Trajectory) -> float:
-    before = np.array(scene.moments) * scene.omega
+    moments, exponent = _scaled(np.array(scene.moments)), _exponent(scene.omega)
+    before = moments * np.ldexp(scene.omega, -exponent)
     (start,) = turned_to_space(np.array([scene.attitude]), before[None, :])
     size = float(np.linalg.norm(start))
     if size == 0.0:
         return 0.0
-    momentum = replace(trajectory, moments=scene.moments).angular_momentum("space")
+    assert trajectory.attitude is not None
+    momentum = turned_to_space(trajectory.attitude, moments * np.ldexp(trajectory.omega, -exponent))
     return float(np.linalg.norm(momentum - start, axis=1).max(initial=0.0)) / size
+
+
+def _scaled(vector: Array) -> Array:
+    """Return a vector multiplied by a power of 2, by which no square is out of range."""
+    return np.asarray(np.ldexp(vector, -_exponent(vector)))
+
+
+def _exponent(vector: ArrayLike) -> int:
+    return int(np.frexp(np.abs(vector).max())[1])
 
 
 def distance(first: Trajectory, second: Trajectory) -> float:

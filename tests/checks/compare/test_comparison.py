@@ -173,6 +173,17 @@ def test_accuracy_against_known_numbers() -> None:
         assert drift == pytest.approx(0.0201 * parts[2] / parts.sum(), rel=1e-3)
 
 
+@pytest.mark.parametrize("size", [1e-170, 1e170])
+def test_drifts_need_no_squares_of_the_given_size(size: float) -> None:
+    scene = replace(case_scene(4), steps=1, attitude=(1.0, 0.0, 0.0, 0.0))
+    omega, moments = size * np.array(scene.omega), size * np.array(scene.moments)
+    small = replace(scene, omega=tuple(omega), moments=tuple(moments))
+    run = replace(_trajectory(omega[None, :] * 1.01), attitude=np.array([scene.attitude]))
+    found = accuracy(small, run, replace(reference(scene, scene.times()), omega=run.omega))
+    assert (found.energy, found.momentum) == pytest.approx((0.0201, 0.0201))
+    assert found.momentum_in_space == pytest.approx(0.01)
+
+
 def test_error_of_attitudes_is_an_angle() -> None:
     scene = replace(case_scene(4), steps=2, attitude=(0.5, -0.1, 0.7, 0.5))
     truth = reference(scene, scene.times())

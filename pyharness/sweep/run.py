@@ -19,7 +19,7 @@ from pyharness.sweep.executors import Engine, engine
 from pyharness.sweep.reductions import empty, needs_attitudes
 from pyharness.sweep.store import Store, check_store, opened
 from pyharness.sweep.store_layout import filled
-from pyharness.sweep.sweep import Arrays, Indices, Sweep, spread
+from pyharness.sweep.sweep import Arrays, Indices, Sweep, points, spread
 
 # Scenes in the samples, evenly spread over the grid; the smallest sample is measured first.
 _SAMPLES = (8, 256, 2048, 8192)
@@ -30,6 +30,9 @@ _PART = 0.01
 _LONGEST = 60.0  # longest expected time (s) of such a sample
 # Fewest values sampled along a dimension whose value all scenes of a batch share.
 _PLACES = 5
+# Chunks measured whole if they are a small part and not slow; growth of the parts of a chunk.
+_CHUNKS = 3
+_GROWTH = 16
 _FILES = 20  # most chunks solved, or written and read, for a measurement
 
 
@@ -94,21 +97,43 @@ def _pattern(sweep: Sweep, chunk: int) -> Arrays:
 def seconds_per_chunk(sweep: Sweep) -> float:
     """Return the time (s) to solve a chunk in this process.
 
-    It is measured on whole chunks below 0.2 s, else on samples.
+    It is measured on whole chunks below 0.2 s, or if few take at most a minute; else on samples.
     """
     scenes = math.prod(sweep.chunk_shape)
     seconds = scenes * seconds_per_scene(sweep)
+    most, enough = _FILES, _ENOUGH
     if seconds > _ENOUGH:
-        return seconds
+        seconds = min(seconds, _seconds_by_parts(sweep, sweep.n_chunks // 2))
+        most, enough = _CHUNKS, math.inf
+        if _PART * sweep.n_chunks < _CHUNKS or _CHUNKS * seconds > _LONGEST:
+            return seconds
     # Only whole chunks show the constant cost of a chunk.
     begin = time.perf_counter()
-    count = min(_FILES, sweep.n_chunks)
+    count = min(most, sweep.n_chunks)
     for i in range(count):
         solve_chunk(sweep, i * (sweep.n_chunks - 1) // max(1, count - 1))
-        if time.perf_counter() - begin > _ENOUGH:
+        if time.perf_counter() - begin > enough:
             count = i + 1
             break
     return (time.perf_counter() - begin) / count
+
+
+def _seconds_by_parts(sweep: Sweep, chunk: int) -> float:
+    """Return the time (s) of a chunk, by times of one scene and of ever larger parts."""
+    where = points(sweep.box(chunk))
+    total = len(where[0])
+
+    def took(count: int) -> float:
+        places = np.arange(count) * (total - 1) // max(1, count - 1)
+        begin = time.perf_counter()
+        solve_points(sweep, [each[places] for each in where])
+        return time.perf_counter() - begin
+
+    one, each, count = took(1), math.inf, _GROWTH
+    while count < total and (each == math.inf or one + count * each < _LONGEST):
+        each = max(0.0, took(count) - one) / (count - 1)
+        count *= _GROWTH
+    return one + total * each
 
 
 def seconds_per_scene(sweep: Sweep) -> float:

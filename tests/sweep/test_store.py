@@ -24,6 +24,7 @@ from pyharness.sweep.batches import solve_chunk
 from pyharness.sweep.executors import engine
 from pyharness.sweep.run import check_size, forecast
 from pyharness.sweep.store import opened
+from pyharness.sweep.sweep import Sweep, points
 from pyharness.sweep.sweep_file import read_sweep
 from tests.sweep.killed import ATTITUDE, OMEGA, kill_and_resume
 from tests.sweep.sweeps import PROGRAM, SQUARE, TILT, files, run_sweep, text, written
@@ -212,6 +213,22 @@ def test_forecast_has_the_time_of_files(tmp_path: Path, monkeypatch: Patch) -> N
         # Existing chunks are read again, which takes time too.
         assert 2_000.0 < forecast(sweep, str(tmp_path / "store"), 1, own) < 20_000.0
     assert [each.name for each in tmp_path.iterdir()] == ["sweep.toml"]
+
+
+def test_forecast_knows_the_constant_cost_of_a_batch(tmp_path: Path, monkeypatch: Patch) -> None:
+    now = [0.0]
+
+    def solved(sweep: Sweep, where: list[Any]) -> None:
+        now[0] += 3.0 + 0.004 * len(where[0])
+
+    monkeypatch.setattr(run, "time", SimpleNamespace(perf_counter=lambda: now[0]))
+    monkeypatch.setattr(run, "solve_points", solved)
+    monkeypatch.setattr(run, "solve_chunk", lambda sweep, i: solved(sweep, points(sweep.box(i))))
+    for chunks in (50, 400):
+        axis = TILT.replace("count = 6", f"count = {chunks * 2000}")
+        given = text(axis, top='chunk = 2000\nreductions = ["end"]')
+        seconds = run.seconds_per_chunk(read_sweep(written(tmp_path, given)))
+        assert seconds == pytest.approx(11.0, rel=1e-2)
 
 
 def test_file_of_the_longest_axis_is_within_its_limit(tmp_path: Path, monkeypatch: Patch) -> None:

@@ -27,7 +27,7 @@ from pyharness.engine.parameters import (
 from pyharness.engine.recorded import kernel_tape
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY, product
-from pyharness.model.errors import InputError, TimedError, kind_of, unknown
+from pyharness.model.errors import InputError, TimedError, WorkLimitError, kind_of, unknown
 from pyharness.model.extension import COMPLETE, GAVE_UP, extension
 from pyharness.model.scene import ImpossibleBodyWarning, Scene
 from pyharness.model.state_torque import has_switches, is_opaque
@@ -221,6 +221,8 @@ def _extrapolate(name: str, moved: Callable[[float], Scene], size: float, states
         try:
             with warnings.catch_warnings(action="ignore", category=ImpossibleBodyWarning):
                 after, before = states(moved(h)), states(moved(-h))
+        except WorkLimitError as exceeded:
+            raise InputError(f"sensitivities: {exceeded}") from None
         except InputError:  # as when the motion slides; a smaller change may succeed
             row = []
             continue

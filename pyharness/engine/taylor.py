@@ -13,7 +13,7 @@ from pyharness.model.attitude import IDENTITY
 from pyharness.model.constant_body import with_constant_body
 from pyharness.model.dense_output import NODES, Pieces
 from pyharness.model.effort import advice
-from pyharness.model.errors import TimedError
+from pyharness.model.errors import WorkLimitError
 from pyharness.model.extension import ENDS, GAVE_UP, extension
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
@@ -61,7 +61,7 @@ def taylor(
         # After one step the kernel forecasts the work.
         how = "would exceed" if steps == 1 else "exceeded"
         count = "" if steps == 1 else f" after {steps} steps"
-        raise TimedError(
+        raise WorkLimitError(
             f"taylor {how} its work limit before t = {{time}} s{count}; "
             + advice("use a shorter time or a larger tolerance", effort, work[1]),
             times[n_rows],

@@ -53,7 +53,11 @@ class TimedError(InputError):
 
     def slower(self, factor: float) -> "TimedError":
         """Return the same error with its time multiplied by `factor`."""
-        return TimedError(self._message, self.time * factor)
+        return type(self)(self._message, self.time * factor)
+
+
+class WorkLimitError(TimedError):
+    """A TimedError of an integration that exceeds its work limit."""
 
 
 class NotBuiltError(RuntimeError):

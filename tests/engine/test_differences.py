@@ -144,6 +144,14 @@ def test_a_switch_that_is_only_touched_is_refused() -> None:
         solve(scene, 5.0, sensitivities=["torque.push"])
 
 
+def test_the_work_limit_is_named() -> None:
+    scene = Scene("brake", (0.1, 0.2, 0.8), MOMENTS, torque=brake)
+    times, effort = [20.0], 2.3e-6
+    assert solve(scene, times, tolerance=1e-2, effort=effort).steps
+    with pytest.raises(InputError, match=r"^sensitivities: taylor .* work limit"):
+        solve(scene, times, tolerance=1e-2, effort=effort, sensitivities=["torque.weak"])
+
+
 def test_bodies_have_them_too() -> None:
     scene = Scene("brake", (0.0, 0.0, 0.8), MOMENTS, torque=brake)
     found = solve_many(scene, 20.0, omega=[(0, 0, 0.8), (0, 0, 0.7)], sensitivities=["omega"])

@@ -27,6 +27,12 @@ class OwnState(NamedTuple):
     scale: float = 0.0
 
 
+class BroughtStates(tuple[OwnState, ...]):
+    """States that a torque brings; a copy of the scene with another torque has that torque's."""
+
+    __slots__ = ()
+
+
 def checked_states(value: object) -> tuple[OwnState, ...]:
     """Return the argument `states` of a scene."""
     if isinstance(value, tuple) and all(isinstance(each, OwnState) for each in value):

@@ -13,7 +13,7 @@ from pyharness.model.changing import Changing
 from pyharness.model.errors import InputError, kind_of, printable
 from pyharness.model.facts import facts
 from pyharness.model.keywords import with_hints
-from pyharness.model.own_states import OwnState, checked_states
+from pyharness.model.own_states import BroughtStates, OwnState, checked_states
 from pyharness.model.state_torque import StateTorque, checked_torque
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.values import (
@@ -215,7 +215,10 @@ class Scene:
         # A torque may bring its states, such as the momentum of wheels.
         brought = self.torque.starts if isinstance(self.torque, StateTorque) else ()
         has_none = isinstance(self.states, (tuple, Mapping)) and not self.states
-        self._set("states", checked_states(brought if has_none else self.states))
+        if brought and (has_none or isinstance(self.states, BroughtStates)):
+            self._set("states", BroughtStates(checked_states(brought)))
+        else:
+            self._set("states", checked_states(self.states))
         names = tuple(each.name for each in self.states)
         self._set("torque", checked_torque(self.torque, names))
         if self.torque.in_space and self.coefficients is not None:

@@ -2,6 +2,7 @@
 
 import cmath
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -629,6 +630,16 @@ def test_growth_is_not_that_of_the_size_of_a_state(
         assert found.growth < 20.0
         assert found.error is not None
         assert found.error < tolerance
+
+
+def test_another_torque_brings_its_own_states() -> None:
+    first, second = (wheels((0.0, 0.0, h), motor=lambda t, omega, h: -omega) for h in (1.0, 2.0))
+    scene = Scene("wheel", (0.0, 0.1, 1.0), MOMENTS, torque=first)
+    assert replace(scene, omega=(0.0, 0.0, 1.0)).states == scene.states
+    assert replace(scene, torque=second).states == replace(scene, torque=second, states=()).states
+    assert replace(scene, torque=second).states != scene.states
+    given = tuple(each._replace(start=3.0) for each in scene.states)
+    assert {each.start for each in replace(scene, torque=second, states=given).states} == {3.0}
 
 
 def test_states_of_other_scenes_are_checked_too() -> None:

@@ -177,6 +177,8 @@ def _checked(given: Any, name: str, attitude: bool, own: Sequence[str]) -> Event
     n_attitude = 4 if attitude else 0
     if isinstance(given, Event):
         event, needs_attitude = given, given.needs_attitude
+    elif isinstance(given, type):
+        raise InputError(f"{name} is a class; {_FUNCTIONS_ALLOWED}")
     elif callable(given):
         count = _arguments(given, name, len(own) > 0)
         needs_attitude = count == 3

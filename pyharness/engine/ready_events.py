@@ -162,7 +162,7 @@ def rest(value: Number, *, terminal: bool | int = False, direction: int = -1) ->
     Raises
     ------
     InputError
-        If `value` is not finite or not above 0.
+        If `value` is not from 1e-150 to 1e150.
 
     Examples
     --------
@@ -175,8 +175,9 @@ def rest(value: Number, *, terminal: bool | int = False, direction: int = -1) ->
     (array([2.30258509]), array([1., 2.]), 'event')
     """
     level = finite("events: rest value", value)
-    if level <= 0.0:
-        raise InputError(f"events: rest value: {level:g}; allowed: a number greater than 0")
+    # The squares of other values are 0 or overflow.
+    if not 1e-150 <= level <= 1e150:
+        raise InputError(f"events: rest value is {level:g} rad/s; allowed: 1e-150 to 1e150 rad/s")
     return Event(
         f"rest({level:g})",
         lambda t, omega, attitude, rates: sum(each * each for each in omega) - level * level,

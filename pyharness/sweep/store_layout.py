@@ -4,6 +4,7 @@
 the store, to detect a foreign file. `folder` is the store's folder, `name` a path in it.
 """
 
+import atexit
 import contextlib
 import errno
 import hashlib
@@ -13,8 +14,10 @@ import os
 import re
 import shutil
 import stat
+import time
 import warnings
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -29,6 +32,7 @@ from pyharness.sweep.reductions import REDUCTIONS, empty
 from pyharness.sweep.sweep import ReductionSpec, Sweep
 
 _PIECE = 1 << 20  # bytes read at once
+_REMOVALS = 20  # most attempts, 0.05 s apart, to remove a folder in which a thread may still write
 
 
 class DamageError(Exception):
@@ -218,6 +222,9 @@ def filled(sweep: Sweep, folder: Path) -> Iterator[Path]:
     attributes |= {"scene": scene_text(sweep.scene), "sweep_sha256": sweep.fingerprint}
     if fields:
         attributes["coordinates"] = " ".join(fields)
+    # Ctrl-C may leave Zarr's thread writing, or interrupt the removal.
+    remove = partial(_remove, new)
+    atexit.register(remove)
     try:
         with zarr.config.set({"array.write_empty_chunks": True}):
             _fill_group(zarr.create_group(new, zarr_format=3, attributes=attributes), sweep)
@@ -229,7 +236,16 @@ def filled(sweep: Sweep, folder: Path) -> Iterator[Path]:
         place_checksums(label(sweep), "metadata", new, files, LARGEST_METADATA, METADATA)
         yield new
     finally:
-        shutil.rmtree(new, ignore_errors=True)
+        remove()
+        atexit.unregister(remove)
+
+
+def _remove(folder: Path) -> None:
+    for _ in range(_REMOVALS):
+        shutil.rmtree(folder, ignore_errors=True)
+        if not folder.exists():
+            return
+        time.sleep(0.05)
 
 
 def _fill_group(group: Any, sweep: Sweep) -> None:

@@ -231,6 +231,21 @@ def test_forecast_knows_the_constant_cost_of_a_batch(tmp_path: Path, monkeypatch
         assert seconds == pytest.approx(11.0, rel=1e-2)
 
 
+def test_folder_in_which_a_thread_still_writes_is_removed(
+    tmp_path: Path, monkeypatch: Patch
+) -> None:
+    ways = iter([lambda *given, **more: None])
+    monkeypatch.setattr(
+        store_layout,
+        "shutil",
+        SimpleNamespace(rmtree=lambda *a, **b: next(ways, shutil.rmtree)(*a, **b)),
+    )
+    sweep = read_sweep(written(tmp_path, text(TILT)))
+    with contextlib.suppress(KeyboardInterrupt), store_layout.filled(sweep, tmp_path / "store"):
+        raise KeyboardInterrupt
+    assert [each.name for each in tmp_path.iterdir()] == ["sweep.toml"]
+
+
 def test_file_of_the_longest_axis_is_within_its_limit(tmp_path: Path, monkeypatch: Patch) -> None:
     """Zstandard adds at most 1/256 to what it can't compress; a larger file is an error in a line.
 

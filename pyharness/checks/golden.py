@@ -145,6 +145,7 @@ def _compared(
 def read_record(folder: Path) -> dict[str, dict[str, Any]]:
     """Return the files in `folder` by program or method; raise InputError for an invalid one."""
     found = {}
+    places: dict[str, str] = {}
     for path in sorted(folder.glob("*.toml")):
         try:
             file = toml_of(read_input(path, "file", _LARGEST, "a record"), "file")
@@ -155,6 +156,9 @@ def read_record(folder: Path) -> dict[str, dict[str, Any]]:
             for entry in file["trajectory"]:
                 _rows(entry)
                 _ = [entry[key] for key in _KEYS]
+                if place := places.get(entry["command"]):
+                    raise ValueError(f"'{entry['command']}' is in '{place}' too")
+                places[entry["command"]] = path.name
             _ = file["mathematics"]
             found[path.stem] = file
         except (OSError, ValueError, KeyError, TypeError) as error:

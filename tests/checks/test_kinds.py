@@ -33,6 +33,7 @@ from pyharness.cli.main import main
 from pyharness.engine import problem
 from pyharness.engine.registry import METHODS
 from pyharness.engine.solve import solve
+from pyharness.model.errors import InputError
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.scene import Scene
@@ -223,6 +224,13 @@ def test_record_of_a_method_has_all_rows(capsys: Capture) -> None:
     with patch("pyharness.checks.golden.method_candidate", lambda *_: Wrong()):
         assert main(["verify", "--only", "golden/closed-form/case-2"]) == 1
     assert "golden/closed-form/case-2" in capsys.readouterr().out
+
+
+def test_trajectory_in_two_files_is_told(tmp_path: Path) -> None:
+    for name in ("rk4.toml", "rk5.toml"):
+        (tmp_path / name).write_bytes((RECORD / "rk4.toml").read_bytes())
+    with pytest.raises(InputError, match=r"rk5\.toml': .*--case 1 .* is in 'rk4\.toml' too"):
+        read_record(tmp_path)
 
 
 @pytest.mark.campaign

@@ -43,8 +43,8 @@ def rendered(template: str, found: Mapping[str, Any]) -> str:
 
 
 def abstract_of(text: str) -> str:
-    """Return the abstract of the article as one line."""
-    return " ".join(text.partition("## Abstract\n")[2].partition("\n## ")[0].split())
+    """Return the abstract of the article as one line, without the keywords."""
+    return " ".join(text.partition("## Abstract\n")[2].partition("\n**Keywords:**")[0].split())
 
 
 def wrapped(text: str) -> str:

@@ -252,6 +252,7 @@ def test_metadata_have_the_form_of_the_journal_and_the_facts_of_the_project() ->
     assert record["title"] == f"[Re] {citation['references'][0]['title']}"
     assert TEXT.startswith(f"# {record['title']}\n\n{record['authors'][0]['name']}\n")
     assert record["abstract"] == abstract_of(TEXT)
+    assert record["abstract"].endswith("because the affected terms vanish there.")
     assert record["keywords"].startswith(", ".join(citation["keywords"]))
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     assert project["keywords"] == citation["keywords"]

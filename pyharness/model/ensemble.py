@@ -9,6 +9,7 @@ import numpy as np
 from pyharness.model.arrays import buffer_of, check_rows, only_one, rows_of, spread
 from pyharness.model.distribution import check_package, checked_axes
 from pyharness.model.errors import InputError, known
+from pyharness.model.inertia import SYMMETRIC, symmetric_matrix
 from pyharness.model.torque_law import FRAMES
 from pyharness.model.trajectory import Array, BatchResult, turned_to_space
 
@@ -117,7 +118,8 @@ class Ensemble(BatchResult):
         ------
         InputError
             If not exactly one of `moments` and `inertia` is given, or it has not one row or n rows;
-            if the frame is unknown, or "space" is requested without attitudes.
+            if a matrix is not symmetric, the frame is unknown, or "space" is requested without
+            attitudes.
         """
         frame = known("frame", frame, FRAMES)
         given = only_one({"moments": moments, "inertia": inertia})
@@ -125,6 +127,7 @@ class Ensemble(BatchResult):
             raise InputError("neither moments nor inertia is given; give one of them")
         if given == "inertia":
             matrices = rows_of(given, inertia, 3, 3)
+            _check_symmetric(given, matrices)
         else:
             matrices = rows_of(given, moments, 3)[:, :, None] * np.eye(3)
         n = len(self.omega)
@@ -340,3 +343,9 @@ def place_for(
         if array is not None:
             buffer_of(f"out.{name}", array, (n, width), "d")
     return out
+
+
+def _check_symmetric(name: str, matrices: Array) -> None:
+    away = np.abs(matrices - matrices.swapaxes(1, 2)).max(axis=(1, 2))
+    for i in np.flatnonzero(away > SYMMETRIC * np.abs(matrices).max(axis=(1, 2)))[:1]:
+        symmetric_matrix(f"{name} of body {i}" if len(matrices) > 1 else name, matrices[i].tolist())

@@ -230,11 +230,22 @@ def changes_of(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def tell_inactive(options: argparse.Namespace, listings: Iterable[Listing]) -> None:
-    """Warn of requested readings and conjectures that no listing uses."""
+    """Warn of requested readings and conjectures that no listing uses, and of vain corrections."""
     asked = {*names(options.reading), *names(options.conjecture)} - {"none"}
     active = {name for listing in listings for name in listing.active}
     for name in sorted(asked - active - set(names(options.fix))):
         warn(f"'{name}' has no effect on corrected statements; --keep {name} leaves it active")
+    given, programs = changes_of(options), chosen_programs(options)
+    found: set[str] = set()
+    for program in programs:
+        own = [name for name in given["readings"] if name in names_of("reading", program)]
+        found |= subset(program, readings=own, conjectures=given["conjectures"]).active
+    for name in sorted({*given["fix"]} - found):
+        kind = "reading" if any(name in names_of("reading", p) for p in programs) else "conjecture"
+        warn(
+            f"--fix {name}: it is not active, and nothing is corrected; allowed: with --{kind} "
+            f"{name}, or one of {', '.join(sorted(found))}"
+        )
 
 
 def listing_text(listing: Listing) -> str:
@@ -255,15 +266,19 @@ def chosen_stops(options: argparse.Namespace) -> dict[str, Any]:
     return {"lipschitz": limit, "may_stop": not options.no_stop}
 
 
-def refuse(options: argparse.Namespace, chosen: str, names: Iterable[str]) -> None:
+def refuse(
+    options: argparse.Namespace, chosen: str, names: Iterable[str], allowed: str = ""
+) -> None:
     """Raise InputError if an option of `names` is given besides `chosen`.
 
     A name is an attribute of `options`, such as "no_stop", or a key of OPTIONS, as "--case N".
+    The message ends with what is `allowed`.
     """
     for name in names:
         option = name.partition(" ")[0].removeprefix("--").replace("_", "-")
         if getattr(options, option.replace("-", "_")):
-            raise InputError(f"--{option} has no meaning with {chosen}")
+            end = f"; allowed: {allowed}" if allowed else ""
+            raise InputError(f"--{option} has no meaning with {chosen}{end}")
 
 
 def names(text: str | None) -> list[str]:

@@ -111,6 +111,14 @@ def test_laboratory_has_the_same_listing(program: str) -> None:
         assert Listing(program, found["state"]["active"]) == Listing.corrected(program)
 
 
+def test_a_correction_of_what_is_not_active_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    command = ["run", "--case", "4", "--program", "two-term", "--fix", "c1-for-c"]
+    assert main(command) == 0
+    assert "--fix c1-for-c: it is not active" in capsys.readouterr().err
+    assert main([*command, "--reading", "c1-for-c"]) == 0
+    assert capsys.readouterr().err == ""
+
+
 @pytest.mark.campaign
 @pytest.mark.parametrize("case", case_numbers())
 def test_compare_tells_what_is_in_vain(case: int, capsys: pytest.CaptureFixture[str]) -> None:

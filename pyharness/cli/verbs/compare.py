@@ -94,7 +94,12 @@ def _methods(options: argparse.Namespace) -> int:
 def _ablate(options: argparse.Namespace, scene: Scene, programs: Sequence[str]) -> int:
     others = [option for option in shared.LISTING if not option.startswith("--reading")]
     others += ["tolerance", "word", "attitude", "plot", "strict", "numerics"]
-    shared.refuse(options, "--ablate", others)
+    shared.refuse(
+        options,
+        "--ablate",
+        others,
+        "--program, --reading, --effort, and the options of scene and output",
+    )
     readings = shared.names(options.reading)
     for name in readings:
         allowed = [known for program in programs for known in names_of("reading", program)]

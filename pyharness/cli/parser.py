@@ -37,6 +37,16 @@ class _Formatter(argparse.HelpFormatter):
         return "\n       ".join(["usage: " + lines[0], *lines[1:]]) + "\n\n"
 
 
+class _Once(argparse.Action):
+    def __call__(
+        self, parser: object, namespace: argparse.Namespace, values: Any, option: str | None = None
+    ) -> None:
+        """Store the value; raise InputError if the option has one."""
+        if getattr(namespace, self.dest) is not None:
+            raise InputError(f"{option} is given twice; allowed: once")
+        setattr(namespace, self.dest, values)
+
+
 class Parser(argparse.ArgumentParser):
     """The parser of one verb's options, whose errors suggest the nearest name."""
 
@@ -68,9 +78,11 @@ class Parser(argparse.ArgumentParser):
             usual = _GROUPS.get(option, "output" if name in _OUTPUTS else "options")
             group = groups[own.get(name, usual)]
             if metavar.startswith("["):
-                group.add_argument(name, nargs="?", const="", metavar=metavar[1:-1], help=text)
+                group.add_argument(
+                    name, action=_Once, nargs="?", const="", metavar=metavar[1:-1], help=text
+                )
             elif metavar:
-                group.add_argument(name, metavar=metavar, help=text)
+                group.add_argument(name, action=_Once, metavar=metavar, help=text)
             else:
                 group.add_argument(name, action="store_true", help=text)
         groups["output"].add_argument("-h", "--help", action="help", help="Print this help.")

@@ -252,7 +252,7 @@ def _cards_of(asked: str) -> list[Card]:
     if colon and program not in PROGRAMS:
         raise unknown("program", program, PROGRAMS, f"cards {asked!r}")
     programs = (program,) if colon else PROGRAMS
-    if not (match := re.fullmatch(r"(\d{1,6})(?:-(\d{1,6}))?", ranges)):
+    if not (match := re.fullmatch(r"([0-9]{1,6})(?:-([0-9]{1,6}))?", ranges)):
         raise InputError(
             f"cards {asked!r}: neither a program ({', '.join(PROGRAMS)}) nor a card or a range of "
             "cards, as 1660, 1040-1090, two-term:1660"

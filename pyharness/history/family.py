@@ -292,7 +292,10 @@ def order_table(
             doubt = abs(slopes[-1] - slopes[-2]) if len(slopes) >= _SLOPES_WANTED else math.inf
             if doubt < doubts[i]:
                 measured[i], doubts[i] = slopes[-1], doubt
-        open_ones = [i for i in open_ones if doubts[i] > _SETTLED]
+        # Two slopes may agree by chance: an order that is too low must be so at every horizon.
+        open_ones = [
+            i for i in open_ones if doubts[i] > _SETTLED or _too_low(measured[i], chosen[i])
+        ]
         if not open_ones:
             break
     progress(phases - 1, phases, "errors")
@@ -304,6 +307,10 @@ def order_table(
         OrderFinding(each, predicted_order(each), order, doubt <= _SETTLED, float(error))
         for each, order, doubt, error in zip(chosen, measured, doubts, errors, strict=True)
     ]
+
+
+def _too_low(order: float | None, member: Member) -> bool:
+    return order is not None and order < predicted_order(member) - SLACK
 
 
 def _ladder(scene: Scene, members: Sequence[Member], horizon: float, end: Array) -> Array:

@@ -120,6 +120,14 @@ def test_long_and_short_scenes_have_orders_too(changes: dict[str, Any]) -> None:
     assert abs(found.deviation) <= SLACK
 
 
+def test_slopes_that_agree_by_chance_are_no_order() -> None:
+    """Regression test: the first horizon gave 4.57 twice, for 5."""
+    rest = replace(case_scene(5), omega=(0.0, 0.0, 0.0), step_size=0.1, steps=10)
+    (found,) = order_table(rest, [Member("collocation", 5, None, 4)])
+    assert found.settled
+    assert abs(found.deviation) <= SLACK
+
+
 def _conditions(member: Member, h: float, columns: int) -> Array:
     """Return the weighted integrals of j t**(j-1), j = 1 ... columns, over a step of length h.
 

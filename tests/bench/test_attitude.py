@@ -143,7 +143,7 @@ def test_verb_judges_both_and_says_who_carries_none(scene: str, capsys: Capture)
     assert all(row["error"] <= max(row["setting"] or 0.0, 5e-15) for row in record["rows"])
     reasons = {each["method"]: each["reason"] for each in record["refused"]}
     assert reasons["rk4"] == reasons["two-term-original"] == "does not compute attitudes"
-    assert main([*command, "--method", "auto", "--format", "markdown"]) == 0
+    assert main([*command, "--method", "auto,taylor", "--format", "markdown"]) == 0
     page = capsys.readouterr().out
     assert "# Run time against error of omega and attitude\n" in page
     assert "--attitude --format markdown`" in page

@@ -80,6 +80,8 @@ def run(options: argparse.Namespace) -> int:
     methods = chosen(list_own_contenders(), options.method, "method", options.attitude)
     others = chosen(peers(), options.peers, "peer", options.attitude)
     contenders, missing = _present(methods, others, options.peers is not None)
+    if count and len(contenders) < 2 and options.format != "json":
+        raise InputError("bench: --draws compares solvers; give at least two, or --format json")
     shared.check_outputs(options)
     if count:
         loads = []

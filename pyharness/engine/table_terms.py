@@ -155,6 +155,8 @@ def _rows(where: str, values: Any, count: int, allowed: str) -> list[Triple]:
 def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbers]) -> StateTorque:
     """Return a torque that acts within pulses, and is 0 elsewhere.
 
+    Steps of Taylor series end where a pulse begins or ends.
+
     Parameters
     ----------
     starts : iterable of numbers, shape (n,)

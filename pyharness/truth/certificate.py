@@ -34,8 +34,9 @@ _LENGTH_BITS = 20
 _SHARE_BITS = 20  # the last terms are at most 2**-20 of the radius, or what the digits allow
 _TOLERATED = 3  # bits by which the last terms may exceed this limit
 # Limit of work, some five to thirty seconds; a step needs 1, or more if its bits times the square
-# of the order exceed _BITS_OF_STEP.
-_MOST_WORK, _BITS_OF_STEP = 20_000, 1e6
+# of the order exceed _BITS_OF_STEP. The time of a product grows faster than its bits, if they are
+# more than _BITS_OF_PRODUCT.
+_MOST_WORK, _BITS_OF_STEP, _BITS_OF_PRODUCT = 20_000, 1e6, 1200
 _MOST_ATTEMPTS = 6
 # After the fraction _EARLY of the time, the growth of the radius is extrapolated to the end. If
 # digits will be missing, the proof begins again with these and _MORE.
@@ -192,7 +193,8 @@ class _Run:
             if early < time / end < 1.0 and more > 0.0:
                 raise _AmplifiedError(more + _MORE)
             bits = max(self._bits, *(x.bit_length() for x in middle))
-            work += max(1.0, self._order**2 * bits / _BITS_OF_STEP)
+            slower = max(1.0, bits / _BITS_OF_PRODUCT)
+            work += max(1.0, self._order**2 * bits * slower / _BITS_OF_STEP)
             # The checker adds the distance from the stated middle: 0, rounded up.
             radius, wave_radius = radii[0] + system.norm([0, 0, 0]), radii[1]
             self.steps.append([h, tube, radius, middle])

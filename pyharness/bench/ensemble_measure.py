@@ -224,7 +224,7 @@ class Memory:
     method: str
     bodies: int
     arrays: int  # bytes of initial omegas, torques and results
-    peak: int | None  # bytes with the arrays; None where the system does not report it
+    peak: int | None  # most bytes added, with the arrays; None where the system does not report it
 
     @property
     def ratio(self) -> float | None:

@@ -44,8 +44,8 @@ LISTING = {
     "--fix NAME,...": "Correct only these defects of the original program (names: `pyharness "
     "defects`).",
     "--keep NAME,...": "Correct all defects of the original program except these.",
-    "--reading NAME,...": "Read these doubtful lines of the original program in the way that we "
-    "did not adopt (names: `pyharness defects --kind reading`).",
+    "--reading NAME,...": "For these doubtful lines of the original program, use the reading that "
+    "we did not adopt (names: `pyharness defects --kind reading`).",
     "--conjecture NAME,...": "Make these assumptions about missing statements of the original "
     "program (names: `pyharness defects --kind conjecture`; none: no assumption). Default: "
     "torque-held, which evaluates a varying torque once in each step.",

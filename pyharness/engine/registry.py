@@ -247,7 +247,7 @@ def check_prepared(scene: Scene, method: str) -> None:
 
 
 def check_torque(scene: Scene, method: str, attitude: bool) -> None:
-    """Raise InputError if the method can't take the scene's torque, inertia or states."""
+    """Raise InputError if the method can't solve the scene, or its attitude must be requested."""
     torque, chosen = scene.torque, REGISTRY[method]
     if scene.states and method not in PREPARED_FOR_STATE:
         raise InputError(

@@ -28,9 +28,8 @@ _OTHERS = (".csv", ".json", ".md", ".toml", ".tsv", ".txt", ".xlsx", ".xml")
 def checked_path(where: str, path: object) -> str:
     """Return a path as text; a new file without an ending gets .npz."""
     if not isinstance(path, (str, os.PathLike)):
-        raise InputError(
-            f"{where}: the path is {kind_of(path)}; allowed: a path, as text or a Path"
-        )
+        kind = "bytes" if isinstance(path, bytes) else kind_of(path)
+        raise InputError(f"{where}: the path is {kind}; allowed: a path, as text or a Path")
     name = os.fsdecode(path)
     stem, ending = os.path.splitext(os.path.basename(name))
     return name if not stem or ending or os.path.exists(name) else f"{name}.npz"

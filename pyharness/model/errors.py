@@ -87,9 +87,9 @@ def printable(text: str, kept: str = "") -> str:
 def kind_of(value: object) -> str:
     """Return the type of a value in words, such as "a list"."""
     kinds = {
-        "text": (str,), "bytes": (bytes, bytearray), "true or false": (bool,),
-        "a whole number": (int,), "a number": (float,), "a complex number": (complex,),
-        "a list": (list, tuple), "a table": (dict,), "nothing": (type(None),),
+        "text": (str, bytes, bytearray), "true or false": (bool,), "a whole number": (int,),
+        "a number": (float,), "a complex number": (complex,), "a list": (list, tuple),
+        "a table": (dict,), "nothing": (type(None),),
     }  # fmt: skip
     for name, types in kinds.items():
         if isinstance(value, types):
@@ -99,7 +99,7 @@ def kind_of(value: object) -> str:
     if isinstance(dtype_kind, str):
         if getattr(value, "shape", ()) != ():
             return "a list"
-        scalars = {"b": bool, "i": int, "u": int, "f": float, "c": complex, "U": str, "S": bytes}
+        scalars = {"b": bool, "i": int, "u": int, "f": float, "c": complex, "U": str, "S": str}
         if dtype_kind in scalars:
             return kind_of(scalars[dtype_kind]())
     return f"a {type(value).__name__}"

@@ -47,7 +47,7 @@ def run(
 
 
 def scene_in(scene: Scene, word: Word) -> Scene:
-    """Return a copy of a checked scene with all numbers but counts in the format `word`."""
+    """Return a copy of a checked scene whose numbers, without attitude and counts, are in `word`."""
     law = scene.law
 
     def converted(value: Any) -> Any:

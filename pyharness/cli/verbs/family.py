@@ -21,9 +21,9 @@ OPTIONS = {
     "(Legendre nodes), or one fraction of the step for each term, as in 0.3,0.6.",
     "--corrections K": "Number of times that each step corrects its first estimate, 0 to 100 "
     "(default 1).",
-    "--lost": "Instead of measuring orders, try mistakes that may explain the failure of three "
-    "programs that the thesis does not print (section IV.2). Mistakes that make more of the three "
-    "fail come first.",
+    "--lost": "Instead of measuring orders, look for programming mistakes that explain why three "
+    "unprinted programs of the thesis failed (section IV.2). Those that explain most failures come "
+    "first.",
     "--word W": "Floating-point arithmetic of the programs of --lost: "
     f"{', '.join(WORD_NAMES)} (default {WORD_NAMES[0]}). cdc48 is the arithmetic of CDC computers, "
     "which truncates results; cdc48-rounded rounds them.",

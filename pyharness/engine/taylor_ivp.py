@@ -32,7 +32,6 @@ _LEAST_SCALE = 2.0**-1000
 # _FIRST_CHANGE, and steps grow at most by the factor _MOST_GROWTH, as in SciPy's methods.
 _FIRST_CHANGE = 0.01
 _MOST_GROWTH = 10.0
-_SHORTEST = 1e-30  # least max_step, over a finite time span
 # An event at a switch is 0 there, but for rounding, which hides its sign until a short step later.
 _AFTER_SWITCH = 0.01  # over the step that ended at the switch
 _FIRST_PARTS = 1e-12, 1e-2  # least and largest first step, over the step that the tolerances allow
@@ -121,12 +120,6 @@ class Taylor(OdeSolver):  # type: ignore[misc]
         share = self.atol.min(initial=math.inf) / longest if longest else 0.0
         self._relative = min(1.0, float(self.rtol.min(initial=1.0) + share))
         span = abs(self.t_bound - self.t)
-        least = _SHORTEST * span
-        if math.isfinite(span) and self.max_step < least:
-            raise InputError(
-                f"max_step is {self.max_step:g}; allowed: at least {least:g}, {_SHORTEST:g} of the "
-                "time span"
-            )
         self._trial = min(span, LONGEST_TRIAL)
         self._terms = np.zeros((1, self.n))
         if first_step is None:

@@ -13,7 +13,14 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
 CATALOGUE = ROOT / "tests" / "messages.txt"
-_ERRORS = ("InputError", "NotBuiltError", "TimedError", "ImpossibleBodyWarning", "unknown")
+_ERRORS = (
+    "InputError",
+    "NotBuiltError",
+    "TimedError",
+    "WorkLimitError",
+    "ImpossibleBodyWarning",
+    "unknown",
+)
 _CALL = re.compile(rf"(?<!class )(?<!def )(?<![\w`])(?P<begin>(?:{'|'.join(_ERRORS)})\()")
 _CONSTANT = re.compile(r'(?m)^(?P<name>[A-Z_][A-Z0-9_]*) = (?P<begin>(?:\(\s*)?f?")')
 

@@ -243,7 +243,7 @@ def tell_inactive(options: argparse.Namespace, listings: Iterable[Listing]) -> N
     for name in sorted({*given["fix"]} - found):
         kind = "reading" if any(name in names_of("reading", p) for p in programs) else "conjecture"
         warn(
-            f"--fix {name}: it is not active, and nothing is corrected; allowed: with --{kind} "
+            f"--fix {name}: it is not active; allowed: with --{kind} "
             f"{name}, or one of {', '.join(sorted(found))}"
         )
 

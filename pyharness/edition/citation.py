@@ -97,7 +97,7 @@ def csl(place: str = "", path: str = "") -> list[dict[str, Any]]:
 
 
 def cite_data() -> dict[str, Any]:
-    """Return what the pages' script needs to cite part of a page, with placeholders for the part."""
+    """Return what the script of the pages needs to cite a part, with placeholders for the part."""
     place = "@PLACE@", "@PATH@"
     return {
         "address": address(), "publish": PUBLISH, "digest": text_digest(),

@@ -216,28 +216,29 @@ def _extrapolate(name: str, moved: Callable[[float], Scene], size: float, states
     """Return d(states)/d(number), (n, m), by Ridders' method; `moved` changes the number."""
     best, least, largest = np.zeros((0, 0)), np.inf, 0.0
     row: list[Array] = []
+    failure: InputError | None = None
     for level in range(_LEVELS):
         h = _FIRST * size / _RATIO**level
         try:
             with warnings.catch_warnings(action="ignore", category=ImpossibleBodyWarning):
                 after, before = states(moved(h)), states(moved(-h))
-        except WorkLimitError as exceeded:
-            raise InputError(f"sensitivities: {exceeded}") from None
-        except InputError:  # as when the motion slides; a smaller change may succeed
-            row = []
+        except InputError as error:  # as when the motion slides; a smaller change may succeed
+            row, failure = [], error
             continue
         largest = max(largest, np.abs(after).max())
         found, factor = [(after - before) / (2.0 * h)], 1.0
         for other in row:
             factor *= _RATIO**2
             found.append(found[-1] + (found[-1] - other) / (factor - 1.0))
-            error = max(np.abs(found[-1] - found[-2]).max(), np.abs(found[-1] - other).max())
-            if error <= least:
-                best, least = found[-1], error
+            doubt = max(np.abs(found[-1] - found[-2]).max(), np.abs(found[-1] - other).max())
+            if doubt <= least:
+                best, least = found[-1], doubt
         if least <= _ENOUGH * np.abs(best).max(initial=0.0):
             break
         row = found
     if not least <= _ALLOWED * np.abs(best).max(initial=0.0) + _SMALL * largest / size:
+        if isinstance(failure, WorkLimitError):
+            raise InputError(f"sensitivities: {failure}")
         raise InputError(
             f"sensitivities: the state does not depend smoothly on {name}; allowed: a torque whose "
             "switches are crossed, and not only touched, or times before"

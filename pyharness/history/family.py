@@ -290,9 +290,10 @@ def order_table(
         for i, column in zip(open_ones, errors.T, strict=True):
             slopes = _slopes(column)
             doubt = abs(slopes[-1] - slopes[-2]) if len(slopes) >= _SLOPES_WANTED else math.inf
-            if doubt < doubts[i]:
+            # Two slopes may agree by chance: an order that is too low must be so at every horizon.
+            settled = doubt <= _SETTLED and not _too_low(slopes[-1], chosen[i])
+            if settled or doubt < doubts[i]:
                 measured[i], doubts[i] = slopes[-1], doubt
-        # Two slopes may agree by chance: an order that is too low must be so at every horizon.
         open_ones = [
             i for i in open_ones if doubts[i] > _SETTLED or _too_low(measured[i], chosen[i])
         ]

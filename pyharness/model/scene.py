@@ -215,7 +215,7 @@ class Scene:
         # A torque may bring its states, such as the momentum of wheels.
         brought = self.torque.starts if isinstance(self.torque, StateTorque) else ()
         has_none = isinstance(self.states, (tuple, Mapping)) and not self.states
-        if brought and (has_none or isinstance(self.states, BroughtStates)):
+        if has_none or isinstance(self.states, BroughtStates):
             self._set("states", BroughtStates(checked_states(brought)))
         else:
             self._set("states", checked_states(self.states))

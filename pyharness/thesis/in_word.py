@@ -47,7 +47,7 @@ def run(
 
 
 def scene_in(scene: Scene, word: Word) -> Scene:
-    """Return a copy of a checked scene whose numbers, without attitude and counts, are in `word`."""
+    """Return a checked scene with all numbers but attitude and counts in the format `word`."""
     law = scene.law
 
     def converted(value: Any) -> Any:

@@ -78,7 +78,7 @@ class Switches:
         return False
 
     def end(self, length: Decimal) -> Decimal:
-        """Return `length` (s), shortened until the operands' series converge and to the first jump."""
+        """Return `length` (s), shortened until operands' series converge and to the first jump."""
         while any(self._is_unresolved(x, length) for *_, x in self._tape.operands_of_switches()):
             length *= Decimal("0.75")
         roots = []

@@ -152,6 +152,16 @@ def test_the_work_limit_is_named() -> None:
         solve(scene, times, tolerance=1e-2, effort=effort, sensitivities=["torque.weak"])
 
 
+def test_a_smaller_change_may_keep_the_work_limit() -> None:
+    def law(t: Any, w: Any, *, k: float = 1.0) -> Any:
+        return -w * np.exp(1200.0 * (k - 1.0)) + np.where(t > 0.5, 0.0, 0.001)
+
+    scene = Scene("stiff", (0.1, 0.2, 0.8), MOMENTS, torque=law)
+    found = solve(scene, [1.0], sensitivities=["torque.k"])
+    assert found.sensitivities is not None
+    assert np.isfinite(found.sensitivities["torque.k"]).all()
+
+
 def test_bodies_have_them_too() -> None:
     scene = Scene("brake", (0.0, 0.0, 0.8), MOMENTS, torque=brake)
     found = solve_many(scene, 20.0, omega=[(0, 0, 0.8), (0, 0, 0.7)], sensitivities=["omega"])

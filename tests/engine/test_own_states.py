@@ -13,6 +13,7 @@ from pyharness import (
     ChangingMoments,
     Scene,
     Stepper,
+    TorqueLaw,
     events,
     load,
     read_scene,
@@ -640,6 +641,7 @@ def test_another_torque_brings_its_own_states() -> None:
     assert replace(scene, torque=second).states != scene.states
     given = tuple(each._replace(start=3.0) for each in scene.states)
     assert {each.start for each in replace(scene, torque=second, states=given).states} == {3.0}
+    assert replace(scene, torque=TorqueLaw()).states == ()
 
 
 def test_states_of_other_scenes_are_checked_too() -> None:

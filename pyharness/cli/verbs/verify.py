@@ -1,8 +1,6 @@
 """The verb `verify`."""
 
 import argparse
-from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -111,9 +109,6 @@ def run(options: argparse.Namespace) -> int:
         return _self_test(options, chosen)
     checks = []
     kinds = requested_suites(KINDS, chosen.only)
-    for each in chosen.only if len(chosen.only) > 1 else ():
-        if "/" in each and not any(True for _ in verify(replace(chosen, only=[each]))):
-            raise _no_such(chosen, [each])
     for check in verify(chosen):
         checks.append(check)
         shared.progress(kinds.index(check.suite), len(kinds), check.id)
@@ -122,27 +117,24 @@ def run(options: argparse.Namespace) -> int:
     if missing or not checks:
         if kinds == ["random"] and not chosen.draws:
             raise InputError("--draws 0 leaves no random scene to check; allowed: 1 or more")
-        raise _no_such(chosen, missing[:1] or chosen.only)
+        asked = missing[:1] or chosen.only
+        if may_hold("decks", asked) and compiler() is None:
+            raise InputError(
+                "the check needs gfortran to compile decks; install it, or put it on the PATH"
+            )
+        if not chosen.record.is_dir() and may_hold("golden", asked):
+            raise InputError(
+                "there are no stored trajectories (golden) here; give --record DIR, or run in a "
+                "source checkout"
+            )
+        raise InputError(
+            f"--only {','.join(asked)}: there is no such check; allowed: {', '.join(KINDS)}"
+        )
     drawn = samples(checks, ROUNDING) if options.draws is not None else []
     more = [*drawn, *references(checks)]
     text = summary([*_title(chosen), *_unjudged(chosen, checks)], checks, more=more)
     report = checks_report("verify", checks, text, seed=chosen.seed)
     return shared.show(report, options, failed=not all(check.passed for check in checks))
-
-
-def _no_such(chosen: Selection, asked: Sequence[str]) -> InputError:
-    if may_hold("decks", asked) and compiler() is None:
-        return InputError(
-            "the check needs gfortran to compile decks; install it, or put it on the PATH"
-        )
-    if not chosen.record.is_dir() and may_hold("golden", asked):
-        return InputError(
-            "there are no stored trajectories (golden) here; give --record DIR, or run in a "
-            "source checkout"
-        )
-    return InputError(
-        f"--only {','.join(asked)}: there is no such check; allowed: {', '.join(KINDS)}"
-    )
 
 
 def _listing_output(options: argparse.Namespace) -> int:

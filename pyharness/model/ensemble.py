@@ -346,6 +346,7 @@ def place_for(
 
 
 def _check_symmetric(name: str, matrices: Array) -> None:
-    away = np.abs(matrices - matrices.swapaxes(1, 2)).max(axis=(1, 2))
+    with np.errstate(over="ignore"):
+        away = np.abs(matrices - matrices.swapaxes(1, 2)).max(axis=(1, 2))
     for i in np.flatnonzero(away > SYMMETRIC * np.abs(matrices).max(axis=(1, 2)))[:1]:
         symmetric_matrix(f"{name} of body {i}" if len(matrices) > 1 else name, matrices[i].tolist())

@@ -175,7 +175,7 @@ def rest(value: Number, *, terminal: bool | int = False, direction: int = -1) ->
     (array([2.30258509]), array([1., 2.]), 'event')
     """
     level = finite("events: rest value", value)
-    # Squares of others are subnormal or may overflow.
+    # Squares of other values are subnormal or may overflow.
     if not 1e-150 <= level <= 1e150:
         raise InputError(f"events: rest value is {level:g} rad/s; allowed: 1e-150 to 1e150 rad/s")
     return Event(

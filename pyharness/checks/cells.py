@@ -41,7 +41,7 @@ _EVALUATIONS = {"two-term": 3, "four-term": 5, "runge-kutta": 4}
 
 
 def cells(chosen: Selection) -> Iterator[Attempt]:
-    """Yield a check of each program version in each case, or of a few if `chosen.thin`."""
+    """Yield checks that Fortran and Python agree, for every program version in every case."""
     divergences = facts("divergences")["divergence"]
     listed = {entry["cell"] for entry in divergences if entry["kind"] == "cross-language"}
     for listing, case in all_cells():
@@ -53,12 +53,10 @@ def cells(chosen: Selection) -> Iterator[Attempt]:
 
 
 def of_cell(suite: str, listing: Listing, case: int) -> Name:
-    """Return the name of a check of a program version in a case; `suite` is its kind."""
     return Name(suite, listing.program, f"case-{case}", listing_name(listing))
 
 
 def random_programs(chosen: Selection) -> Iterator[Attempt]:
-    """Yield checks of random program versions, with random stop tests, in random scenes."""
     for number in range(chosen.draws):
         yield Attempt(chosen.name_draw(number, "program"), partial(_of_draw, chosen.seed, number))
 
@@ -72,7 +70,7 @@ def _of_draw(seed: str, number: int, name: Name) -> Check:
 def _agreement(
     listing: Listing, scene: Scene, is_listed: bool, options: Sequence[Any], name: Name
 ) -> Check:
-    """Return the check that Fortran and Python agree or, if `is_listed`, differ."""
+    """Return the check that Fortran and Python agree or, for a known divergence, differ."""
     # The options are the constant of the stop test (1/s), and whether the test may end the run.
     run = PROGRAM_REGISTRY[listing.program].run
     compiled, twin = (run(scene, listing, language, *options) for language in ("fortran", "python"))
@@ -101,8 +99,7 @@ def words(chosen: Selection) -> Iterator[Attempt]:
     """Yield checks of our simulated machine arithmetic, bit for bit.
 
     CDC instructions must give the expected results. Programs in our 53-bit arithmetic must agree
-    with floats; compiled programs in other arithmetics, with their Python versions. By default the
-    original and corrected programs run; against floats, also those with a single defect or reading.
+    with floats; compiled programs in other arithmetics, with their Python versions.
     """
     yield Attempt(Name("words", "vectors"), _vectors)
     for listing, case in all_cells():
@@ -151,7 +148,7 @@ def listings(program: str) -> list[Listing]:
 
 
 def decks(chosen: Selection) -> Iterator[Check]:
-    """Yield checks that the author's cards, compiled, agree with our Fortran, if possible."""
+    """Yield checks of our Fortran against the author's cards, if a compiler is installed."""
     every = product(chain.from_iterable(map(listings, PROGRAMS)), case_numbers())
     some = [cell for cell in every if not chosen.thin or cell_name(*cell) in _THIN]
     named = [(of_cell("decks", *cell), *cell) for cell in some]

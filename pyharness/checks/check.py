@@ -49,23 +49,19 @@ class Name:
 
     @property
     def id(self) -> str:
-        """Return the nonempty parts joined by slashes, unique in a run."""
         who = self.subject, self.circumstance
         who = who[::-1] if self.suite in _CIRCUMSTANCE_FIRST else who
         return "/".join(filter(None, (self.suite, *who, self.setting, self.quantity)))
 
     @property
     def place(self) -> str:
-        """Return circumstance, setting and quantity, joined by slashes."""
         return "/".join(filter(None, (self.circumstance, self.setting, self.quantity)))
 
     @property
     def replay(self) -> str:
-        """Return the shell command that repeats this check alone."""
         return f"python -m pyharness {self.command} --only {self.id}{self.options}"
 
     def with_quantity(self, quantity: str) -> "Name":
-        """Return this name with another `quantity`."""
         return replace(self, quantity=quantity)
 
     def bounded(self, value: float, limit: float, basis: Basis, note: str = "") -> "Check":
@@ -108,18 +104,15 @@ class Check:
     )
 
     def __post_init__(self) -> None:
-        """Raise ValueError unless limit and basis are both given or both None."""
         if (self.limit is None) != (self.basis is None):
             raise ValueError(f"{self.id}: a limit has a basis, and a basis has a limit")
 
     @property
     def id(self) -> str:
-        """Return the id, as in ``cells/two-term/case-3/original``."""
         return self.name.id
 
     @property
     def suite(self) -> str:
-        """Return the check's kind."""
         return self.name.suite
 
     @property
@@ -129,11 +122,9 @@ class Check:
 
     @property
     def replay(self) -> str:
-        """Return the shell command that repeats this check alone."""
         return self.again or self.name.replay
 
     def record(self) -> dict[str, Any]:
-        """Return the fields as a dictionary for JSON."""
         head = {"id": self.id, "passed": self.passed, "value": self.value, "limit": self.limit}
         more = {each.name: getattr(self, each.name) for each in fields(self)[_OF_ANY:]}
         bound = None if self.reference_bound is None else self.reference_bound()
@@ -215,7 +206,6 @@ def run_suites(
 
 
 def requested_suites(suites: Iterable[str], only: Sequence[str]) -> list[str]:
-    """Return the suites that may contain a requested check."""
     return [suite for suite in suites if may_hold(suite, only)]
 
 
@@ -240,7 +230,7 @@ def may_hold(id: str, only: Sequence[str]) -> bool:
 
 @dataclass(frozen=True)
 class Selection:
-    """The checks that one run of `verify` makes."""
+    """The choice of the checks that one run of `verify` makes."""
 
     only: Sequence[str] = ()  # beginnings of ids, as in ``cells/two-term``; empty: all
     seed: str = field(default_factory=weekly_seed)  # seed of the random draws
@@ -251,11 +241,9 @@ class Selection:
     thin: bool = False  # a few checks of every kind, for `verify --self-test`
 
     def may_ask(self, id: str) -> bool:
-        """Return whether a check whose id begins with `id` may be selected."""
         return may_hold(id, self.only)
 
     def name_draw(self, number: int, subject: str = "") -> Name:
-        """Return the name of a check of `subject` (program or method) in random scene `number`."""
         draws = f" --draws {self.draws}" if self.draws > DRAWS else ""
         options = f"{draws} --seed {shlex.quote(self.seed)}"
         return Name("random", subject, str(number), options=options)

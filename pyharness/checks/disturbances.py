@@ -65,7 +65,6 @@ class Probe:
 
     @property
     def difference(self) -> float:
-        """Return the largest absolute difference; not finite if an element is not."""
         return float(np.abs(self.found - self.derived).max())
 
 

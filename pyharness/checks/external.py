@@ -214,7 +214,7 @@ def _as_far_as_solved(
 
 
 def _results(problem: Problem, method: str, values: Sequence[Value]) -> list[_Result | None]:
-    """Return omega and its error bound (rad/s) by value; None if a matrix is singular."""
+    """Return omega and its error bound (rad/s) for each value; None where a matrix is singular."""
     if method in PROGRAMS:
         return [_program(problem, value, method) for value in values]
     scene, times = problem.scene, [float(value.time) for value in values]

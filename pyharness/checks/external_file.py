@@ -39,16 +39,12 @@ class Figure:
 
 @dataclass(frozen=True)
 class Pointing:
-    """A published attitude."""
-
     attitude: Quaternion  # unit quaternion
     accuracy: float  # error bound, rad
 
 
 @dataclass(frozen=True)
 class Value:
-    """The published results at one time."""
-
     time: str  # as printed (s); taken as exact
     # in the unit of the problem; None where nothing is printed
     omega: tuple[Figure | None, ...]
@@ -57,8 +53,6 @@ class Value:
 
 @dataclass(frozen=True)
 class Problem:
-    """A published scene, and its results at several times."""
-
     name: str  # name of its file
     title: str  # title as a sentence
     unit: str  # unit of the printed omega, one of `UNITS`
@@ -93,7 +87,6 @@ def read_problem(path: str | Path) -> Problem:
 
 @cache
 def problems() -> tuple[Problem, ...]:
-    """Return the package's published problems, ordered by name."""
     return tuple(_read(path, None) for path in sorted(_FOLDER.glob("*.toml")))
 
 

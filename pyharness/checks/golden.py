@@ -56,8 +56,6 @@ _KEYS = ("command", "ended", "steps", "evaluations", "stop", "digest")
 
 @dataclass(frozen=True)
 class Recorded:
-    """A trajectory of the golden record."""
-
     source: str  # program or method, which is the name of the file
     name: str  # last parts of the check's id, as in ``case-3/original``
     command: str  # the command that prints it
@@ -65,7 +63,6 @@ class Recorded:
     tolerance: float | None  # None if every bit is compared
 
     def run(self) -> Trajectory:
-        """Compute the trajectory."""
         if self.source in PROGRAMS:
             is_original = self.name.endswith("original")
             listing = (Listing.original if is_original else Listing.corrected)(self.source)
@@ -74,7 +71,6 @@ class Recorded:
 
 
 def recorded() -> Iterator[Recorded]:
-    """Yield the trajectories to record."""
     for case in case_numbers():
         scene = case_scene(case)
         command = f"python -m pyharness run --case {case}"
@@ -143,7 +139,7 @@ def _compared(
 
 
 def read_record(folder: Path) -> dict[str, dict[str, Any]]:
-    """Return the files in `folder` by program or method; raise InputError for an invalid one."""
+    """Return the files by program or method; raise InputError if one is invalid."""
     found = {}
     places: dict[str, str] = {}
     for path in sorted(folder.glob("*.toml")):

@@ -44,7 +44,6 @@ class Answer:
 
 
 def of_end(method: str, end: End) -> Answer:
-    """Return a method's answer from an `End`."""
     if end.is_refused:
         return Answer(refusal=f"{method}: {end.ended}")
     attitude = None if end.attitude is None else end.attitude[None, :]
@@ -63,7 +62,6 @@ class MethodRun:
 
     @cached_property
     def answer(self) -> Answer:
-        """Return the answer, computed once; an InputError becomes its refusal."""
         try:
             return self.ask()
         except InputError as refusal:
@@ -119,12 +117,10 @@ class Truth:
 
     @property
     def end(self) -> float:
-        """Return the last time (s)."""
         return float(self.time[-1])
 
     @property
     def relative_error(self) -> float:
-        """Return the bound on the error of omega, divided by the largest abs(omega)."""
         return self.error / (self.flow.largest or 1.0)
 
     def error_of(self, answer: Answer) -> float:
@@ -152,7 +148,6 @@ def reference_truth(
     effort: float | None = None,
     flow: Conditioning | None = None,
 ) -> Truth:
-    """Return the reference solution at `times` (s)."""
     flow = flow or conditioning_at(scene, times)
     # The usual reference has errors of 1e-22 in its steps, too large for an amplification above
     # 1e3.
@@ -186,7 +181,7 @@ def allowed(truth: Truth, made: float, growth: float, steps: float = 0.0) -> flo
 
 
 def lively(growth: float) -> float:
-    """Return the factor on the tolerance in a limit: `growth` if above 1000, else 1."""
+    """Return the factor on the tolerance in an error's limit."""
     return growth if growth > LIVELY else 1.0
 
 
@@ -196,7 +191,6 @@ def linear(limit: float) -> float:
 
 
 def tolerance_of(tried: MethodRun) -> float:
-    """Return the tolerance of a run that has one."""
     assert tried.tolerance is not None
     return tried.tolerance
 

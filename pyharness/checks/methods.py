@@ -81,7 +81,6 @@ def prepared(chosen: Selection) -> Iterator[Attempt]:
 
 
 def attitudes(chosen: Selection) -> Iterator[Attempt]:
-    """Yield checks of attitudes, by `solve` and by prepared solvers."""
     for case in cases(chosen):
         scene = replace(case_scene(case), attitude=START)
         times = (*scene.times()[9::10], _LATER)
@@ -91,7 +90,6 @@ def attitudes(chosen: Selection) -> Iterator[Attempt]:
 
 
 def cases(chosen: Selection, thin: Sequence[int] = (4, 5)) -> Sequence[int]:
-    """Return the numbers of the cases to check: all, or `thin` in the self-test."""
     return thin if chosen.thin else list(case_numbers())
 
 

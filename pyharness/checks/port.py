@@ -50,11 +50,9 @@ class Cell:
 
     @property
     def request(self) -> bytes:
-        """Return the line of JSON that requests the run."""
         return request(self.scene, self.listing, self.lipschitz, self.may_stop)
 
     def twin(self) -> Trajectory:
-        """Return the Python version's trajectory."""
         run = PROGRAM_REGISTRY[self.listing.program].run
         return run(self.scene, self.listing, "python", self.lipschitz, self.may_stop)
 
@@ -124,7 +122,6 @@ def refuse_port(command: str) -> None:
 
 
 def replay_command(command: str, cell: Cell | None = None) -> str:
-    """Return the command that repeats one or all of a port's checks."""
     verb = f"python -m pyharness verify --port {shlex.quote(command)}"
     return verb if cell is None else f"{verb} {cell.options}"
 
@@ -146,7 +143,7 @@ def compared(
 
 
 def differences(twin: Trajectory, answer: Answer) -> list[str]:
-    """Return descriptions of the answer's differences from `twin`, the Python version's run."""
+    """Return the answer's differences from `twin`, the Python version's run."""
     wanted, given = _rows(twin), answer.rows
     found = []
     if difference := _difference(wanted, given):

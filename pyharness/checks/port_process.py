@@ -71,7 +71,6 @@ class PortProcess:
     """The process of a port, as a context manager; entering raises PortError if it can't start."""
 
     def __init__(self, command: str, patience: float = PATIENCE, option: str = "--port") -> None:
-        """Store the split command and the longest wait (s); an error message names `option`."""
         self._words = split_command(command, option)
         self._patience = patience
 
@@ -102,7 +101,6 @@ class PortProcess:
         return self
 
     def __exit__(self, *error: object) -> None:
-        """End the port and all its child processes."""
         # All processes may have ended; macOS then raises PermissionError.
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(self._process.pid, signal.SIGKILL)

@@ -52,7 +52,6 @@ def request(
 
 
 def requested_scene(scene: Scene) -> dict[str, Any]:
-    """Return a request's field `scene`."""
     return {
         **scene_record(scene),
         "masses": scene.masses,
@@ -85,7 +84,6 @@ def read_answer(line: bytes, steps: int) -> Answer:
 
 
 def read_object(line: bytes) -> dict[str, Any]:
-    """Return the JSON object in `line`, or raise PortError."""
     try:
         given = json.loads(line)
     except (ValueError, RecursionError) as error:
@@ -107,7 +105,6 @@ def _stop(stop: object) -> Stop:
 
 
 def read_list(where: str, value: object) -> list[Any]:
-    """Return a JSON list, or raise PortError."""
     if not isinstance(value, list):
         raise PortError(f"{where}: {kind_of(value)} where a list belongs")
     return value
@@ -122,14 +119,12 @@ def read_row(where: str, row: object, width: int, told: str) -> list[float]:
 
 
 def read_name(field: str, value: object, allowed: Sequence[str]) -> str:
-    """Return one of the `allowed` texts, or raise PortError."""
     if value not in allowed:
         raise PortError(f"{field} is {json.dumps(value)[:60]}; allowed: {', '.join(allowed)}")
     return str(value)
 
 
 def read_whole(where: str, value: object) -> int:
-    """Return a whole number, or raise PortError."""
     if type(value) is not int:
         raise PortError(f"{where}: {kind_of(value)} where a whole number belongs")
     return value

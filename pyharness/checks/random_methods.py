@@ -155,7 +155,6 @@ def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
 
 
 def random_attitudes(chosen: Selection) -> Iterator[Attempt]:
-    """Yield checks of attitudes in scenes whose true attitude is known."""
     for number in range(0, chosen.draws, _EVERY_ATTITUDE):
         if not chosen.may_ask(f"random/{number}"):
             continue
@@ -215,7 +214,6 @@ def _prepared(name: str, drawn: Draw) -> MethodRun:
 
 
 def sample(tried: Callable[[], MethodRun], truth: Truth, policy: Policy, name: Name) -> Sample:
-    """Return the check of a run's error, with its tolerance and error amplification."""
     one = tried()
     found, tolerance = judge(name, one, truth, policy), tolerance_of(one)
     growth = truth.flow.amplification

@@ -181,7 +181,6 @@ def references(checks: Sequence[Check]) -> Section:
 
 
 def verdict(checks: Sequence[Check]) -> str:
-    """Return a line with the numbers of all and of failed checks."""
     failed = sum(not check.passed for check in checks)
     made = counted(len(checks), "check")
     return f"{made}, {failed} failed" if failed else f"{made}, all well"

@@ -34,14 +34,12 @@ class Trial:
 
 
 def trial(name: str) -> Trial:
-    """Return the trial `name`, one of `TRIALS`."""
     place = _ELSEWHERE.get(name, name).replace("-", "_")
     values = vars(import_module(f"pyharness.checks.trials.{place}")).values()
     return next(each for each in values if isinstance(each, Trial) and each.name == name)
 
 
 def stress(only: Sequence[str] = (), trials: Mapping[str, Trial] | None = None) -> Iterator[Check]:
-    """Yield the checks of `stress` that `only` selects."""
     suites = {
         name: lambda name=name: (trials[name] if trials else trial(name)).attempts(only)
         for name in trials or TRIALS

@@ -40,7 +40,6 @@ _COARSE = 1e-6
 
 
 def stress_report(trials: Sequence[Trial], checks: Sequence[Check]) -> Report:
-    """Return the report: failures, then a table and a picture for each trial."""
     text: list[Any] = [listed_singly(checks), [_NOTE, *basis_note(checks)]]
     for each in trials:
         own = [check for check in checks if check.suite == each.name]

@@ -89,7 +89,6 @@ class Batch:
 
     @property
     def is_program(self) -> bool:
-        """Return whether a program solves the batch."""
         return self.listing is not None
 
     @cached_property
@@ -156,7 +155,6 @@ class Batch:
         return self._solve(method, tolerance, self.t_end * part).omega
 
     def from_start(self, omega0: Array) -> "Batch":
-        """Return the batch with another initial omega (rad/s), without results."""
         return replace(self, arrays={**self.arrays, "omega": omega0})
 
     def run(self, at: list[int]) -> ProgramEnsemble:

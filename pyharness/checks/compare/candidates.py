@@ -43,7 +43,6 @@ class End:
 
     @property
     def has_result(self) -> bool:
-        """Return whether the candidate reached the time, whatever its error."""
         return self.ended in WITH_ALL_ROWS
 
 
@@ -68,7 +67,6 @@ class Candidate:
     rows: Callable[..., Trajectory]
 
     def end(self, scene: Scene, time: float) -> End:
-        """Return the result at `time` (s); raise InputError without one."""
         ready = self.ready(scene, time)
         return ready.read(ready.run())
 
@@ -149,7 +147,6 @@ def program_candidate(
 
 
 def unstopped(listing: Listing) -> Candidate:
-    """Return a candidate of a compiled program without stop test and velocity."""
     return program_candidate(listing, may_stop=False, velocity=False)
 
 
@@ -159,7 +156,6 @@ def copied_result(values: Iterable[float]) -> Array:
 
 
 def not_finite(why: str = "overflow") -> End:
-    """Return an `End` with the ending `why` and NaN as omega."""
     return End(np.full(3, math.nan), why)
 
 

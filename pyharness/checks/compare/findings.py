@@ -37,7 +37,6 @@ class ProgramFinding:
 
     @property
     def who(self) -> str:
-        """The program and its listing's label, as in ``two-term original``."""
         return f"{self.listing.program} {self.listing.label}"
 
 

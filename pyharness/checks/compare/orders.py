@@ -60,11 +60,9 @@ class Order:
 
     @property
     def is_judged(self) -> bool:
-        """Return whether the measurement is decisive."""
         return self.state in ("as due", "rounding", "misses")
 
     def __str__(self) -> str:
-        """Return the measured order as text, or why there is none."""
         if self.value is not None:
             return f"order {self.value:.2f}"
         return {

@@ -83,7 +83,6 @@ def ended_after(limit: float) -> Iterator[None]:
 
 @contextlib.contextmanager
 def silenced() -> Iterator[None]:
-    """Suppress warnings of Python and floating-point errors of NumPy in a ``with`` block."""
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield

@@ -56,7 +56,6 @@ class Fault:
 
 
 def true_motion(scene: Scene, times: Array) -> State:
-    """Return the states at ascending times (s)."""
     run = solve(scene, times.tolist(), tolerance=_TOLERANCE, attitude=True)
     if run.attitude is None or len(run.omega) < len(times):
         raise ArithmeticError("the motion does not reach the last time")

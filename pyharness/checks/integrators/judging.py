@@ -66,8 +66,6 @@ _FINITE = Basis(
 
 @dataclass(eq=False)
 class Verdict:
-    """The results of all checks of an integrator, started by `command`."""
-
     command: str
     again: Callable[[str], str] = lambda name: ""  # the command that repeats the checks in a scene
     checks: list[Check] = field(default_factory=list)
@@ -81,7 +79,6 @@ class Verdict:
         return self.judged[-1].finest.control if self.judged else ""
 
     def add(self, scene: str, *checks: Check) -> None:
-        """Append checks in a scene, with the command that repeats them."""
         self.checks += [replace(check, again=self.again(scene)) for check in checks]
 
 
@@ -265,7 +262,6 @@ def _judge_long(ask: Ask, found: Verdict) -> None:
 
 
 def replay_command(command: str, seed: str, draws: int, name: str = "") -> str:
-    """Return the command that repeats an integrator's checks in one problem or all."""
     verb = f"python -m pyharness verify --integrator {shlex.quote(command)}"
     where = f" --cell {name}" if name else ""
     return f"{verb} --seed {shlex.quote(seed)} --draws {draws}{where}"

@@ -149,8 +149,6 @@ PLANTS = (
 
 
 def with_plant(ask: Ask, plant: IntegratorPlant, scene: Scene) -> Ask:
-    """Return a function that requests states from an integrator with a planted fault."""
-
     def advanced(advance: Advance, asked: dict[str, Any]) -> Motion:
         h, times = asked["step_size"], asked["times"]
         count = round(times[-1] / h)

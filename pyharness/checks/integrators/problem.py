@@ -64,12 +64,10 @@ class Problem:
 
     @property
     def name(self) -> str:
-        """The kind of torque and the number, as in ``wave-1``."""
         return self.scene.name
 
     @property
     def kind(self) -> str:
-        """The kind of torque, one of `MODERATE`."""
         return self.scene.name.partition("-")[0]
 
     @cached_property
@@ -80,7 +78,6 @@ class Problem:
 
     @cached_property
     def truth(self) -> Reference:
-        """The true states at the requested times."""
         return reference(self.scene, self.times.tolist())
 
     @cached_property
@@ -95,7 +92,6 @@ class Problem:
         return list(motions(self.scene, self.times, self.step_size(LEVELS - 1)))
 
     def faulty_states(self, fault: Fault, level: int) -> State:
-        """Return the states with a fault, at the step size of a level."""
         if fault.of_step:
             found = fault.motion(self.scene, self.times, self.step_size(level))
             assert found is not None
@@ -103,11 +99,9 @@ class Problem:
         return next(state for each, state in self.faulty if each is fault)
 
     def step_size(self, level: int) -> float:
-        """Return the step size of a level (s)."""
         return self.scene.step_size / 2.0**level
 
     def tolerance(self, level: int) -> float:
-        """Return the tolerance of a level."""
         return _COARSEST * _PER_LEVEL**level
 
     @property
@@ -120,7 +114,6 @@ class Problem:
         return _ROUNDINGS * rounding * math.sqrt(self.most_steps)
 
     def request(self, level: int, scene: Scene | None = None, times: Array | None = None) -> bytes:
-        """Return the JSON line that requests states with a level's step size and tolerance."""
         asked = (self.times if times is None else times).tolist()
         return request(scene or self.scene, asked, self.step_size(level), self.tolerance(level))
 
@@ -141,7 +134,6 @@ def errors_between(state: State, motion: Motion) -> tuple[float, float | None]:
 
 
 def finite_or_infinite(x: float) -> float:
-    """Return x, or infinity if it is not finite."""
     return x if math.isfinite(x) else math.inf
 
 
@@ -219,7 +211,6 @@ class Judged:
 
     @property
     def finest(self) -> Motion:
-        """The answer at the finest setting."""
         return self.answers[-1]
 
     @cached_property
@@ -248,7 +239,6 @@ class Judged:
         return max(least, *(each.errors[level] for each in self.convergences))
 
     def order_of(self, part: str) -> Convergence | None:
-        """Return the measured order of `part`, "omega" or "attitude", or None."""
         return next((each for each in self.convergences if each.part == part), None)
 
 
@@ -293,7 +283,6 @@ def long_motion(free: Judged) -> tuple[int, Array, float | None]:
 
 
 def drift_of(scene: Scene, times: Array, motion: Motion) -> Drift:
-    """Return the drift in `motion`, whose states are at `times` (s)."""
     omega = np.vstack([scene.omega, motion.omega])
     with np.errstate(all="ignore"):
         vectors = np.array(scene.moments) * omega

@@ -64,7 +64,6 @@ Ask = Callable[[bytes, int], Motion]
 
 
 def asking_of(process: PortProcess) -> Ask:
-    """Return a function that requests an integrator's answers."""
     return lambda line, rows: read_motion(process.ask(line), rows)
 
 

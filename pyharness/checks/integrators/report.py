@@ -46,7 +46,6 @@ _FLOOR = 1e-17  # smaller errors, and 0, are drawn here
 
 
 def integrator_report(found: Verdict, seed: str) -> Report:
-    """Return the report of an integrator's checks, with a picture."""
     told = f"{found.command}: against the true solution of random scenes (seed: {seed})"
     title = [told, *map(str, references(found.checks))]
     tables = [_orders(found), _drifts(found), _findings(found)]

@@ -63,12 +63,10 @@ def in_method(name: str, faulty: Faulty) -> Fault:
 
 
 def changing(change: Change) -> Faulty:
-    """Return a faulty function that applies `change` to the right function's result."""
     return lambda size, right, *rest, **named: change(right(*rest, **named), size)
 
 
 def change_result(target: str, change: Change) -> Fault:
-    """Return a fault that changes the result of the function `target`."""
     return instead(target, changing(change))
 
 

@@ -28,19 +28,16 @@ class Outcome:
 
     @property
     def check(self) -> Check:
-        """The outcome as a check, whose value is the number of failed checks."""
         return Name("self-test", self.name).judged(self.passed, self.note, float(self.failed))
 
 
 def control(failed: int, note: str) -> Outcome:
-    """Return the outcome of the control, without a fault."""
     return Outcome(CONTROL, "no fault: nothing may fail", failed == 0, failed, note)
 
 
 def self_test_report(
     title: Sequence[str], found: Sequence[Outcome], again: str, **extra: Any
 ) -> Report:
-    """Return the report of a self-test, which the command `again` repeats."""
     lines = []
     for each in found:
         lines += [f"{'' if each.passed else 'FAILED '}{each.name}: {each.fault}", f"  {each.note}"]

@@ -270,7 +270,6 @@ _DRAWS = 12
 
 
 def self_test(seed: str, record: Path) -> Iterator[Outcome]:
-    """Yield the outcome without a fault, then with each planted fault."""
     chosen = Selection(seed=seed, draws=_DRAWS, record=record, thin=True)
     failed, note = _failed(chosen)
     yield control(failed.total(), note)

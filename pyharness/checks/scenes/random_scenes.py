@@ -77,12 +77,10 @@ def draw(seed: str, number: int) -> Draw:
 
 
 def text_generator(seed: str) -> np.random.Generator:
-    """Return NumPy's random generator, seeded by a text."""
     return np.random.default_rng([ord(letter) for letter in seed])
 
 
 def random_scene(kind: str, seed: str | int, name: str = "") -> Scene:
-    """Return the scene of a `kind`, a key of `KINDS`, for a seed."""
     return replace(KINDS[kind](Random(seed)), name=name)
 
 

@@ -52,7 +52,6 @@ class Amplification:
 
     @property
     def size(self) -> int:
-        """The number of propagated vectors, m."""
         return len(self.coefficients)
 
     def evaluate(self, z: Complex) -> Complex:
@@ -84,7 +83,6 @@ class Amplification:
         return np.asarray(total)
 
     def text(self) -> str:
-        """Return the polynomials as text."""
         rows = [", ".join(_polynomial_text(each) for each in row) for row in self.coefficients]
         return rows[0] if self.size == 1 else "[" + "; ".join(rows) + "]"
 
@@ -188,8 +186,6 @@ class Region:
 
 @dataclass(frozen=True, eq=False)
 class Regions:
-    """The stability regions on one grid of z."""
-
     # Real and imaginary parts of z on the grid.
     real: Array
     imaginary: Array

@@ -110,7 +110,6 @@ def orbit(scene: Scene) -> Orbit:
 
 
 def floats(rows: Sequence[Sequence[Decimal]]) -> Array:
-    """Return rows of decimal numbers as an array in binary64."""
     return np.array([[float(x) for x in row] for row in rows])
 
 

@@ -65,7 +65,6 @@ def inverse(matrix: Fractions) -> Fractions:
 
 
 def fractions(floats: ArrayLike) -> Fractions:
-    """Return an array of floats as exact fractions."""
     return np.asarray(np.vectorize(Fraction, otypes=[object])(floats))
 
 

@@ -66,18 +66,13 @@ class SteadyRotation:
 
 @dataclass(frozen=True)
 class SteadyRotations:
-    """The steady rotations of a scene."""
-
     told: str  # text: which steady rotations exist, and which are shown
     disturbance: float  # perturbation divided by the rotation
     rotations: tuple[SteadyRotation, ...]
 
 
 def steady_rotations(scene: Scene, disturbance: float) -> SteadyRotations:
-    """Return a scene's steady rotations.
-
-    `disturbance` is the perturbation divided by the rotation.
-    """
+    """Return a scene's steady rotations; `disturbance` is the perturbation over the rotation."""
     if scene.body_torque.varies:
         raise InputError(
             "rotations: the torque varies with time, so that no rotation is steady; "

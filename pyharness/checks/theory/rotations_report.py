@@ -40,7 +40,6 @@ _KEY = (
 
 
 def rotations_report(scene: Scene, found: SteadyRotations) -> Report:
-    """Return the report of a scene's steady rotations."""
     perturbed = f"perturbation: {found.disturbance:g} of the rotation"
     text: list[Section] = [[*heading(scene), perturbed], [found.told]]
     if found.rotations:

@@ -37,7 +37,6 @@ class Numbers:
         return np.asarray(self._torque + self._coefficients * turned * onward)
 
     def times_step(self, x: Array) -> Array:
-        """Return `x` times the step size."""
         return self._step * x
 
 
@@ -74,8 +73,6 @@ Scheme = Callable[[Numbers, Array], Array]
 
 @dataclass(frozen=True)
 class FixedStep:
-    """A program or method with a fixed step."""
-
     name: str
     order: int  # order of the global error
     scheme: Scheme  # ``scheme(arithmetic, omega)`` returns omega after a step

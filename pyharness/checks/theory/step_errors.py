@@ -67,7 +67,6 @@ class Forecast:
 
 
 def path(scene: Scene, time: float) -> Path:
-    """Return the solution until `time` (s), and its sensitivity."""
     from pyharness.engine.solve import solve
 
     flow = conditioning(scene, time)
@@ -83,8 +82,6 @@ def path(scene: Scene, time: float) -> Path:
 
 
 class Forecaster:
-    """Error predictions for one method along one solution."""
-
     def __init__(self, along: Path, method: str) -> None:
         self._path = along
         self.method = SCHEMES[method]
@@ -98,7 +95,6 @@ class Forecaster:
         self._wandering = _MEAN_ROUNDING * ROUNDING * self.method.roundings * size
 
     def predict(self, steps: int) -> Forecast:
-        """Return the predicted errors of `steps` equal steps."""
         here = self._path
         h = float(here.times[-1]) / steps
         largest = here.flow.largest

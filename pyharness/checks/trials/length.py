@@ -172,7 +172,6 @@ class Drift:
 
 
 def curves() -> Iterator[Drift]:
-    """Yield the errors of every quantity by every method in every motion."""
     for motion, scene in MOTIONS.items():
         for method, integrator in INTEGRATORS.items():
             for what, found, steps, limits in measured(integrator, scene, orbit_of(motion)):
@@ -208,7 +207,6 @@ def measured(
 
 @cache
 def orbit_of(motion: str) -> Orbit:
-    """Return samples and error factors of a motion named in `MOTIONS`."""
     return brouwer.orbit(MOTIONS[motion])
 
 

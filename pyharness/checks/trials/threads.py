@@ -53,8 +53,6 @@ _LATE = 20.0  # end time (s)
 
 @dataclass(frozen=True)
 class Job:
-    """A call that returns its results' bits."""
-
     subject: str
     scene: Scene
     call: Callable[[], bytes]
@@ -87,7 +85,6 @@ def different(jobs: Sequence[Job], repeats: int = _REPEATS) -> list[Job]:
 
 
 def bits(job: Job) -> bytes:
-    """Return the bits of a job's results, or of its InputError's message."""
     try:
         return job.call()
     except InputError as refusal:
@@ -95,7 +92,6 @@ def bits(job: Job) -> bytes:
 
 
 def jobs() -> list[Job]:
-    """Return jobs for methods, prepared solvers, programs, LEQT1F and refusals."""
     found = []
     for scene in SCENES:
         found += [Job(name, scene, partial(_rows, scene, name)) for name in METHODS]

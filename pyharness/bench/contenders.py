@@ -24,15 +24,12 @@ Maker = Callable[[float, float], Ready]
 
 @dataclass(frozen=True)
 class Contender:
-    """A solver in a benchmark."""
-
     name: str
     setting: str  # "tolerance", "steps" or "none"
     package: str = field(default="", kw_only=True)  # empty for ours
 
     @property
     def is_installed(self) -> bool:
-        """Return whether the package, if any, is installed."""
         return not self.package or find_spec(self.package) is not None
 
 
@@ -48,7 +45,6 @@ class SceneContender(Contender):
 
 
 def list_own_contenders() -> list[SceneContender]:
-    """Return our methods, and the original and corrected programs."""
     both = partial(SceneContender, attitude=True)
     found = [
         both("auto", "tolerance", partial(prepared_maker, "auto"), TOLERANCES),
@@ -73,8 +69,6 @@ def refuse_rounding(solver: str, setting: float) -> None:
 
 
 def prepared_maker(name: str, scene: Scene, compiled: bool = False) -> Maker:
-    """Return a function that prepares integrations by the solver `name`."""
-
     def make(horizon: float, setting: float) -> Ready:
         attitude = scene.attitude is not None
         # A closed form has no setting.

@@ -23,7 +23,6 @@ _HARDEST = 1.0  # largest torque about an axis over the moment about this axis, 
 
 
 def coefficients() -> list[float]:
-    """Return Euler's coefficients A, B, C for `MOMENTS`."""
     return [float(each) for each in exact_coefficients(Scene("", (0.0, 0.0, 0.0), MOMENTS))]
 
 
@@ -40,12 +39,10 @@ class EnsembleLoad:
 
     @property
     def n(self) -> int:
-        """Return the number of bodies."""
         return len(self.omega0)
 
     @property
     def scene(self) -> Scene:
-        """Return a scene with the shared moments, at rest and without torque."""
         return Scene(self.name, (0.0, 0.0, 0.0), MOMENTS)
 
     @property
@@ -56,7 +53,6 @@ class EnsembleLoad:
         return np.asarray(self.torque / np.array(MOMENTS))
 
     def part(self, rows: "slice | list[int]") -> "EnsembleLoad":
-        """Return the load of the bodies in `rows`."""
         given = {name: getattr(self, name) for name in ("omega0", "torque", "attitude0")}
         own: dict[str, Any]
         own = {k: np.ascontiguousarray(x[rows]) for k, x in given.items() if x is not None}
@@ -72,7 +68,6 @@ class EnsembleLoad:
         return np.array(found)
 
     def scenes(self) -> Iterator[Scene]:
-        """Yield each body's scene."""
         for i, start in enumerate(self.omega0.tolist()):
             law = TorqueLaw() if self.torque is None else TorqueLaw(self.torque[i].tolist())
             attitude = None if self.attitude0 is None else self.attitude0[i].tolist()
@@ -87,8 +82,6 @@ EnsembleMaker = Callable[[EnsembleLoad, float, int], Callable[[], Array]]
 
 @dataclass(frozen=True)
 class EnsembleContender(Contender):
-    """A contender for many bodies."""
-
     prepare: EnsembleMaker  # the first call of the prepared function may compile code
     threads: tuple[int, ...] = (1, 2)  # numbers of threads to measure with
     torque_free: bool = False  # solves only bodies without torque
@@ -98,7 +91,6 @@ class EnsembleContender(Contender):
 
     @property
     def ways(self) -> Mapping[str, EnsembleMaker]:
-        """Return the ways to prepare the solver, by note, "" for a single way."""
         return self.variants or {"": self.prepare}
 
 
@@ -112,7 +104,6 @@ def draw(seed: str, n: int) -> list[EnsembleLoad]:
 
 
 def with_attitudes(loads: list[EnsembleLoad], seed: str) -> list[EnsembleLoad]:
-    """Return the loads with random attitudes."""
     source = text_generator(f"ensemble attitudes/{seed}")
     turned = source.standard_normal((loads[0].n, 4))
     turned /= np.linalg.norm(turned, axis=1, keepdims=True)

@@ -62,7 +62,6 @@ class Rate:
 
     @property
     def bodies_a_second(self) -> float:
-        """Return the number of bodies integrated per second."""
         return self.bodies / self.seconds
 
     @property
@@ -73,8 +72,6 @@ class Rate:
 
 @dataclass(frozen=True)
 class Rates:
-    """All measured speeds, and reasons for missing ones."""
-
     seed: str
     bodies: int
     rows: list[Rate] = field(default_factory=list)
@@ -205,7 +202,6 @@ def _enough(
 
 
 def clock_of(threads: int) -> Clock:
-    """Return processor time for one thread, else wall time."""
     return process_time if threads == 1 else perf_counter
 
 
@@ -228,7 +224,6 @@ class Memory:
 
     @property
     def ratio(self) -> float | None:
-        """Return the peak over the arrays' size."""
         return None if self.peak is None else self.peak / self.arrays
 
 

@@ -194,7 +194,6 @@ def _scipy_loop(load: EnsembleLoad, setting: float, threads: int) -> Callable[[]
 
 
 def in_threads(solve: Callable[[slice], None], n: int, threads: int, block: int) -> None:
-    """Call `solve` for slices of at most `block` of n bodies, in `threads` threads."""
     pieces = [slice(first, min(n, first + block)) for first in range(0, n, block)]
     if threads == 1:
         for piece in pieces:

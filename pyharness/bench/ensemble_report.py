@@ -20,15 +20,12 @@ _STYLES = {"prepared": "D-.", "closed-form": "o-", "taylor": "s--", "rk4": "^:"}
 
 @dataclass(frozen=True)
 class Ensembles:
-    """The results of `bench --ensemble`."""
-
     rates: Rates
     sizes: Sequence[Size]
     memory: Sequence[Memory]
 
 
 def ensemble_report(found: Ensembles, packages: Iterable[str], command: str) -> Report:
-    """Return the report of speeds, times per body, and memory."""
     text = [*_make_tables(found), _notes(found)]
     pictures = {"growth": partial(size_picture, found.sizes)}
     report = Report("bench", text, partial(_record, found), _data(found.rates), pictures=pictures)
@@ -125,7 +122,6 @@ def _record(found: Ensembles) -> dict[str, Any]:
 
 
 def size_picture(sizes: Sequence[Size]) -> Picture:
-    """Return the picture of time per body (ns) against number of bodies."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.5, 4.5), dpi=110, layout="constrained")

@@ -69,7 +69,6 @@ class Workload:
 
     @property
     def place(self) -> str:
-        """Return the name, as in ``case 5`` or ``scene 12``."""
         return f"{'scene' if self.kinds else 'case'} {self.label}"
 
     @property
@@ -100,8 +99,6 @@ class Row:
 
 @dataclass(frozen=True)
 class Refusal:
-    """The reason for a missing result."""
-
     workload: Workload
     method: str
     setting: float | None
@@ -110,8 +107,6 @@ class Refusal:
 
 @dataclass(frozen=True)
 class Finding:
-    """The results of one benchmark."""
-
     workloads: list[Workload]
     rows: list[Row]
     refused: list[Refusal]
@@ -124,7 +119,6 @@ class Finding:
 
     @property
     def attitude(self) -> bool:
-        """Return whether attitudes were requested."""
         return any(load.scene.attitude is not None for load in self.workloads)
 
 

@@ -28,7 +28,6 @@ _SLOPES = (2, 4, 8)
 
 
 def bench_picture(finding: Finding, data: Table) -> Picture:
-    """Return the picture of errors against run time and evaluations, a row for each workload."""
     from matplotlib.figure import Figure
 
     count = len(finding.workloads)
@@ -120,7 +119,6 @@ def draw_slopes(axes: "Axes") -> None:
 
 
 def growth_picture(found: "Mapping[int, Sequence[Growth]]") -> Picture:
-    """Return the picture of the Taylor method's error and the effect of rounding time."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(4.5 * len(found), 4.0), dpi=110, layout="constrained")

@@ -120,7 +120,6 @@ def _data(finding: Finding) -> Table:
 
 
 def savings_report(found: Sequence[Saving]) -> Report:
-    """Return the report of savings."""
     time = digits(".3g", 1e6)
     columns = (
         *words("skipped where"), Column("us with it", time, unit="s", full=time),
@@ -133,7 +132,6 @@ def savings_report(found: Sequence[Saving]) -> Report:
 
 
 def growth_report(found: Mapping[int, Sequence[Growth]]) -> Report:
-    """Return the report of the Taylor method's error against time, by case of Table 1."""
     time, error = digits(".3g"), digits(".2g")
     columns = (
         *words("case"), Column("time", time, unit="s", full=time),
@@ -188,7 +186,6 @@ def microseconds(seconds: float | None) -> str:
 
 
 def ratio(value: float | None) -> str:
-    """Return a ratio with about three digits; "-" for None."""
     if value is None:
         return "-"
     if value >= 99.95:
@@ -235,7 +232,6 @@ def _of_the_reference(finding: Finding, load: Workload) -> str:
 
 
 def power(target: float) -> str:
-    """Return a power of ten as text, as in 1e-6."""
     return f"{target:.0e}".replace("e-0", "e-")
 
 

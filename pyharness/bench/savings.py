@@ -30,12 +30,10 @@ class Saving:
 
     @property
     def ratio(self) -> float:
-        """Return the time with the computation divided by the time without it."""
         return self.with_it / self.without
 
 
 def savings(t_end: float = 3.0, tolerance: float = 1e-9) -> list[Saving]:
-    """Return the savings by each computation that can be omitted."""
     constant = case_scene(5)
     times = [t_end * k / 100.0 for k in range(1, 101)]
     rows = prepare(constant, "taylor", tolerance)
@@ -75,5 +73,4 @@ def _python(code: str) -> None:
 def measured_saving(
     part: str, where: str, with_it: Callable[[], object], without: Callable[[], object]
 ) -> Saving:
-    """Return the saving of `part`, from calls with and without it."""
     return Saving(part, where, *seconds([with_it, without], _SECONDS, _BATCHES))

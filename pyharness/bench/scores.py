@@ -68,7 +68,6 @@ def _ratios(finding: Finding, load: Workload) -> dict[str, tuple[float | None, .
 
 
 def groups(finding: Finding) -> dict[str, list[Workload]]:
-    """Return the groups of workloads, ordered by end time and name."""
     found: dict[str, list[Workload]] = {}
     for load in finding.workloads:
         found.setdefault(load.group, []).append(load)

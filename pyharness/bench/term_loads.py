@@ -72,17 +72,14 @@ class TermBodies(EnsembleLoad):
 
     @property
     def scene(self) -> Scene:
-        """Return the shared scene."""
         return self.body
 
     def scenes(self) -> Iterator[Scene]:
-        """Yield each body's scene."""
         for start in self.omega0.tolist():
             yield replace(self.body, omega=start)
 
 
 def term_scenes() -> list[TermScene]:
-    """Return nine scenes with ready-made torques, then scenes with expressions."""
     turning = TorqueLaw(_FIELD, sines=[(_SWING, _FREQUENCY)], frame="space")
     ready: dict[str, tuple[Any, Formula]] = {
         "damping": (terms.damping(_D), _damping),
@@ -105,7 +102,6 @@ def _scene(name: str, torque: Any) -> Scene:
 
 
 def term_loads(scenes: Sequence[TermScene]) -> list[Workload]:
-    """Return a workload for each scene and end time."""
     found = []
     for each, time in product(scenes, HORIZONS):
         scene, scale = each.scene, max(map(abs, each.scene.omega))
@@ -115,7 +111,6 @@ def term_loads(scenes: Sequence[TermScene]) -> list[Workload]:
 
 
 def term_bodies(scenes: Sequence[TermScene], seed: str, n: int) -> list[TermBodies]:
-    """Return a load of `n` bodies for each scene; `seed` determines their initial omegas."""
     source = text_generator(f"terms/{seed}")
     omega0 = np.array(_OMEGA) + source.uniform(-_SPREAD, _SPREAD, (n, 3))
     horizon = HORIZONS[0]
@@ -226,7 +221,6 @@ def term_methods(compiled: bool = False) -> list[SceneContender]:
 
 
 def term_leaves(scenes: Sequence[TermScene], compiled: bool) -> Counter[str]:
-    """Return the number of scenes with each value of `Solver.leaves`."""
     own: Any = partial(prepare, compiled=compiled)
     solvers = [own(each.scene, attitude=each.scene.attitude is not None) for each in scenes]
     return Counter(str(each.leaves) for each in solvers)

@@ -48,8 +48,6 @@ _WORTH = (
 
 @dataclass(frozen=True)
 class Terms:
-    """The results for single and many bodies."""
-
     single: Finding
     many: Rates
     leaves: Counter[str] = field(default_factory=Counter)  # numbers of torques by `Solver.leaves`
@@ -68,7 +66,6 @@ class Summary:
 
 
 def term_report(found: Terms, packages: Iterable[str], command: str) -> Report:
-    """Return the report: run times and ratios for one and many bodies, and mean ratios."""
     text = [*_make_tables(found), _notes(found)]
     report = Report("bench", text, partial(_record, found), _data(found), pictures={})
     return measured_report("# Torques that depend on the state", _WORTH, report, packages, command)

@@ -111,7 +111,6 @@ def with_attitudes(loads: list[EnsembleLoad], seed: str) -> list[EnsembleLoad]:
 
 
 def own_ensembles(compiled: bool = False) -> list[EnsembleContender]:
-    """Return our contenders for many bodies; `compiled` is as in `solve_many`."""
     one, closed = EnsembleContender, _make_own("closed-form")
     return [
         one("closed-form", "none", closed, torque_free=True, attitude=True),

@@ -215,8 +215,6 @@ class Size:
 
 @dataclass(frozen=True)
 class Memory:
-    """The memory that one call adds to a process."""
-
     method: str
     bodies: int
     arrays: int  # bytes of initial omegas, torques and results

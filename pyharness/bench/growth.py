@@ -35,7 +35,6 @@ class Growth:
 def growth(
     scene: Scene, horizons: Sequence[float] = HORIZONS, tolerance: float = 1e-15
 ) -> list[Growth]:
-    """Return the Taylor method's error against the closed form at `horizons` (s)."""
     if closed_form(scene) is None:
         raise InputError(
             "growth: the scene has no closed form to compare with; give a scene without torque"

@@ -147,7 +147,6 @@ def measure(
     progress: Progress = no_progress,
     clock: Clock | None = None,
 ) -> Finding:
-    """Return times and errors of all contenders on all workloads, timed by `clock` (s)."""
     clock = clock or perf_counter
     found = Finding(list(loads), [], [], {}, {})
     makers: dict[tuple[int | str, str], Maker] = {}

@@ -103,7 +103,7 @@ def heyoka_maker(
 
 
 def _problem(scene: Scene) -> tuple[RightHandSide, Sequence[float], Any]:
-    """Return right-hand side, initial state, and absolute over relative tolerance."""
+    """Return right-hand side, initial state, and the ratio of absolute to relative tolerance."""
     is_free, largest = scene.attitude is None, max(map(abs, scene.omega)) or 1.0
     if isinstance(scene.torque, StateTorque):
         slopes = slopes_of(scene)
@@ -244,7 +244,6 @@ def numba_fixed(method: str, scene: Scene) -> Maker:
 
 
 def compiled_function(source: str) -> Any:
-    """Return the function named `function` in a Python source."""
     names: dict[str, Any] = {}
     exec(compile(source, "<bench>", "exec"), {"sin": np.sin, "cos": np.cos}, names)
     return names["function"]
@@ -281,7 +280,6 @@ def rates(
 
 
 def end_of(state: Array, evaluations: int | None = None) -> End:
-    """Return `state`, omega and perhaps attitude, as an `End`."""
     found = copied_result(state)
     attitude = found[3:] if len(found) > 3 else None
     return End(found[:3], evaluations=evaluations, attitude=attitude)

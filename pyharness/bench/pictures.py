@@ -103,7 +103,6 @@ def _frame(axes: "Axes", load: Workload, label: str) -> None:
 
 
 def draw_slopes(axes: "Axes") -> None:
-    """Draw lines with the slopes of orders 2, 4 and 8 in the empty upper right corner."""
     low, high = axes.get_xlim()
     begin = high * (low / high) ** 0.3
     for order in _SLOPES:

@@ -80,7 +80,6 @@ def grouped(reasons: Iterable[tuple[str, str, str]], most: int | None = None) ->
 
 
 def bench_report(finding: Finding, packages: Iterable[str], command: str) -> Report:
-    """Return the report: times and mean ratios or, for random scenes, distributions of ratios."""
     drawn, data = _random(finding), _data(finding)
     title = "# Run time against error" + (" of omega and attitude" if finding.attitude else "")
     text = [*(_spread_parts if drawn else _make_tables)(finding), _notes(finding)]

@@ -122,7 +122,6 @@ def _ratio(by: float | None, seconds: float | None) -> float | None:
 
 
 def geometric_mean(ratios: Sequence[float | None]) -> float | None:
-    """Return the geometric mean, or None if a ratio is None."""
     known = [ratio for ratio in ratios if ratio is not None]
     if len(known) < len(ratios):
         return None

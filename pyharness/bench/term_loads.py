@@ -214,7 +214,6 @@ def _in_space(t: Any, w: Any, q: Any, sin: Any, cos: Any) -> Sequence[Any]:
 
 
 def term_methods(compiled: bool = False) -> list[SceneContender]:
-    """Return our contender for single bodies, without coarse tolerances."""
     own = (each for each in list_own_contenders() if each.name == OURS)
     prepare = partial(prepared_maker, OURS, compiled=compiled)
     return [replace(each, prepare=prepare, settings=_TOLERANCES[:-1]) for each in own]
@@ -249,6 +248,5 @@ def term_peers(scenes: Sequence[TermScene]) -> list[SceneContender]:
 
 
 def body_contenders(compiled: bool = False) -> list[EnsembleContender]:
-    """Return our and heyoka's contender for many bodies, on one core."""
     found = [*own_ensembles(compiled), *ensemble_peers()]
     return [replace(each, threads=(1,)) for each in found if each.name in (MANY_OURS, MANY_HEYOKA)]

@@ -88,8 +88,6 @@ class Name:
 
 @dataclass(frozen=True)
 class Check:
-    """The result of one check."""
-
     name: Name
     passed: bool
     value: float | None  # None if there is no single number

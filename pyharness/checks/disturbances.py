@@ -87,7 +87,6 @@ def jacobian(scene: Scene, omega: Sequence[float]) -> Exact:
 
 
 def eigenvalues(scene: Scene) -> Array:
-    """Return the eigenvalues of the initial Jacobian, times the step size."""
     return np.asarray(np.linalg.eigvals(np.array(jacobian(scene, scene.omega), dtype=float)))
 
 

@@ -66,7 +66,7 @@ class PortCheck(Check):
 
 
 def port_cells(programs: Sequence[str], cases: Sequence[int], cells: Sequence[str]) -> list[Cell]:
-    """Return the runs of `programs` in `cases`; `cells`, unless empty, has beginnings of names."""
+    """Return runs of `programs` in `cases`; `cells`, if any, are the beginnings of their names."""
     found = []
     for listing, case in all_cells():
         name, of = cell_name(listing, case), of_cell("port", listing, case)

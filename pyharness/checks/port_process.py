@@ -120,7 +120,7 @@ class PortProcess:
     def ask(self, line: bytes) -> bytes:
         """Send a request and return the answer, both without line feed.
 
-        Raise PortError if the answer is late or longer than one line.
+        Raise PortError if the port ends, or the answer is late, too long or more than one line.
         """
         end = time.monotonic() + self._patience
         rest = line + b"\n"

@@ -25,8 +25,6 @@ ENDINGS = ("complete", "stopped", "overflow")
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """A port's result of one run."""
-
     rows: Array  # TIME (s), omega and velocity after each step, shape (n, 7)
     ended: str  # one of `ENDINGS`
     stop: Stop | None

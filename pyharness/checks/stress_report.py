@@ -110,7 +110,6 @@ def _mark(check: Check) -> _Mark:
 
 
 def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
-    """Return a trial's picture of values and limits, with a panel for each method."""
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
@@ -216,7 +215,6 @@ _OF_METHODS: dict[str, dict[str, Any]] = {
 
 
 def length_picture(found: Sequence["Drift"]) -> Picture:
-    """Return the picture of errors of energy and phase against the number of steps."""
     from matplotlib.figure import Figure
 
     from pyharness.checks.theory.brouwer import LAWS

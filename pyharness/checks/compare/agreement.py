@@ -86,7 +86,7 @@ def _drift_in_space(scene: Scene, trajectory: Trajectory) -> float:
 
 
 def _scaled(vector: Array) -> Array:
-    """Return a vector multiplied by a power of 2, by which no square is out of range."""
+    """Return a vector times a power of 2, less than 1 in magnitude: no square overflows."""
     return np.asarray(np.ldexp(vector, -_exponent(vector)))
 
 

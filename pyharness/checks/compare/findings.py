@@ -42,8 +42,6 @@ class ProgramFinding:
 
 @dataclass(frozen=True, eq=False)
 class MethodFinding:
-    """The results of one method, or why it failed."""
-
     method: str
     tolerance: float
     trajectory: Trajectory | None

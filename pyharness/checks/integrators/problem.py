@@ -88,7 +88,6 @@ class Problem:
 
     @cached_property
     def faulty(self) -> list[tuple[Fault, State]]:
-        """The known faults with an effect, and their states with the smallest step."""
         return list(motions(self.scene, self.times, self.step_size(LEVELS - 1)))
 
     def faulty_states(self, fault: Fault, level: int) -> State:
@@ -203,8 +202,6 @@ def _power(errors: float, settings: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """An integrator's answers in one problem, and its measured orders."""
-
     problem: Problem
     answers: tuple[Motion, ...]
     convergences: tuple[Convergence, ...]

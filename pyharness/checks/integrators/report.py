@@ -103,7 +103,6 @@ def _inside(values: Any) -> Any:
 
 
 def integrator_picture(found: Verdict) -> Picture:
-    """Return a picture of errors over step size (s) or tolerance, and drifts over time (s)."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.0, 4.2), dpi=110, layout="constrained")

@@ -84,8 +84,6 @@ def change_at(path: str, change: Callable[[Any], Any]) -> Callable[[dict[str, An
 
 
 def change_attribute(name: str, change: Change) -> Change:
-    """Return a change of a result's attribute `name`; None remains None."""
-
     def changed(found: Any, size: float) -> Any:
         value = getattr(found, name)
         return found if value is None else replace(found, **{name: change(value, size)})

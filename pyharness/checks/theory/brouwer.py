@@ -205,7 +205,6 @@ def errors(
 
 
 def root_mean_square(found: Array) -> Array:
-    """Return the root mean square over rows (initial conditions), ignoring NaN."""
     return np.asarray(np.sqrt(np.nanmean(np.asarray(found) ** 2, axis=0)))
 
 

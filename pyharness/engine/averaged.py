@@ -195,7 +195,6 @@ class _Run:
         return self.coordinates.rate * math.sqrt(0.5 * (low + high) * math.sqrt(low * high))
 
     def _forecast(self) -> float:
-        """Return an estimate of the next macro-step's length (rad)."""
         point = self.point
         fast, times = fast_nodes(_FEWEST_ANGLES), np.full(_FEWEST_ANGLES, self.begin[0])
         slopes = self.forward * self.coordinates.slopes(
@@ -270,7 +269,6 @@ class _Run:
         )
 
     def _angles(self, modulus: float) -> int:
-        """Return the number of angles for a squared elliptic modulus; raise TimedError near 1."""
         # The oscillation is analytic up to this distance from the real axis of the angle.
         width = math.acosh(1.0 / math.sqrt(min(1.0, max(modulus, 1e-4))))
         if width * _MOST_ANGLES < _DIGITS:

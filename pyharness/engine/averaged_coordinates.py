@@ -167,8 +167,6 @@ def torque_of(scene: Scene) -> tuple[Torque, bool]:
 
 
 class _Slot(NamedTuple):
-    """The dependence of a recorded value on omega and time."""
-
     degree: float = 0.0  # of the polynomial factor; infinite if another factor is no wave
     fastest: float = 0.0  # highest frequency of the waves, rad/s
     rate: float | None = None  # 1/s, of a slot that is linear in time alone

@@ -59,7 +59,6 @@ class Fast(NamedTuple):
 
 @lru_cache(maxsize=16)
 def slow_nodes(count: int) -> Slow:
-    """Return `count` Chebyshev points and their matrices."""
     at = points(count)
     values = np.polynomial.chebyshev.chebvander(at, count)
     integrals = np.empty((count, count))
@@ -79,7 +78,7 @@ def slow_nodes(count: int) -> Slow:
 
 @lru_cache(maxsize=16)
 def fast_nodes(count: int) -> Fast:
-    """Return `count` equidistant angles (an even number) and their arrays."""
+    """Return the angles and their arrays for an even `count`."""
     angles = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
     waves = np.fft.rfft(np.eye(count), axis=1)
     divided = np.zeros_like(waves)

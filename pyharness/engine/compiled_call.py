@@ -28,7 +28,6 @@ class CompiledCall(NamedTuple):
 
 
 def compiled_call(solver: Any) -> CompiledCall:
-    """Return the function for compiled code, its argument `data`, and the solver."""
     from pyharness import _solver
 
     # PYFUNCTYPE, unlike CFUNCTYPE, raises KeyboardInterrupt after Ctrl-C if Python code calls it.

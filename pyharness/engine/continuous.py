@@ -22,7 +22,6 @@ from pyharness.model.trajectory import Trajectory
 def solution_of(
     scene: Scene, found: Trajectory, rows: dense.Rows, method: str, tolerance: float
 ) -> DenseOutput:
-    """Return the solution as a function of time, between time 0 and the ends of `found`."""
     is_closed = not found.evaluations and method != "reference"
     return dense.dense_output(scene, found, rows, tolerance, METHODS[method].finest, is_closed)
 
@@ -85,6 +84,5 @@ def _first_periods(
 
 
 def with_events_reversed(found: Trajectory) -> Trajectory:
-    """Return the trajectory with its events in reverse order."""
     times, states = found.t_events or [], found.y_events or []
     return replace(found, t_events=[x[::-1] for x in times], y_events=[x[::-1] for x in states])

@@ -105,7 +105,6 @@ def dense_output(
 def state_pieces(
     scene: Scene, found: Trajectory, rows: Rows, tolerance: float, finest: float
 ) -> Pieces:
-    """Return the solution as polynomials of time; the arguments are as in `dense_output`."""
     ends = sorted({0.0, *found.time[[0, -1]].tolist()})
     if tolerance == 1.0:
         return _of_fixed_steps(scene, ends, rows, partial(rates, scene))

@@ -61,13 +61,11 @@ class Solution:
 
     @cached_property
     def at_nodes(self) -> tuple[Array, Array]:
-        """The times (s) and states at each polynomial's nodes."""
         times = nodes(self.pieces.edges[:-1], self.pieces.edges[1:], POINTS)
         return times, self.sol.normalized(_refining() @ self.pieces.values)
 
     @cached_property
     def at_ends(self) -> tuple[Array, Array]:
-        """The times (s) and states at both ends and time 0."""
         edges, (_, states) = self.pieces.edges, self.at_nodes
         times = np.array(sorted({edges[0], 0.0, edges[-1]}))
         # Time 0 is an edge.
@@ -75,17 +73,14 @@ class Solution:
         return times, np.concatenate([first, states[-1:, -1]])
 
     def values(self, g: EventFunction, times: Array, states: Array | None = None) -> Array:
-        """Return the values of an event's function at `times` (s)."""
         states = self.states(times) if states is None else states
         rates = self.sol.rates(times, states) if g.event.needs_rates else None
         return g(times, states, rates)
 
     def exact_values(self, g: EventFunction, times: Array) -> Array:
-        """Return an event's values at `times` (s), from states of `sol` instead of `pieces`."""
         return self.values(g, times, self.sol.normalized(self.sol.states(times)))
 
     def noise(self, g: EventFunction, times: Array, shift: float = _SHIFT) -> Array:
-        """Return the errors of a function's values due to errors of time, state and rates."""
         return self.values_and_noise(g, times, None, shift)[1]
 
     def values_and_noise(
@@ -115,7 +110,10 @@ class Solution:
         return found[1], *(errors @ np.abs(found - found[1]))
 
     def changed_values(self, g: EventFunction, times: Array, part: float) -> Array:
-        """Return values at n times (s), (m, n): unchanged, then with each unknown changed."""
+        """Return values at n times (s), (m, n): unchanged, then with changed unknowns.
+
+        Each unknown is raised, then each lowered, by the fraction `part` of its size.
+        """
         states = self.states(times)
         n, width = states.shape
         count = 2 * width + 1
@@ -200,7 +198,6 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
 def noise_of(
     g: EventFunction, solution: Solution, low: Array, high: Array, shift: float = _SHIFT
 ) -> Array:
-    """Return the largest error of an event's values in each interval, `low` to `high` (s)."""
     times = nodes(low, high, POINTS)[:, _SOME]
     noise = solution.noise(g, times.ravel(), shift).reshape(times.shape)
     return np.asarray(noise.max(axis=1))

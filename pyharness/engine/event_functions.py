@@ -65,7 +65,6 @@ class EventFunction:
     _tapes: list[Tape | None] = field(default_factory=list, repr=False)  # at most one
 
     def __call__(self, times: Array, states: Array, rates: Array | None = None) -> Array:
-        """Return the values, all finite, at n times (s), (n,)."""
         given = times, states, None if rates is None else rates[:, :3]
         found = self._of_arrays(*given) if self.is_vectorized is not False else None
         if found is None:
@@ -111,7 +110,6 @@ class EventFunction:
         )
 
     def _of_tape(self, times: Array, states: Array, rates: Array | None) -> Array | None:
-        """Return the values from recorded operations, or None if recording fails."""
         is_new = not self._tapes
         if is_new:
             self._tapes.append(self._recorded(states.shape[1]))
@@ -162,7 +160,6 @@ class EventFunction:
 def event_functions(
     events: object, attitude: bool, states: Sequence[OwnState] = ()
 ) -> list[EventFunction]:
-    """Return one event, or a list of events, as checked functions."""
     if callable(events) or isinstance(events, Event):
         events = [events]
     if not isinstance(events, (list, tuple)):

@@ -45,7 +45,6 @@ _ORDERS = np.arange(NODES)
 
 
 def transformed(rows: Array, matrix: Array) -> Array:
-    """Return the products of a matrix and each row."""
     parts = [rows[k : k + _AT_ONCE] @ matrix.T for k in range(0, len(rows), _AT_ONCE)]
     return np.concatenate(parts) if parts else rows
 
@@ -55,7 +54,6 @@ class _Columns:
     """A table; each attribute is a column."""
 
     def only(self, kept: Index) -> Self:
-        """Return the rows that an index or mask selects."""
         return type(self)(*(getattr(self, name)[kept] for name in self.__dataclass_fields__))
 
 
@@ -63,7 +61,6 @@ C = TypeVar("C", bound=_Columns)
 
 
 def together(parts: list[C], order: str) -> C:
-    """Return the rows of all tables in ascending order of column `order`."""
     names = parts[0].__dataclass_fields__
     found = type(parts[0])(*(np.concatenate([getattr(x, name) for x in parts]) for name in names))
     return found.only(np.argsort(getattr(found, order), kind="stable"))
@@ -111,7 +108,6 @@ class Roots(_Columns):
 
     @classmethod
     def bare(cls, time: Array, change: Index, noise: Any = 0.0, lasting: Any = 0.0) -> "Roots":
-        """Return roots with 0 for the unknown `slope`, `curvature` and `near`."""
         zeros = np.zeros(len(time))
         return cls(
             time, zeros.astype(int) + change, zeros, zeros, zeros + noise, zeros, zeros + lasting
@@ -119,7 +115,6 @@ class Roots(_Columns):
 
 
 def joined(parts: list[Roots]) -> Roots:
-    """Return all roots in ascending order of time."""
     parts = [each for each in parts if each.time.size]
     if not parts:
         return Roots.bare(np.zeros(0), 0)
@@ -136,7 +131,6 @@ def values_at(coefficients: Array, x: Array) -> Array:
 
 
 def may_vanish(fits: Fits) -> Index:
-    """Return a mask of the polynomials that may have a root."""
     first = np.abs(fits.coefficients[:, 0])
     found: Index = first <= np.maximum(fits.noise, FIT_ERROR * fits.sizes) + (fits.sizes - first)
     return found | ((fits.first < 0.0) != (fits.last < 0.0))

@@ -75,7 +75,6 @@ class ZeroIntervals:
         return found
 
     def merged(self, g: EventFunction, solution: Solution) -> "ZeroIntervals":
-        """Return the intervals, joined where the function is 0 between them."""
         noise = np.maximum(self.noise[1:], self.noise[:-1])
         is_one = _is_zero_between(g, solution, self.high[:-1], self.low[1:], noise)
         first = np.flatnonzero(np.append(True, ~is_one))
@@ -116,7 +115,6 @@ def _begins(fits: Fits, numbers: Index) -> Index:
 
 
 def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroIntervals | None:
-    """Return the intervals in which a function is 0 to within its error, or None."""
     sizes = fits.sizes
     if not sizes.size:
         return None

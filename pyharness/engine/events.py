@@ -25,7 +25,6 @@ _WIDER = 16.0  # factor on the half width of an interval, until the sign changes
 
 
 def event_roots(g: EventFunction, solution: Solution) -> Roots:
-    """Return all roots of an event's function."""
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         fits, rough = fitted(g, solution)
         kept = may_vanish(fits)
@@ -178,7 +177,6 @@ def _with_extrema(
 
 
 def _chosen(roots: Roots, group: Index, change: int, ends: tuple[float, ...]) -> int:
-    """Return the index of a group's root at `ends`, else of its middle root."""
     at_end = group[np.isin(roots.time[group], ends)]
     if at_end.size:
         return int(at_end[0])
@@ -239,7 +237,6 @@ class FoundEvents:
 
 
 def no_events(count: int, columns: int) -> FoundEvents:
-    """Return an empty result for `count` functions, and states of `columns` numbers."""
     states = [np.zeros((0, columns)) for _ in range(count)]
     return FoundEvents([np.zeros(0) for _ in range(count)], states, -math.inf, math.inf)
 

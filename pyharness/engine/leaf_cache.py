@@ -40,18 +40,15 @@ _FAILURES = (LeavesError, RuntimeError)
 
 
 def folder() -> Path:
-    """Return the cache folder of compiled code, which may be missing."""
     home = Path(os.environ.get("XDG_CACHE_HOME", ""))
     return (home if home.is_absolute() else Path("~/.cache").expanduser()) / "pyharness" / "leaves"
 
 
 def size() -> int:
-    """Return the size (bytes) of all compiled code."""
     return sum(info.st_size for _, info in _files())
 
 
 def about_leaves() -> dict[str, str | int]:
-    """Return the cache's folder and size (bytes), and the C compiler or an error."""
     try:
         return {"folder": str(folder()), "bytes": size(), "compiler": " ".join(compiler())}
     except _FAILURES as error:
@@ -100,7 +97,6 @@ def loaded(tape: Structure, place: str) -> int:
 
 @cache
 def compiler() -> tuple[str, ...]:
-    """Return the command of the C compiler: CC, cc, gcc or clang."""
     import shlex
     from shutil import which
 

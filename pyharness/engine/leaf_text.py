@@ -26,7 +26,6 @@ class Structure(NamedTuple):
 
 
 def structure(tape: "Listing") -> Structure | None:
-    """Return the structure of recorded operations; None if they can't be compiled."""
     kinds = {operation[0] for operation in tape.operations}
     if not kinds <= {*OPERATIONS, Operations.LINEAR} or len(tape.operations) > _MOST_OPERATIONS:
         return None
@@ -35,12 +34,10 @@ def structure(tape: "Listing") -> Structure | None:
 
 
 def key(tape: Structure) -> int:
-    """Return a 63-bit integer that identifies a structure."""
     return int.from_bytes(sha256(repr(tuple(tape)).encode()).digest()[:8]) >> 1
 
 
 def rule_of(operation: Listed) -> Operation:
-    """Return an operation's recurrence."""
     is_wave = operation[0] == Operations.SINE_COSINE and operation[2] > 0
     return OPERATIONS[WAVE if is_wave else operation[0]]
 
@@ -87,7 +84,6 @@ def rates_of(tape: Structure) -> range:
 
 
 def unknowns_of(tape: Structure) -> range:
-    """Return the slots of the unknowns."""
     return range(FIRST_UNKNOWN, FIRST_UNKNOWN + tape.n_unknowns)
 
 

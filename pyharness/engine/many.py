@@ -309,7 +309,6 @@ def _solve_groups(
     scenes: Sequence[Scene], kinds: Sequence[int], t_end: Any, step: Number | None,
     out: "Ensemble | Array | None", **settings: Any,
 ) -> Ensemble:  # fmt: skip
-    """Return the final states of scenes, by a kernel call for each kind."""
     check_alike(scenes)
     if scenes[0].attitude is None and any(each.torque.needs_attitude for each in scenes):
         raise InputError(NO_ATTITUDE)

@@ -121,7 +121,6 @@ def solve_row(
     solver: "Solver[Any]", i: int, starts: Array, times: Array, turns: Array | None,
     found: Ensemble,
 ) -> None:  # fmt: skip
-    """Solve body `i` by a single call; the status of invalid numbers is REFUSED."""
     start, time = row_of(starts, i), float(row_of(times, i))
     try:
         if turns is None or found.attitude is None:

@@ -112,7 +112,6 @@ def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Array, Ar
 
 
 def from_scene(scene: Scene) -> dict[str, Any]:
-    """Return the arrays of `solve_many` for one scene."""
     law = checked_scene(scene, any_axes=True).body_torque
     kind = next(name for name in BODIES if getattr(scene, name) is not None)
     return {
@@ -130,7 +129,6 @@ _kept: dict[tuple[Any, ...], tuple[Scene, Any]] = {}
 
 
 def keep_with(scene: Scene, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
-    """Return `make()`, cached for this scene and `key`."""
     # By identity, because equal scenes may differ in the signs of zeros. An entry keeps its
     # scene alive, so that no other object gets this identity.
     full = id(scene), *key
@@ -170,7 +168,6 @@ def checked_rows(given: Mapping[str, Any]) -> dict[str, Array]:
 
 
 def check_alike(scenes: Sequence[Scene]) -> None:
-    """Raise InputError if only some scenes have attitudes, or step sizes differ."""
     if len({each.step_size for each in scenes}) > 1:
         raise InputError("the scenes have different step sizes; allowed: one step size for all")
     if len({each.attitude is None for each in scenes}) > 1:
@@ -180,7 +177,6 @@ def check_alike(scenes: Sequence[Scene]) -> None:
 
 
 def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
-    """Return the arrays of scenes; raise InputError if one kernel call can't solve all."""
     if not scenes:
         raise InputError("the sequence of scenes is empty; give at least one scene")
     check_alike(scenes)
@@ -204,10 +200,6 @@ def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
 
 
 def checked_copies(arrays: dict[str, Any], *, as_given: bool = False) -> dict[str, Array]:
-    """Return copies of the arrays, with one row per body or one for all.
-
-    Quaternions are normalised unless `as_given`.
-    """
     rows = checked_rows({**arrays, "omega": None, "attitude": None})
     for name in ("omega", "attitude"):
         rows |= checked_rows({name: arrays[name]})
@@ -217,7 +209,6 @@ def checked_copies(arrays: dict[str, Any], *, as_given: bool = False) -> dict[st
 
 
 def scene_of_row(scene: Scene, rows: Mapping[str, Array], i: int) -> Scene:
-    """Return `scene` with the values of body `i` in `rows`."""
     own = {name: row_of(each, i) for name, each in rows.items()}
     values = {name: own.pop(name) for name in rows if name.startswith(PARAMETER)}
     torque: dict[str, Any] = {

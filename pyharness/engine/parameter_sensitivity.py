@@ -60,7 +60,6 @@ States = Callable[[Scene], Array]
 def checked_names(
     scene: Scene, names: Iterable[str], method: str, attitude: bool
 ) -> tuple[str, ...]:
-    """Return the distinct parameter names, all known and allowed."""
     place = "sensitivities"
     if method not in _METHODS:
         raise InputError(f"{place}: the method is {method}; allowed: {', '.join(_METHODS)}")

@@ -62,7 +62,6 @@ def parameters_of(scene: Scene) -> dict[str, list[float] | None]:
 
 
 def varied_equations(scene: Scene, names: Sequence[str], attitude: bool) -> VariedEquations:
-    """Return the equations of motion, and their parameter derivatives."""
     body = scene.moments, scene.coefficients, scene.inertia, scene.changing
     known = parameters_of(scene)
     values = tuple((name, tuple(known.get(name) or ())) for name in names)
@@ -86,7 +85,6 @@ def check_values(scene: Scene, names: Iterable[str]) -> None:
 
 
 def torque_with_values(torque: StateTorque | TorqueLaw, values: Mapping[str, float]) -> StateTorque:
-    """Return a recorded torque with other parameter values."""
     try:
         parts = [_with_values(each, values) for each in _list_summands(torque)]
     except ArithmeticError as error:

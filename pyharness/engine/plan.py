@@ -32,8 +32,6 @@ class Decision(NamedTuple):
 
 @dataclass(frozen=True)
 class Plan:
-    """The choice of method and computed quantities for a scene."""
-
     scene: Scene
     method: str  # name of the method that was chosen or requested
     closed_form: str | None  # sphere, symmetric or elliptic, if a closed form is used
@@ -43,12 +41,10 @@ class Plan:
 
     @cached_property
     def decisions(self) -> tuple[Decision, ...]:
-        """Return the decisions on all parts of the solution."""
         return tuple(_decisions(self))
 
     @property
     def skipped(self) -> frozenset[str]:
-        """Return the names of the parts that are not computed."""
         return frozenset(each.part for each in self.decisions if not each.kept)
 
 

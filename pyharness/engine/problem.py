@@ -65,7 +65,6 @@ def _exact_remainders(moments: "Exact", found: Triple) -> Triple:
 
 
 def estimate_or_none(estimate: float) -> float | None:
-    """Return a kernel's estimate; None if negative (unknown)."""
     return float(estimate) if estimate >= 0.0 else None
 
 
@@ -81,7 +80,6 @@ def trajectory_of(
     attitudes: Array | None = None,
     **more: Any,
 ) -> Trajectory:
-    """Return the trajectory from the first `n_rows` columns of a kernel's results."""
     ended = ENDS[status] if ENDS[status] in (*WITH_ALL_ROWS, "sliding") else "overflow"
     if ended in WITH_ALL_ROWS:
         for name, value in (("error", error), ("growth", growth)):

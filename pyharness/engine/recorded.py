@@ -106,7 +106,6 @@ def _system(
 
 
 def is_recorded(scene: Scene) -> bool:
-    """Return whether the torque depends on the state, or the inertia changes."""
     return isinstance(scene.torque, StateTorque) or scene.changing is not None
 
 
@@ -279,7 +278,6 @@ def packed_scene(
 def packed_tape(
     tape: Tape, step_size: float, tolerance: float, effort: float, leaves: int = 0
 ) -> Array:
-    """Return equations of motion and settings as one array, in the order of `Places`."""
     packed = np.concatenate(
         [_settings(Methods.TAPE, step_size, tolerance, effort), kernel_tape(tape)]
     )

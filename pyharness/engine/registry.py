@@ -32,8 +32,6 @@ _SCIPY_DEFAULT = 1e-8
 
 @dataclass(frozen=True)
 class Method:
-    """A method, and the properties that determine its use."""
-
     name: str
     title: str
     source: str
@@ -225,14 +223,12 @@ def computes_attitude(scene: Scene, method: str, requested: bool | None) -> bool
 
 
 def check_attitude(method: str, able: Iterable[str] = WITH_ATTITUDE) -> None:
-    """Raise InputError if the method can't propagate the attitude; the message names `able`."""
     if not REGISTRY[method].attitude:
         allowed = ", ".join(able)
         raise InputError(f"method {method} does not compute attitudes; allowed: {allowed}")
 
 
 def check_prepared(scene: Scene, method: str) -> None:
-    """Raise InputError if the method has no prepared solver for the torque or inertia."""
     if is_opaque(scene.torque):
         raise InputError(
             "an opaque torque has no prepared solver; allowed: a torque that can be recorded, or "
@@ -247,7 +243,6 @@ def check_prepared(scene: Scene, method: str) -> None:
 
 
 def check_torque(scene: Scene, method: str, attitude: bool) -> None:
-    """Raise InputError if the method can't solve the scene, or its attitude must be requested."""
     torque, chosen = scene.torque, REGISTRY[method]
     if scene.states and method not in PREPARED_FOR_STATE:
         raise InputError(

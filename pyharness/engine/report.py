@@ -165,7 +165,6 @@ def _picture(title: str, trajectory: Trajectory, numbers: Table) -> Picture:
 
 
 def _dense(trajectory: Trajectory) -> Trajectory:
-    """Return the trajectory at the times of its dense output, if any."""
     sol = trajectory.sol
     if sol is None or sol.t_min == sol.t_max:
         return trajectory
@@ -183,7 +182,6 @@ def mark_end(axes: "Axes", trajectory: Trajectory, row: int) -> None:
 
 
 def plan_report(scene: Scene, plan: "Plan") -> Report:
-    """Return the report of a plan."""
     table = Table(
         words("part computed why"),
         [[part, "yes" if kept else "no", why] for part, kept, why in plan.decisions],

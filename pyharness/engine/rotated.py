@@ -40,7 +40,6 @@ def rotated(scene: Scene, turn: Callable[[Triple], Triple], body: bool) -> Scene
 
 
 def axes_of(turn: Callable[[Triple], Triple]) -> Array:
-    """Return the images of the axes under `turn` as rows, shape (3, 3)."""
     return np.array([turn((1.0, 0.0, 0.0)), turn((0.0, 1.0, 0.0)), turn((0.0, 0.0, 1.0))])
 
 

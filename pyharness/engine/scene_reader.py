@@ -65,7 +65,6 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
 
 
 def scene_of_file(content: bytes, default_name: str, where: str) -> Scene:
-    """Return the scene that a file's bytes describe; error messages begin with `where`."""
     data = toml_of(content, where)
     try:
         return scene_of(data, default_name)
@@ -74,7 +73,6 @@ def scene_of_file(content: bytes, default_name: str, where: str) -> Scene:
 
 
 def scene_of(data: dict[str, Any], default_name: str) -> Scene:
-    """Return the scene that a TOML file's data describe."""
     check_written_schema(data, "scene file")
     every: dict[str, Sequence[str]] = {**SCENE_TABLES, "states": ()}
     check_keys(data, ("schema", "name", *every), "top level")

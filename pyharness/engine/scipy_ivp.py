@@ -66,13 +66,12 @@ class _Ahead(NamedTuple):
 
 
 def steps_sum(name: str, radians: float, growth: float, turned: float = 0.0) -> float:
-    """Return a bound on the ratio of the error at the end to the local error, from `_Ahead`."""
+    """Return a bound on the ratio of the error at the end to the local error; see `_Ahead`."""
     found = _SUM[name] + _SUM_A_RADIAN[name] * radians * min(growth, _SENSITIVE)
     return found + _SUM_A_TURN[name] * turned * min(growth, _SENSITIVE)
 
 
 def finest_tolerance(name: str, scene: Scene, time: float) -> float:
-    """Return the smallest tolerance that SciPy's method `name` can meet until `time` (s)."""
     if isinstance(scene.torque, StateTorque):
         return max(FINEST[name], finest_of_state(name, scene, time, _most(name, 1.0)))
     ahead = _Run(scene, time, name).ahead()
@@ -159,13 +158,10 @@ def scipy_method(name: str) -> Integrator:
 
 
 def state_of(scene: Scene) -> tuple[float, ...]:
-    """Return the initial omega (rad/s), and the quaternion if any."""
     return (*scene.omega, *(scene.attitude or ()))
 
 
 def with_attitude(slopes: RightHandSide) -> RightHandSide:
-    """Return the right-hand side of omega and the quaternion."""
-
     def both(time: float, state: Sequence[float]) -> list[float]:
         x, y, z, *q = state
         return [*slopes(time, (x, y, z)), *quaternion_rates((x, y, z), q)]

@@ -141,7 +141,6 @@ class Run:
         )
 
     def work_error(self, time: float) -> TimedError:
-        """Return the exception for an exceeded work limit at `time` (s)."""
         return TimedError(
             f"{self.label} exceeded its work limit at t = {{time}} s after {self.most} "
             "right-hand sides; "

@@ -38,8 +38,6 @@ _WORK, _OPERATION_WORK, _OPAQUE_WORK = 16.0, 0.7, 16.0
 
 
 class StateRows(NamedTuple):
-    """The results of an integration."""
-
     state: Array  # shape (n, 3) or (n, 7): omega, and the attitude as a unit quaternion
     is_complete: bool  # whether there is a row for each time
     largest: float  # largest abs(omega) of any component from 0 to the end (rad/s)
@@ -47,8 +45,6 @@ class StateRows(NamedTuple):
 
 
 class StateRun(Run):
-    """A repeatable integration under a torque that depends on the state."""
-
     def __init__(self, scene: Scene, end: float, name: str, effort: float, most: float) -> None:
         torque = scene.torque
         assert isinstance(torque, StateTorque)
@@ -120,7 +116,6 @@ class StateRun(Run):
             raise InputError(f"[torque]: {HAS_MEMORY}")
 
     def work_error(self, time: float) -> TimedError:
-        """Return the exception for an exceeded work limit."""
         if self._jumps():
             return TimedError(
                 f"{self.label}: the torque jumps back and forth at t = {{time}} s; write a smooth "
@@ -146,7 +141,6 @@ class StateRun(Run):
         return jump > 0.1 * float(np.abs([first, second]).max())
 
     def check_undefined(self) -> None:
-        """Raise InputError if an opaque function returned NaN since the last step."""
         if self._undefined is not None:
             raise TimedError(
                 "[torque]: the function returned NaN at t = {time} s; allowed: three finite "
@@ -155,7 +149,6 @@ class StateRun(Run):
             )
 
     def after_step(self, time: float, state: Sequence[float]) -> None:
-        """Record the step; raise NoNumberError if the time has not advanced in over 50 steps."""
         self._stuck = self._stuck + 1 if time == self._reached else 0
         if self._stuck > _MOST_STUCK:
             raise NoNumberError
@@ -251,7 +244,6 @@ class StateRun(Run):
 
 
 def with_unit_attitude(rows: Array) -> Array:
-    """Return states, (n, 3) or (n, 7), with normalised quaternions."""
     if rows.shape[1] == 3:
         return rows
     unit = rows[:, 3:] / np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)

@@ -13,13 +13,11 @@ _WORST_FIRST = ("singular", "sliding", "overflow", "unchecked", "sensitive", "co
 
 
 def row_names(found: Trajectory) -> tuple[str, ...]:
-    """Return the names of a trajectory's arrays over time."""
     more = ("attitude", "own")
     return *_ROWS, *(name for name in more if getattr(found, name) is not None)
 
 
 def in_reverse(found: Trajectory) -> Trajectory:
-    """Return the trajectory with times and states in reverse order."""
     return replace(found, **{name: getattr(found, name)[::-1] for name in row_names(found)})
 
 

@@ -28,7 +28,6 @@ class SingularError(TimedError):
         self.what = what
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return the class and the arguments for `pickle`."""
         return type(self), (self.what, self.time)
 
 

@@ -117,7 +117,6 @@ class Solver(BoundKernel[Result]):
         cls, scene: Scene, chosen: Plan, tolerance: float, asked: str, effort: float,
         with_attitude: bool, compiled: bool = False,
     ) -> Self:  # fmt: skip
-        """Create a solver; users call `prepare`."""
         entry = extension()
         kernel = entry.solve_packed_attitude if with_attitude else entry.solve_packed
         code = _code(chosen, with_attitude)
@@ -146,12 +145,10 @@ class Solver(BoundKernel[Result]):
         return solver
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return the class and the arguments for `copy` and `pickle`."""
         options = self.with_attitude, self._compiled
         return type(self), (self.scene, self.plan, *self.settings, *options)
 
     def __repr__(self) -> str:
-        """Return the solver's class, scene and method."""
         return f"<{type(self).__name__} of '{self.scene.name}' by {self.plan.method}>"
 
     @cached_property

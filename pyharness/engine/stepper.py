@@ -121,7 +121,6 @@ class Stepper:
 
     @property
     def steps(self) -> int:
-        """The number of steps so far."""
         return self._steps
 
     @property

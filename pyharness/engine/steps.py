@@ -51,7 +51,6 @@ def rates(scene: Scene, times: Array, state: Array) -> Array:
 
 
 def steps_output(scene: Scene, pieces: Pieces) -> DenseOutput:
-    """Return a scene's dense output, of which `pieces` are the states."""
     low, high = pieces.edges[[0, -1]].tolist()
     return DenseOutput(low, high, pieces, partial(rates, scene), len(scene.states))
 
@@ -81,7 +80,6 @@ def transformed_steps(
 
 
 def joined_steps(before: DenseOutput | None, after: DenseOutput | None) -> DenseOutput | None:
-    """Return the dense outputs before and after time 0 as one; None if either is missing."""
     if before is None or after is None:
         return None
     parts = before.states, after.states

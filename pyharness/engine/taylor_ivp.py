@@ -202,8 +202,6 @@ class _Series(DenseOutput):  # type: ignore[misc]
 
 
 def recorded_equation(fun: Callable[..., Any], n: int) -> Tape:
-    """Return ``fun(t, y)``, with n components, as recorded operations."""
-
     def record(recorder: Recorder) -> Tape:
         time, *state = recorder.inputs()
         # A single equation may return a number.

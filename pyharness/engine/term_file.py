@@ -36,7 +36,6 @@ _LAW = ("constant", "rate", "sines", "cosines")
 
 
 def read_terms(tables: object, body: dict[str, Any]) -> list[StateTorque]:
-    """Return the torques that the tables describe."""
     if not isinstance(tables, list):
         raise InputError(
             f"[torque] terms is {kind_of(tables)}; it must be a list of tables [[torque.terms]]"

@@ -34,12 +34,10 @@ def _file_value(value: Any) -> Any:
 
 
 def is_diagonal(matrix: Array) -> bool:
-    """Return whether a matrix is diagonal."""
     return np.array_equal(matrix, np.diag(np.diag(matrix)))
 
 
 def matrix_of(where: str, value: object) -> Array:
-    """Return a matrix, (3, 3), from a number, a diagonal or rows."""
     if isinstance(converted(value), float):
         return np.diag([finite(where, value)] * 3)
     allowed = "allowed: a number, three numbers for the axes, or three rows of three numbers"
@@ -54,7 +52,6 @@ def matrix_of(where: str, value: object) -> Array:
 
 
 def inertia_of(where: str, value: object) -> Array:
-    """Return an inertia matrix (kg m2), shape (3, 3), from three moments or three rows."""
     if isinstance(converted(value), float):
         raise InputError(f"{where}: {kind_of(value)}; allowed: three moments, or three rows, kg m2")
     matrix = matrix_of(where, value)
@@ -66,7 +63,6 @@ def inertia_of(where: str, value: object) -> Array:
 
 
 def law_of_vector(where: str, value: object, frame: str) -> TorqueLaw:
-    """Return three numbers, or a TorqueLaw with `frame`, as a TorqueLaw."""
     allowed = f'allowed: three numbers, or a TorqueLaw with frame="{frame}"'
     if isinstance(value, TorqueLaw):
         if value.frame != frame:

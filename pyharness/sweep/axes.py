@@ -114,19 +114,16 @@ RIVALS = (
 
 
 def field_names() -> list[str]:
-    """Return the fields that an axis may vary, except constants of expressions."""
     return [*NUMBERS, *CHOICES]
 
 
 def number_field(name: str) -> Field:
-    """Return the field `name`, of `NUMBERS` or a constant; raise KeyError if unknown."""
     if name.startswith(CONSTANTS):
         return Field("", "constant of the torque's expressions", looped=True)
     return NUMBERS[name]
 
 
 def units_of(field: str) -> str:
-    """Return the unit of a field; empty for names and constants."""
     return NUMBERS[field].units if field in NUMBERS else ""
 
 
@@ -163,7 +160,6 @@ class Axis:
 
     @property
     def is_choice(self) -> bool:
-        """Return whether the values are names."""
         return self.field in CHOICES
 
     def coordinates(self) -> NDArray[Any]:
@@ -220,14 +216,12 @@ def _between(first: float, last: float, made: Callable[[float, float], Floats]) 
 
 
 def check_name(what: str, name: object, allowed: Iterable[str], where: str = "") -> str:
-    """Return `name`; raise InputError if it is not `allowed`."""
     if not isinstance(name, str) or name not in allowed:
         raise unknown(what, name, allowed, where)
     return name
 
 
 def axis_of(table: object, number: int) -> Axis:
-    """Return the axis of a file's table [[axis]] `number` (from 1)."""
     where = f"[[axis]] {number}"
     if not isinstance(table, dict):
         raise InputError(f"{where} is {kind_of(table)}; it must be a table [[axis]]")

@@ -59,7 +59,6 @@ def leaves_of_sweep(sweep: Sweep) -> str | None:
 
 
 def first_batch(sweep: Sweep) -> Batch:
-    """Return a batch of the first scene."""
     ((_, batch),) = batches(sweep, [np.zeros(1, dtype=np.intp) for _ in sweep.shape])
     return batch
 
@@ -219,11 +218,6 @@ def _tilted(scene: Scene, moments: Array | None, tilt: Array, azimuth: Array) ->
 
 
 def check_state_axis(scene: Scene, field: str) -> None:
-    """Raise InputError if the scene's torque lacks the field of an axis.
-
-    A state-dependent torque has no constant or linear term; only expressions have named
-    constants.
-    """
     torque = scene.torque
     if isinstance(torque, StateTorque):
         names = [name for name, _ in torque.constants]
@@ -244,7 +238,6 @@ def check_state_axis(scene: Scene, field: str) -> None:
 
 
 def check_state_solver(scene: Scene, methods: Sequence[str], has_program: bool) -> None:
-    """Raise InputError if a method or program can't solve the scene's torque."""
     torque = scene.torque
     if isinstance(torque, TorqueLaw):
         if torque.frame != "space":

@@ -157,7 +157,6 @@ def end_with_parent() -> None:
 
 
 def check_dask() -> None:
-    """Raise InputError if Dask is not installed."""
     try:
         import distributed  # noqa: F401
     except ImportError:

@@ -47,7 +47,7 @@ class Reduction:
 
     @property
     def fill(self) -> Any:
-        """Return the value for scenes without result: NaN, or -1 for integers."""
+        """Return the value for scenes without result."""
         return np.nan if self.dtype == "f8" else -1
 
 
@@ -116,7 +116,7 @@ def _growth(batch: Batch, given: Mapping[str, Any]) -> Found:
 
 
 def _exponents(vectors: Array) -> NDArray[np.intc]:
-    """Return the exponent of the largest component of each vector, with one component."""
+    """Return the binary exponent of each vector's largest component, shape (..., 1)."""
     return np.asarray(np.frexp(np.abs(vectors).max(axis=-1, keepdims=True))[1])
 
 
@@ -295,7 +295,6 @@ REDUCTIONS = {
 
 
 def needs_attitudes(asked: Iterable[ReductionSpec]) -> bool:
-    """Return whether a requested reduction needs attitudes."""
     return any("attitude" in REDUCTIONS[each.reduction].needs for each in asked)
 
 
@@ -307,7 +306,6 @@ def empty(asked: ReductionSpec, n: int) -> Found:
 
 
 def reduced(asked: ReductionSpec, batch: Batch) -> Found:
-    """Return a stored quantity of a batch, a value or row for each scene."""
     given = {**dict(asked.parameters), "function": asked.function}
     # Infinities and NaN are valid results.
     with np.errstate(all="ignore"):

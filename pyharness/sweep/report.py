@@ -83,7 +83,6 @@ def summary(store: Store, asked: ReductionSpec) -> tuple[list[Found], Counter[in
 
 
 def sweep_report(store: Store, outcome: Outcome, path: str) -> Report:
-    """Return the report of a sweep: axes, statistics, and the work of this run."""
     sweep = store.sweep
     found: list[Found] = []
     flags: list[tuple[str, str, int]] = []

@@ -140,7 +140,6 @@ def _seconds_by_parts(sweep: Sweep, chunk: int) -> float:
 
 
 def seconds_per_scene(sweep: Sweep) -> float:
-    """Return the mean time (s) to solve a scene, from samples."""
     # Not timed, because this call imports the solver's modules.
     solve_points(sweep, spread(sweep, 1))
     for count, larger in zip(_SAMPLES, (*_SAMPLES[1:], math.inf), strict=True):

@@ -40,7 +40,6 @@ _REPAIR = "'pyharness sweep' with --repair"
 
 
 def check_zarr() -> None:
-    """Raise InputError if the package Zarr is missing."""
     check_package("zarr", "sweep", install_command("sweep"))
 
 
@@ -88,7 +87,6 @@ class Store:
         self.repaired = len(damages)
 
     def done(self) -> list[bool]:
-        """Return whether each chunk is complete."""
         return list(self._done)
 
     def write(self, chunk: int, found: Arrays) -> None:
@@ -102,7 +100,6 @@ class Store:
         self._done[chunk] = True
 
     def read(self, name: str, chunk: int) -> Any:
-        """Return the values of a reduction in a chunk."""
         return self._arrays[name][self.sweep.box(chunk)]
 
     def array(self, name: str) -> Any:

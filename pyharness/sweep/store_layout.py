@@ -173,7 +173,6 @@ _HEAD = re.compile(
 
 
 def label(sweep: Sweep) -> Label:
-    """Return the identity of the store that this version of the package makes of a sweep."""
     return Label(SCHEMAS["sweep store"], version(), sweep.fingerprint)
 
 

@@ -54,17 +54,14 @@ class Sweep:
 
     @property
     def dimensions(self) -> dict[str, int]:
-        """Return the length of each dimension by name, in order of axes."""
         return {axis.dimension: axis.count for axis in self.axes}
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Return the number of scenes along each dimension."""
         return tuple(self.dimensions.values())
 
     @property
     def n_scenes(self) -> int:
-        """Return the number of scenes."""
         return math.prod(self.shape)
 
     @property
@@ -85,12 +82,10 @@ class Sweep:
 
     @property
     def chunk_counts(self) -> tuple[int, ...]:
-        """Return the number of chunks along each dimension."""
         return tuple(-(-n // c) for n, c in zip(self.shape, self.chunk_shape, strict=True))
 
     @property
     def n_chunks(self) -> int:
-        """Return the number of chunks."""
         return math.prod(self.chunk_counts)
 
     def position_of(self, chunk: int) -> tuple[int, ...]:
@@ -129,7 +124,7 @@ def spread(sweep: Sweep, count: int) -> list[Indices]:
 
 
 def value_columns(sweep: Sweep, where: list[Indices]) -> dict[str, NDArray[Any]]:
-    """Return each varied field's values, as of ``omega.1``, in the scenes of `where`."""
+    """Return the values of each varied field, such as ``omega.1``, in the scenes at `where`."""
     at = dict(zip(sweep.dimensions, where, strict=True))
     return {axis.field: axis.coordinates()[at[axis.dimension]] for axis in sweep.axes}
 

@@ -24,14 +24,12 @@ _MOST_LINES = 4
 
 
 def check_picture(path: str) -> None:
-    """Raise InputError unless `path` is a picture and matplotlib is installed."""
     if _form(path) not in FORMATS:
         raise InputError(f"--plot '{path}': unknown picture format; allowed: {', '.join(FORMATS)}")
     check_matplotlib("--plot")
 
 
 def check_matplotlib(what: str) -> None:
-    """Raise InputError if matplotlib, which `what` needs, is missing."""
     check_package("matplotlib", what, install_command("plots"))
 
 

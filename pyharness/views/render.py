@@ -106,7 +106,6 @@ def _block(columns: Sequence[Column], cells: Sequence[Sequence[str]]) -> list[st
 
 
 def csv_text(table: Table) -> str:
-    """Return a table as CSV with column heads."""
     import csv
 
     buffer = io.StringIO()
@@ -134,7 +133,6 @@ def _markdown_section(section: Section) -> str:
 
 
 def markdown_table(cells: Sequence[Sequence[str]]) -> str:
-    """Return a Markdown table, with the heads as first row."""
     head, *rows = cells
     lines = [head, ["---"] * len(head), *rows]
     return "".join("| " + " | ".join(line) + " |\n" for line in lines)

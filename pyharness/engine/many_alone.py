@@ -150,7 +150,7 @@ def _lanes(
     scene: Scene, rows: Mapping[str, Array], settings: tuple[float, float], attitude: bool,
     compiled: bool,
 ) -> tuple[tuple[Array, Array] | None, str | None]:  # fmt: skip
-    """Return packed equations, parameters and `Ensemble.leaves` for one kernel call, or None."""
+    """Return equations and parameters for one kernel call, or None, and `Ensemble.leaves`."""
     names = [name for name in rows if name.startswith(PARAMETER)]
     kind = next((name for name in ("moments", "coefficients") if name in rows), None)
     if (

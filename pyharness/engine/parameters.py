@@ -69,7 +69,6 @@ def varied_equations(scene: Scene, names: Sequence[str], attitude: bool) -> Vari
 
 
 def check_values(scene: Scene, names: Iterable[str]) -> None:
-    """Raise InputError unless each name is a torque parameter with one value."""
     known = {
         name.removeprefix(TORQUE): values
         for name, values in parameters_of(scene).items()
@@ -213,7 +212,6 @@ def _torque(
     part: TorqueLaw | StateTorque, time: Any, omega: Any, q: Any, given: Mapping[str, list[Any]],
     own: Sequence[Any] = (),
 ) -> Any:  # fmt: skip
-    """Return a summand of the torque, with symbols `given` for parameters."""
     if isinstance(part, TorqueLaw):
         law: Any = SimpleNamespace(in_space=part.frame == "space")
         for name in ("constant", "rate"):

@@ -55,7 +55,6 @@ def plan(
     velocity: bool = False,
     rows: bool = False,
 ) -> Plan:
-    """Return the plan for a scene; `rows` requests intermediate output."""
     tolerance = requested_tolerance(method, tolerance)
     finest = REGISTRY["quick"].finest if method == "quick" else FINEST
     if not finest <= tolerance <= 1.0:
@@ -77,7 +76,6 @@ def plan(
 def chosen_method(
     scene: Scene, form: str | None, tolerance: float, rows: bool
 ) -> tuple[str, str | None]:
-    """Return method and fallback; `form` is the kind of closed form."""
     # A perturbation of a rotation about the middle axis may be so small that its square, which
     # the closed form needs, underflows. The Taylor series can propagate it.
     if form:
@@ -96,7 +94,6 @@ def chosen_method(
 def by_plan(
     scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0, *more: bool
 ) -> Trajectory:
-    """Return the trajectory at `times` (s) by the chosen method or its fallback."""
     name, fallback = chosen_method(scene, closed_form(scene), tolerance, rows=True)
     method = REGISTRY[name]
     more = more if method.gives_steps else ()

@@ -186,7 +186,6 @@ class _Run(Run):
 
     @np.errstate(over="ignore", invalid="ignore")
     def ahead(self) -> _Ahead:
-        """Return estimates that determine the local tolerance, by a rough integration."""
         # The absolute tolerance is relative to an estimate of the largest |omega|. For a body at
         # rest, the first estimate may be far too large.
         scale = max(map(abs, self.scene.omega)) or self._scale_by_torque()

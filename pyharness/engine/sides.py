@@ -22,7 +22,6 @@ def in_reverse(found: Trajectory) -> Trajectory:
 
 
 def joined(before: Trajectory, after: Trajectory) -> Trajectory:
-    """Return the trajectories before and after time 0, both in ascending order, as one."""
     both = before, after
     ended = min((x.ended for x in both), key=_WORST_FIRST.index)
     rows: dict[str, Any] = {

@@ -69,7 +69,6 @@ def up_to(pieces: Pieces, last: float) -> Pieces:
 def transformed_steps(
     sol: DenseOutput | None, states: Callable[[Array], Array], factor: float = 1.0
 ) -> DenseOutput | None:
-    """Return `sol` with times multiplied by `factor`, and states changed by `states`."""
     if sol is None or not isinstance(sol.states, Pieces):
         return None
     edges, values = sol.states.edges * factor, sol.states.values

@@ -54,7 +54,6 @@ def solve_points(sweep: Sweep, where: list[Indices]) -> Arrays:
 
 
 def leaves_of_sweep(sweep: Sweep) -> str | None:
-    """Return the origin of the code for the first scene's Taylor terms, as `Ensemble.leaves`."""
     return first_batch(sweep).leaves
 
 

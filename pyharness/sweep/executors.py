@@ -143,7 +143,6 @@ def deaf_children() -> Iterator[None]:
 
 
 def end_with_parent() -> None:
-    """Start a thread that ends this process when its parent ends."""
     parent = multiprocessing.parent_process()
     if parent is None:
         return

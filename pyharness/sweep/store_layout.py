@@ -36,12 +36,10 @@ _REMOVALS = 20  # most attempts, 0.05 s apart, to remove a folder in which a thr
 
 
 class DamageError(Exception):
-    """The exception that names a damaged file of a store and its damage."""
+    """Damage to a file of a store."""
 
 
 class Label(NamedTuple):
-    """The identity of a store."""
-
     schema: object  # number of the store's format; an integer if pyharness wrote the store
     version: str  # version of pyharness
     fingerprint: str  # SHA-256 of the sweep
@@ -62,7 +60,6 @@ def checksum_text(label: Label, part: str, folder: Path, names: Sequence[str], l
 def check_files(
     label: Label, part: str, folder: Path, names: Sequence[str], limit: int, checksums: str
 ) -> None:
-    """Raise DamageError if files `names` differ from their checksums in the file `checksums`."""
     found = checksum_text(label, part, folder, names, limit)
     known = read_bounded(folder, checksums, 2 * len(found))
     if known != found:

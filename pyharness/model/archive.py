@@ -49,7 +49,6 @@ def checked_file(where: str, path: object) -> str:
 
 
 def archive_of(arrays: dict[str, Any]) -> bytes:
-    """Return an archive of the arrays; its last entry is their SHA-256 digest."""
     buffer, digest = io.BytesIO(), hashlib.sha256()
     with zipfile.ZipFile(buffer, "w") as archive:
         for name in [*(each for each in arrays if each != DIGEST), DIGEST]:
@@ -64,7 +63,6 @@ def archive_of(arrays: dict[str, Any]) -> bytes:
 
 
 def add_entry(digest: Any, name: str, data: bytes | memoryview) -> None:
-    """Update the digest with an entry's name, length and bytes."""
     digest.update(f"{name} {len(data)}\n".encode())
     digest.update(data)
 
@@ -72,10 +70,10 @@ def add_entry(digest: Any, name: str, data: bytes | memoryview) -> None:
 def read_archive(
     where: str, name: str, kinds: tuple[str, str], known: Iterable[str], written: str
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the arrays and the header of an archive.
+    """Return the arrays and the header of an archive; raise InputError if it is damaged.
 
-    `kinds` are the kind of file in its header and in messages, `known` the allowed arrays;
-    `written` describes a valid file.
+    `kinds` are names of the kind of content, in the header and in messages; `known` are the allowed
+    arrays; `written` describes a valid file in messages.
     """
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     content = read_input(name, where, memory // 4, written)
@@ -134,7 +132,6 @@ def _array(data: bytes) -> Any:
 
 
 def text_of(arrays: dict[str, Any], name: str) -> str:
-    """Return an array's text; raise KeyError if it is missing, ValueError if it is no text."""
     array = arrays[name]
     if array.shape != () or array.dtype.kind != "U":
         raise ValueError("no text")

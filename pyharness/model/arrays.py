@@ -23,7 +23,7 @@ FROM_ZERO: Rule = (lambda x: x >= 0.0, "a number from 0")
 
 
 def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = None) -> Array:
-    """Return a user's row, or n rows, of `shape` as a float array, (n, *shape).
+    """Return a user's array, of `shape` or (n, *shape), as floats of shape (n, *shape).
 
     A letter in `shape`, such as "k", means any length. `rule` checks each number.
     """
@@ -44,7 +44,6 @@ def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = N
 
 
 def numbers_of(where: str, values: object) -> Array:
-    """Return a user's array of real numbers as float64."""
     if type(values) is not np.ndarray:
         if unit_of(values) or isinstance(values, (bytes, bytearray)):
             number(where, values)  # NumPy would drop the unit, or read bytes as numbers
@@ -70,7 +69,6 @@ def numbers_of(where: str, values: object) -> Array:
 
 
 def count_bodies(rows: Mapping[str, Array]) -> int:
-    """Return the number of bodies; raise InputError if arrays differ in it."""
     counts = {len(each) for each in rows.values()}
     n = 0 if 0 in counts else max(counts, default=1)
     if not counts <= {1, n}:
@@ -83,7 +81,6 @@ def count_bodies(rows: Mapping[str, Array]) -> int:
 
 
 def check_rows(name: str, array: Array, n: int) -> None:
-    """Raise InputError unless the array `name` has one row or `n`."""
     if len(array) not in (1, n):
         several = "; for several times of each body use times= of solve_many"
         raise InputError(
@@ -93,7 +90,6 @@ def check_rows(name: str, array: Array, n: int) -> None:
 
 
 def row_of(array: Array, i: int) -> Any:
-    """Return the row of body `i`, or the only row."""
     return array[0 if len(array) == 1 else i]
 
 
@@ -106,7 +102,6 @@ def only_one(given: Mapping[str, object]) -> str:
 
 
 def threads_of(threads: object) -> int:
-    """Return a user's number of threads."""
     found = integer("threads", threads)
     if not 1 <= found <= _MOST_THREADS:
         raise InputError(f"threads is {found}; allowed: 1 to {_MOST_THREADS}")
@@ -114,10 +109,7 @@ def threads_of(threads: object) -> int:
 
 
 def buffer_of(where: str, array: Any, shape: tuple[int, ...], kind: str) -> Any:
-    """Return the user's output array for a kernel.
-
-    `kind` is the required type character, such as "d".
-    """
+    """Return a user's output array if a kernel can write to it; `kind` is its type, such as "d"."""
     right = isinstance(array, np.ndarray) and array.shape == shape and array.dtype == kind
     if not (right and array.flags.c_contiguous and array.flags.writeable and array.flags.aligned):
         raise InputError(
@@ -127,14 +119,12 @@ def buffer_of(where: str, array: Any, shape: tuple[int, ...], kind: str) -> Any:
 
 
 def spread(rows: Array, n: int) -> Array:
-    """Return `n` rows, repeating a shared row."""
     if len(rows) == n:
         return rows
     return np.ascontiguousarray(np.broadcast_to(rows, (n, *rows.shape[1:])))
 
 
 def rows_within(rows: Array, piece: slice) -> Array:
-    """Return the rows in `piece`, repeating a shared row."""
     if len(rows) > 1:
         return rows[piece]
     return np.ascontiguousarray(np.broadcast_to(rows, (piece.stop - piece.start, *rows.shape[1:])))

@@ -18,12 +18,11 @@ Runs = Iterable[tuple[Scene, Iterable[Listing]]]
 
 
 def assumptions() -> list[dict[str, Any]]:
-    """Return the entries of `data/assumptions.toml`."""
     return list(facts("assumptions")["assumption"])
 
 
 def open_starts() -> dict[int, str]:
-    """Return the cases without omega(0) in the thesis, and the source of our value."""
+    """Return, by number of a case without omega(0) in the thesis, the source of our value."""
     cases = facts("cases")["case"]
     return {each["number"]: each["assumed_omega"] for each in cases if "assumed_omega" in each}
 
@@ -31,7 +30,7 @@ def open_starts() -> dict[int, str]:
 def assumed(scene: Scene, listings: Iterable[Listing] = ()) -> list[dict[str, Any]]:
     """Return the assumptions that a scene and its runs of `listings` (program versions) need.
 
-    Scenes outside the thesis, and values that a user changed, need no assumption.
+    Scenes outside the thesis, and values that a user changed, need none.
     """
     among = list(listings)
     return [each for each in assumptions() if _is_made(each, scene, among)]
@@ -64,12 +63,10 @@ def mark(scene: Scene, listing: Listing) -> str:
 
 
 def case_mark(case: int) -> str:
-    """Return `MARK` if we assume omega(0) of a case, else ""."""
     return MARK if case in open_starts() else ""
 
 
 def assumption_records(runs: Runs) -> list[dict[str, Any]]:
-    """Return, for JSON, the assumptions of runs, with their cases."""
     found: dict[tuple[str, str], dict[str, Any]] = {}
     for scene, listings in runs:
         for each in assumed(scene, listings):
@@ -82,7 +79,7 @@ def assumption_records(runs: Runs) -> list[dict[str, Any]]:
 
 
 def claim_records() -> list[dict[str, Any]]:
-    """Return, for JSON, the assumptions that affect only verdicts on claims."""
+    """Return the assumptions that affect verdicts on claims alone."""
     return [_record(each, each["what"]) for each in assumptions() if each["on"] == "claim"]
 
 
@@ -91,7 +88,7 @@ def _record(each: dict[str, Any], what: str) -> dict[str, Any]:
 
 
 def legend(runs: Sequence[tuple[Scene, Iterable[Listing]]]) -> list[str]:
-    """Return, in a list, the line that explains the marks of runs; [] without marks."""
+    """Return a list of the line that explains the marks of runs; empty without marks."""
     every = {scene.case for scene, _ in runs}
     told = []
     for each in assumption_records(runs):

@@ -38,10 +38,7 @@ def scalar_first(values: object) -> Any:
 
 
 def unit_quaternion(where: str, values: object) -> tuple[Quaternion, float]:
-    """Return the unit quaternion of four numbers or a `Rotation`, and the numbers' norm.
-
-    They must be finite and not all 0.
-    """
+    """Return the unit quaternion of four numbers or a `Rotation`, and the numbers' norm."""
     allowed = "allowed: four finite numbers, scalar first, not all 0"
     given = [finite(where, each) for each in number_list(where, scalar_first(values), allowed)]
     if len(given) != 4:

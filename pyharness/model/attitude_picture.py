@@ -97,7 +97,6 @@ def check_animation(path: object, moments: Triple | Changing | None) -> str:
 
 
 def animate(found: "Trajectory", path: str | os.PathLike[str]) -> None:
-    """Write the animation that `Trajectory.animate` describes."""
     name = check_animation(path, found.moments)
     write_files({name: _animation(found, _form(name))}, "animate")
 

@@ -23,6 +23,5 @@ class Basis:
     source: str
 
     def __post_init__(self) -> None:
-        """Check the mark and the texts."""
         if self.mark not in MARKS or not self.limit or not self.source:
             raise ValueError(f"not a basis of a limit: {self}")

@@ -38,8 +38,6 @@ _LEVELS = ("plain", "avx2", "avx512")
 
 @dataclass(frozen=True)
 class Build:
-    """The versions, the compiler and its flags; None if missing."""
-
     version: str
     compiler: str | None
     flags: str | None
@@ -51,7 +49,6 @@ class Build:
 
 
 def build() -> Build:
-    """Return the `Build` of this installation."""
     compiler = flags = extension = None
     try:
         from pyharness import _build, _kernels
@@ -119,7 +116,6 @@ def _ask_kernels() -> dict[str, str | None]:
 
 
 def machine(packages: Iterable[str]) -> dict[str, str]:
-    """Return "processor", "cores", and the versions of installed `packages`."""
     found = {"processor": _processor(), "cores": str(os.cpu_count())}
     return found | {name: text for name in packages if (text := _version(name)) is not None}
 
@@ -147,7 +143,6 @@ def _version(package: str) -> str | None:
 
 
 def doctor_report(build: Build, here: dict[str, Any]) -> Report:
-    """Return the report of the subcommand `doctor`."""
     rows = {
         "pyharness": build.version,
         "installed by": here["installer"],

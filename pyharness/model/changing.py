@@ -150,7 +150,6 @@ class ChangingMoments(Changing):
             """Return the three moments (kg m2) at `time` (s)."""
 
     def __post_init__(self) -> None:
-        """Check the polynomials; convert coefficients to floats."""
         where = "[body] moments"
         given = _items(where, self.polynomials, 4, _POLYNOMIALS)
         if len(given) != 3:
@@ -220,7 +219,6 @@ class ChangingInertia(Changing):
             """Return the inertia matrix (kg m2) at `time` (s)."""
 
     def __post_init__(self) -> None:
-        """Check the matrices; convert elements to floats."""
         from pyharness.model.inertia import checked_inertia, symmetric_matrix
 
         where = "[body] inertia"

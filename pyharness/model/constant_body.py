@@ -32,7 +32,6 @@ def integrated(scene: Scene) -> Scene:
 
 
 def uses_principal_axes(scene: Scene) -> bool:
-    """Return whether `integrated` transforms a scene to principal axes."""
     return scene.inertia is not None and not has_switches(scene.torque)
 
 

@@ -72,7 +72,7 @@ class Pieces:
         return np.ascontiguousarray(self.edges), np.asfortranarray(self.values.T)
 
     def numbers(self, times: Array) -> NDArray[np.intp]:
-        """Return the index of the interval of each time."""
+        """Return the indices of the intervals that contain `times` (s)."""
         return np.searchsorted(self.edges[1:-1], times, side="right")
 
 

@@ -12,19 +12,16 @@ DISTRIBUTION = "rigid-body-harness"
 
 
 def version() -> str:
-    """Return the version of the installed distribution."""
     from importlib.metadata import version
 
     return version(DISTRIBUTION)
 
 
 def install_command(extra: str) -> str:
-    """Return the pip command for an `extra` such as ``plots``."""
     return f"pip install '{DISTRIBUTION}[{extra}]'"
 
 
 def check_package(name: str, what: str, command: str) -> None:
-    """Raise InputError, with the `command` to install it, if a package is missing."""
     from importlib import import_module
 
     try:
@@ -34,7 +31,6 @@ def check_package(name: str, what: str, command: str) -> None:
 
 
 def checked_axes(ax: object) -> "Axes":
-    """Return `ax` if it is an Axes, or a new diagram for None."""
     check_package("matplotlib", "plot", install_command("plots"))
     from matplotlib.axes import Axes
 

@@ -21,11 +21,10 @@ class Dual:
         self.value, self.slopes = value, slopes
 
     def chained(self, value: Any, slope: Any) -> "Dual":
-        """Return a function of this number, from its value and derivative."""
+        """Return f of this number, from f's value and derivative there (chain rule)."""
         return Dual(value, [slope * each for each in self.slopes])
 
     def __add__(self, other: Any) -> "Dual":
-        """Return the sum."""
         second = dual(other, len(self.slopes))
         slopes = [x + y for x, y in zip(self.slopes, second.slopes, strict=True)]
         return Dual(self.value + second.value, slopes)
@@ -33,15 +32,12 @@ class Dual:
     __radd__ = __add__
 
     def __sub__(self, other: Any) -> "Dual":
-        """Return the difference."""
         return self.__add__(-1.0 * other)
 
     def __rsub__(self, other: Any) -> "Dual":
-        """Return `other` minus this number."""
         return self.__mul__(-1.0).__add__(other)
 
     def __mul__(self, other: Any) -> "Dual":
-        """Return the product."""
         second = dual(other, len(self.slopes))
         slopes = [
             x * second.value + self.value * y
@@ -52,7 +48,6 @@ class Dual:
     __rmul__ = __mul__
 
     def __truediv__(self, other: Any) -> "Dual":
-        """Return the quotient."""
         second = dual(other, len(self.slopes))
         quotient = self.value / second.value
         slopes = [
@@ -62,12 +57,10 @@ class Dual:
         return Dual(quotient, slopes)
 
     def __rtruediv__(self, other: Any) -> "Dual":
-        """Return `other` over this number."""
         return dual(other, len(self.slopes)) / self
 
 
 def dual(value: Any, count: int) -> Dual:
-    """Return `value` as a dual number; a plain number gets `count` derivatives of 0."""
     return value if isinstance(value, Dual) else Dual(value, [0.0] * count)
 
 

@@ -53,14 +53,12 @@ def suggested(effort: float, needed: float | None = None) -> str:
 
 
 def waves(scene: Scene) -> int:
-    """Return the number of sines and cosines in a torque law; 0 for a StateTorque."""
     if isinstance(scene.torque, StateTorque):
         return 0
     return len(scene.law.sines) + len(scene.law.cosines)
 
 
 def check_steps(scene: Scene, program: str, implementation: str, effort: float) -> None:
-    """Raise InputError if a program exceeds the work limit of an `implementation`."""
     if implementation not in _LIMITS:
         raise unknown("implementation", implementation, _LIMITS)
     most, a_wave = _LIMITS[implementation]
@@ -69,7 +67,6 @@ def check_steps(scene: Scene, program: str, implementation: str, effort: float) 
 
 
 def check_bodies(scene: Scene, program: str, bodies: int, effort: Number) -> None:
-    """Raise InputError if a compiled program exceeds the work limit on many bodies."""
     cost = 1.0 + _LIMITS["fortran"][1] * waves(scene)
     needed = bodies * scene.steps * cost / _MOST_STEPS_OF_ALL
     _check_work(scene, program, f" of {bodies} bodies", "use fewer", needed, effort)

@@ -87,12 +87,12 @@ class Ensemble(BatchResult):
 
     @property
     def error(self) -> Array | None:
-        """The estimated errors, shape (n,), as in `Trajectory`; NaN where unknown."""
+        """The estimated errors, shape (n,) or (n, m), as in `Trajectory`; NaN where unknown."""
         return None if self.estimates is None else self.estimates[..., 0]
 
     @property
     def growth(self) -> Array | None:
-        """The error amplifications, or upper bounds on them, shape (n,); NaN where unknown."""
+        """The error amplifications, or upper bounds, shape (n,) or (n, m); NaN where unknown."""
         return None if self.estimates is None else self.estimates[..., 1]
 
     def angular_momentum(

@@ -30,7 +30,6 @@ _SENSITIVITY = "sensitivity_"
 
 
 def save_ensemble(found: "Ensemble", path: str | os.PathLike[str]) -> None:
-    """Write an ensemble to a file, as `Ensemble.save` describes."""
     arrays = {name: getattr(found, name) for name in _ARRAYS if getattr(found, name) is not None}
     names = list(found.sensitivities or ())
     for number, name in enumerate(names):
@@ -55,7 +54,6 @@ def save_ensemble(found: "Ensemble", path: str | os.PathLike[str]) -> None:
 
 
 def load_ensemble(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Return a stored ensemble's attributes, as `Ensemble.load` describes."""
     name = checked_path(_FILE, path)
     where = f"{_FILE} '{name}'"
     known = {*_ARRAYS, *_EVENTS, *(f"{_SENSITIVITY}{number}" for number in range(1000))}

@@ -40,7 +40,7 @@ SLIDING = (
 
 
 class TimedError(InputError):
-    """An InputError that names a time (s), perhaps in rescaled time."""
+    """An InputError whose message has the time (s) in place of "{time}"."""
 
     def __init__(self, message: str, time: float) -> None:
         super().__init__(message.replace("{time}", f"{time:.6g}"))
@@ -48,16 +48,14 @@ class TimedError(InputError):
         self._message = message
 
     def __reduce__(self) -> tuple[type["TimedError"], tuple[str, float]]:
-        """Return the arguments for `pickle`."""
         return type(self), (self._message, self.time)
 
     def slower(self, factor: float) -> "TimedError":
-        """Return the same error with its time multiplied by `factor`."""
         return type(self)(self._message, self.time * factor)
 
 
 class WorkLimitError(TimedError):
-    """A TimedError of an integration that exceeds its work limit."""
+    pass
 
 
 class NotBuiltError(RuntimeError):
@@ -76,7 +74,6 @@ class NotBuiltError(RuntimeError):
 
 
 def printable(text: str, kept: str = "") -> str:
-    r"""Return `text` with unprintable characters escaped, except those in `kept`."""
     if text.translate(dict.fromkeys(map(ord, kept))).isprintable():
         return text
     return "".join(

@@ -38,7 +38,6 @@ def first_zeros(polynomial: Iterable[float | Fraction]) -> tuple[float, float]:
 
 
 def _first_zero(polynomial: Sequence[Fraction]) -> float:
-    """Return the first zero (s) of a polynomial after time 0, or infinity."""
     if min(polynomial) >= 0:
         return math.inf
     divisor = math.lcm(*(c.denominator for c in polynomial))

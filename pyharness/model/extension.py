@@ -20,7 +20,6 @@ ENDS = tuple(name.lower().replace("_", " ") for name in vars(Statuses) if name.i
 
 
 def extension() -> ModuleType:
-    """Return the compiled Fortran extension; raise NotBuiltError if it is missing."""
     try:
         from pyharness import _kernels
     except ImportError as error:

@@ -20,11 +20,9 @@ def facts(name: str) -> dict[str, Any]:
 
 
 def facts_folder() -> Path:
-    """Return the folder `data`, which in an installed package also contains `SHIPPED`."""
     return _FOLDER
 
 
 def shipped(name: str) -> Path:
-    """Return the path of `name` in a checkout or an installed package."""
     installed = _FOLDER / name
     return installed if installed.exists() else _PACKAGE.parent / name

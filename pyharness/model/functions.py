@@ -8,17 +8,14 @@ from typing import Any
 
 
 def is_finite(x: Any) -> bool:
-    """Return whether a number is finite."""
     return math.isfinite(x) if isinstance(x, float) else x.is_finite
 
 
 def square_root(x: Any) -> Any:
-    """Return the square root; raise ValueError for a negative float."""
     return math.sqrt(x) if isinstance(x, float) else x.sqrt()
 
 
 def sine(angle: Any) -> Any:
-    """Return the sine of an angle (rad); NaN for an infinite float."""
     if not isinstance(angle, float):
         return angle.sin()
     # Python raises an error for an infinite angle; Fortran, like IEEE 754, returns NaN.
@@ -26,7 +23,6 @@ def sine(angle: Any) -> Any:
 
 
 def cosine(angle: Any) -> Any:
-    """Return the cosine of an angle (rad); NaN for an infinite float."""
     if not isinstance(angle, float):
         return angle.cos()
     return math.cos(angle) if math.isfinite(angle) else math.nan

@@ -111,7 +111,6 @@ def _reverse(axis: Exact) -> Exact:
 
 
 def nearest_float(value: Fraction) -> float:
-    """Return the float nearest to a fraction, perhaps infinite."""
     try:
         return float(value)
     except OverflowError:

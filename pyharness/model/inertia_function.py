@@ -38,12 +38,10 @@ class InertiaFunction(Changing):
     written: tuple[Any, ...] = field(default=(), compare=False)
 
     def __repr__(self) -> str:
-        """Return one line without operations."""
         return f"InertiaFunction({self.place}, {self.phrase})"
 
     @property
     def phrase(self) -> str:
-        """The function in words, for reports."""
         values = self.values()
         if values is None:
             return "a recorded function of t"
@@ -58,7 +56,6 @@ class InertiaFunction(Changing):
 
     @property
     def is_constant(self) -> bool:
-        """Whether the inertia does not change with time."""
         return not self.tape.inputs
 
     @cached_property
@@ -66,11 +63,9 @@ class InertiaFunction(Changing):
         return with_derivatives(self.tape, [TIME])
 
     def matrix(self, time: Any) -> list[list[Any]]:
-        """Return the inertia matrix (kg m2) at a time (s), a float, symbol or array."""
         return self._rows(_outputs(self.tape, time))
 
     def matrix_rate(self, time: Any) -> list[list[Any]]:
-        """Return the time derivative of the inertia matrix (kg m2/s)."""
         return self._rows(_outputs(self._with_rates, time)[COUNTS[self.place] :])
 
     def _rows(self, found: Sequence[Any]) -> list[list[Any]]:
@@ -137,7 +132,6 @@ def inertia_function(place: str, function: Callable[[Any], Any]) -> InertiaFunct
 
 
 def inertia_of_texts(place: str, values: Any) -> InertiaFunction:
-    """Return the inertia from a scene file's expressions of t and numbers."""
     where = f"[body] {place}"
     rows = [values] if place == "moments" else values
     if not isinstance(values, list) or not all(
@@ -164,7 +158,7 @@ def inertia_of_tables(
 
 
 def checked_function(found: InertiaFunction) -> InertiaFunction:
-    """Return an inertia; raise InputError if it jumps, is asymmetric or not above 0."""
+    """Raise InputError if an inertia jumps, is asymmetric, or not positive definite at time 0."""
     # Imported only here, because most scenes need no exact numbers.
     from pyharness.model.inertia import checked_inertia
 

@@ -60,7 +60,6 @@ class Listing:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        """Assign the names to their kinds, and check them."""
         _check_program(self.program)
         given = {field: _names(field, getattr(self, field)) for field in _FIELDS.values()}
         for kind in ("reading", "conjecture"):
@@ -210,7 +209,6 @@ def subset(
 
 
 def checked_listing(listing: object) -> Listing:
-    """Return `listing`; raise InputError unless it is a Listing."""
     if isinstance(listing, Listing):
         return listing
     raise InputError(f"listing is {kind_of(listing)}; it must be a Listing, as subset makes one")

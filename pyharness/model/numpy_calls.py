@@ -121,17 +121,14 @@ class SymbolArray(np.ndarray[Any, Any]):
     __gt__, __ge__ = _comparison(operator.gt), _comparison(operator.ge)
 
     def __array_wrap__(self, array: Any, *_: Any) -> Any:
-        """Return a result as an array, or as its element if it has no dimension."""
         return array.view(SymbolArray) if array.shape else array.item()
 
     def clip(self, *given: Any, **named: Any) -> Any:
-        """Return the elements, limited to an interval."""
         _refuse_out(self, named)
         return _clip(self, *given, **named)
 
 
 def symbol_array(values: Any) -> Any:
-    """Return an array of symbols and numbers."""
     return np.array(values, dtype=object).view(SymbolArray)
 
 

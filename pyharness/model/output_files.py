@@ -12,7 +12,6 @@ from pyharness.model.pipes import write_waiting
 
 
 def check_writable(path: str, option: str) -> None:
-    """Raise InputError, naming `option`, if no file can be written at `path`."""
     try:
         # A link is followed to its target, as in an ordinary write.
         target = Path(os.path.realpath(path)) if "\0" not in path else Path()
@@ -85,7 +84,6 @@ class DeferredInterrupt:
     """A context manager that defers Ctrl-C, so that no temporary files remain."""
 
     def __enter__(self) -> Self:
-        """Install a handler that records interrupts."""
         self._came = False
         self._before = signal.getsignal(signal.SIGINT)
         # Python raises KeyboardInterrupt only in the main thread.
@@ -95,14 +93,12 @@ class DeferredInterrupt:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Restore the previous handler, and call it after Ctrl-C."""
         if self._holds:
             signal.signal(signal.SIGINT, self._before)
         if self._came and callable(self._before):
             self._before(signal.SIGINT, None)
 
     def check(self) -> None:
-        """Raise KeyboardInterrupt if Ctrl-C was pressed."""
         if self._came:
             raise KeyboardInterrupt
 

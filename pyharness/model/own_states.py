@@ -28,13 +28,12 @@ class OwnState(NamedTuple):
 
 
 class BroughtStates(tuple[OwnState, ...]):
-    """States that a torque brings; a copy of the scene with another torque has that torque's."""
+    """Own states from a torque; a scene copied with another torque gets that torque's states."""
 
     __slots__ = ()
 
 
 def checked_states(value: object) -> tuple[OwnState, ...]:
-    """Return the argument `states` of a scene."""
     if isinstance(value, tuple) and all(isinstance(each, OwnState) for each in value):
         names = [each.name for each in value]
         if len(set(names)) < len(names):

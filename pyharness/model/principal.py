@@ -27,19 +27,16 @@ class PrincipalScene(Scene):
 
     @property
     def exact_moments(self) -> Exact:
-        """The sums `moments` + `moments_low` (kg m2) as exact fractions."""
         pairs = zip(self.moments or (), self.moments_low, strict=True)
         return triple(Fraction(high) + Fraction(low) for high, low in pairs)
 
     @cached_property
     def euler_coefficients(self) -> Triple:
-        """The coefficients A, B, C of Euler's equations, each rounded once."""
         i1, i2, i3 = self.exact_moments
         return triple(map(nearest_float, ((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3)))
 
 
 def in_double(scene: Scene) -> Scene:
-    """Return the scene with moments in double precision."""
     if not isinstance(scene, PrincipalScene):
         return scene
     return Scene(**_fields(scene))

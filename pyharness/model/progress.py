@@ -24,12 +24,11 @@ _bar: ContextVar[Any] = ContextVar("bar", default=None)  # None if no bar was re
 
 
 def no_progress(done: int, total: int, what: str) -> None:
-    """Ignore a report of progress."""
+    pass
 
 
 @contextmanager
 def bar_of_bodies(is_shown: bool) -> Iterator[None]:
-    """Show tqdm's progress bar of bodies, if `is_shown`."""
     if not is_shown:
         yield
         return
@@ -44,14 +43,12 @@ def bar_of_bodies(is_shown: bool) -> Iterator[None]:
 
 
 def expect_bodies(n: int) -> None:
-    """Set the total of the progress bar, if it has none."""
     bar = _bar.get()
     if bar is not None and bar.total is None:
         bar.reset(total=n)
 
 
 def count_done(n: int) -> None:
-    """Add n bodies to the progress bar, if any."""
     bar = _bar.get()
     if bar is not None:
         bar.update(n)

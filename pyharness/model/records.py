@@ -63,7 +63,6 @@ def _torque(torque: TorqueLaw | StateTorque) -> dict[str, Any]:
 
 
 def listing_record(listing: Listing) -> dict[str, Any]:
-    """Return a listing for JSON."""
     return {
         "label": listing.label,
         "defects": sorted(listing.defects),
@@ -73,7 +72,6 @@ def listing_record(listing: Listing) -> dict[str, Any]:
 
 
 def ending_record(trajectory: Trajectory) -> dict[str, Any]:
-    """Return the work and the ending of a run for JSON."""
     stop = trajectory.stop
     return {
         "steps": trajectory.steps,
@@ -84,10 +82,8 @@ def ending_record(trajectory: Trajectory) -> dict[str, Any]:
 
 
 def estimate_record(trajectory: Trajectory) -> dict[str, float | None]:
-    """Return a trajectory's error estimates for JSON."""
     return {name: getattr(trajectory, name) for name in ("error", "growth", "digits")}
 
 
 def build_record() -> dict[str, Any]:
-    """Return the attributes of `Build` for JSON."""
     return asdict(build())

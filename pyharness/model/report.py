@@ -22,7 +22,6 @@ def exact(value: Any) -> str:
 
 
 def plain(value: Any) -> str:
-    """Return a value as text; None is a dash."""
     return "-" if value is None else str(value)
 
 
@@ -37,17 +36,14 @@ def short(x: "float | Decimal | None") -> str:
 
 
 def digits(form: str, scale: float = 1.0) -> Callable[[float | None], str]:
-    """Return a function that formats `scale` times a number by `form`; None becomes a dash."""
     return lambda x: "-" if x is None else f"{scale * x:{form}}"
 
 
 def counted(number: int, what: str) -> str:
-    """Return a number with its noun, such as 2 steps."""
     return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 def format_duration(seconds: float) -> str:
-    """Return a duration (s) as text, in s, min, h or days."""
     for limit, unit, name in ((120.0, 1.0, "s"), (7200.0, 60.0, "min"), (172800.0, 3600.0, "h")):
         if seconds < limit:
             return f"{seconds / unit:{'.2g' if seconds < 99.5 else '.0f'}} {name}"
@@ -55,12 +51,10 @@ def format_duration(seconds: float) -> str:
 
 
 def format_count(number: int) -> str:
-    """Return a count as text, with four digits from ten million on."""
     return str(number) if number < 10**7 else f"{float(number):.4g}"
 
 
 def format_bytes(number: float) -> str:
-    """Return a number of bytes, such as 1.25 MB."""
     for unit in ("bytes", "kB", "MB", "GB", "TB"):
         if number < 1000.0:
             return f"{number:.3g} {unit}"
@@ -86,17 +80,13 @@ def words(heads: str) -> list[Column]:
 
 
 class Table(NamedTuple):
-    """A table of a report; `rows` may be an array."""
-
     columns: Sequence[Column]
     rows: "Sequence[Sequence[Any]] | Array"
 
     def written(self) -> list[list[str]]:
-        """Return heads and rows with rounded numbers."""
         return self._cells([(each.head, each.write) for each in self.columns])
 
     def in_full(self) -> list[list[str]]:
-        """Return heads and rows with all digits."""
         return self._cells([(each.name or each.head, each.full) for each in self.columns])
 
     def _cells(self, columns: list[tuple[str, Callable[[Any], str]]]) -> list[list[str]]:
@@ -117,8 +107,6 @@ class Line(str):
 
 
 class Field(NamedTuple):
-    """A labelled paragraph."""
-
     label: str
     text: str
 
@@ -128,8 +116,6 @@ Section = Sequence[str | Field | Table]
 
 
 class Picture:
-    """A matplotlib figure, its numbers, and paragraphs of its title."""
-
     def __init__(self, figure: "Figure", numbers: Table, title: Sequence[str] = ()) -> None:
         self.figure, self.numbers, self.title = figure, numbers, title
 

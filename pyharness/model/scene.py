@@ -185,7 +185,6 @@ class Scene:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        """Check the fields."""
         if not isinstance(self.name, str):
             raise InputError(
                 f"name is {kind_of(self.name)}; allowed: text; in Python, write omega=, moments="
@@ -249,7 +248,6 @@ class Scene:
         _warn_of_impossible(self)
 
     def __repr__(self) -> str:
-        """Return a call with the fields that differ from the defaults."""
         shown = {each.name: getattr(self, each.name) for each in fields(self) if each.repr}
         usual = {each.name: each.default for each in fields(self)}
         usual |= {x.name: x.default_factory() for x in fields(self) if callable(x.default_factory)}

@@ -26,7 +26,6 @@ _WAVES = ("sines", "cosines")
 
 
 def case_numbers() -> list[int]:
-    """Return the numbers of the cases of Table 1."""
     return [entry["number"] for entry in facts("cases")["case"]]
 
 
@@ -72,7 +71,6 @@ def case_scene(number: SupportsIndex) -> Scene:
 
 
 def read_toml(path: str | os.PathLike[str], where: str) -> dict[str, Any]:
-    """Return the data of a user's TOML file."""
     return toml_of(read_file(path, where), where)
 
 
@@ -82,7 +80,6 @@ def read_file(path: str | os.PathLike[str], where: str) -> bytes:
 
 
 def toml_of(content: bytes, where: str) -> dict[str, Any]:
-    """Return the data of a TOML text."""
     try:
         return tomllib.loads(content.decode("utf-8-sig"))
     except UnicodeDecodeError:
@@ -220,14 +217,12 @@ def body_of(scene: Scene) -> tuple[str, Any]:
 
 
 def as_lists(value: Any) -> Any:
-    """Return a value with tuples as lists, and torque laws as tables."""
     if isinstance(value, TorqueLaw):
         return law_table(value)
     return list(map(as_lists, value)) if isinstance(value, tuple) else value
 
 
 def law_of_table(table: dict[str, Any]) -> TorqueLaw:
-    """Return the torque law of a table [torque]."""
     waves = {key: _waves(f"[torque] {key}", table[key]) for key in _WAVES if key in table}
     return TorqueLaw(**{**table, **waves})
 
@@ -244,13 +239,11 @@ def _waves(where: str, entries: object) -> list[tuple[Any, Any]]:
 
 
 def check_written_schema(data: dict[str, Any], kind: str) -> None:
-    """Raise InputError if a file has an unsupported schema number."""
     given = data.get("schema", SCHEMAS[kind])
     check_schema("top level", kind, given, "write it in that form, or take a version that reads it")
 
 
 def check_keys(table: dict[str, Any], allowed: Iterable[str], where: str) -> None:
-    """Raise InputError for a table key that is not `allowed`."""
     for key in table:
         if key not in allowed:
             raise unknown("key", key, allowed, where)

@@ -20,7 +20,6 @@ _LONGEST_TEXT = 60
 
 
 def scene_title(scene: Scene) -> str:
-    """Return the name of a scene, after its case number if any."""
     return f"Case {scene.case}: {scene.name}" if scene.case else scene.name
 
 
@@ -131,7 +130,6 @@ def _tuple(values: Sequence[float]) -> str:
 
 
 def ending(trajectory: Trajectory) -> str:
-    """Return a line on how a run ended."""
     steps = counted(trajectory.steps, "step")
     counts = f"{steps}, {counted(trajectory.evaluations, 'right-hand side')}"
     if trajectory.stop is not None:
@@ -157,13 +155,11 @@ def ending(trajectory: Trajectory) -> str:
 
 
 def sensitive(growth: float | None, digits: float | None) -> str:
-    """Return a phrase on amplified rounding errors and remaining digits."""
     left = counted(math.floor(digits or 0.0), "digit")
     return f"sensitive: rounding errors are amplified by {short(growth)}; {left} left"
 
 
 def estimates(trajectory: Trajectory) -> list[str]:
-    """Return a line on error estimates in a list, or []."""
     told = []
     if trajectory.error is not None and trajectory.digits is not None:
         of = "of the largest |omega|" + (" or of a state" if trajectory.states else "")

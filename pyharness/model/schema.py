@@ -23,10 +23,6 @@ The number is increased if an old version would misread a new file, or a new ver
 
 
 def check_schema(where: str, kind: str, found: object, remedy: str) -> None:
-    """Raise InputError unless `found` is the schema number of a `kind` of file.
-
-    The message begins with `where` and ends with `remedy`.
-    """
     known = SCHEMAS[kind]
     if type(found) is int and found == known:
         return

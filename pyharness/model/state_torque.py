@@ -81,7 +81,6 @@ class StateTorque:
     in_space: bool = field(default=False, init=False, repr=False)
 
     def __repr__(self) -> str:
-        """Return one line without operations."""
         if self.tape is None:
             return f"StateTorque(opaque, needs_attitude={self.needs_attitude})"
         # Expressions and constants may be long, and are shortened as one text.
@@ -183,7 +182,8 @@ def of_law(law: TorqueLaw) -> StateTorque:
 def turned_law(law: TorqueLaw, time: Symbol, attitude: Any) -> Array:
     """Return the body components of a law about the axes of space.
 
-    Compiled code is shared by laws with equally many frequencies.
+    Each component has the terms of all waves, some times 0, so that laws with equally many waves
+    share compiled code.
     """
     angles = [frequency * time for _, frequency in (*law.sines, *law.cosines)]
     terms = [time, *(wave(each) for each in angles for wave in (np.sin, np.cos))]
@@ -333,17 +333,14 @@ def opaque(function: Any) -> StateTorque:
 
 
 def is_opaque(torque: object) -> bool:
-    """Return whether a torque calls an unrecorded function."""
     return isinstance(torque, StateTorque) and torque.tape is None
 
 
 def has_switches(torque: object) -> bool:
-    """Return whether a recorded torque has operations that jump."""
     return isinstance(torque, StateTorque) and bool(torque.tape and torque.tape.n_switches)
 
 
 def checked_torque(value: object, states: tuple[str, ...] = ()) -> TorqueLaw | StateTorque:
-    """Return a user's torque, with functions recorded."""
     found: TorqueLaw | StateTorque
     if isinstance(value, (TorqueLaw, StateTorque)):
         found = value

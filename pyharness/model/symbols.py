@@ -75,20 +75,17 @@ class Recorder:
         return [Symbol(self, 0.0, {slot: 1.0}) for slot in range(self._n_inputs)]
 
     def refusal(self, what: str, write: str = _ALLOWED) -> InputError:
-        """Return the exception for an operation that can't be recorded."""
         allowed = f"allowed: {write}, or {self._instead}"
         where = _line() if self._has_lines else ""
         return InputError(f"{self.place}: {what} can't be recorded{where}; {allowed}")
 
     def refusal_of_numbers(self, reason: str) -> InputError:
-        """Return the exception for a function that accepts no symbols."""
         return InputError(
             f"{self.place}: the function accepts numbers only, not the symbols that record it "
             f"({reason}); allowed: a formula of {_ALLOWED}, or {self._instead}"
         )
 
     def impure(self) -> InputError:
-        """Return the exception for a function that depends on more than its arguments."""
         return InputError(f"{self.place}: {HAS_MEMORY}")
 
     def slot(self, operation: Operation) -> int:
@@ -103,11 +100,9 @@ class Recorder:
         return self._slots[operation]
 
     def result(self, *operation: Any, factor: float = 1.0) -> "Symbol":
-        """Record an operation with these fields; return its result times `factor`."""
         return Symbol(self, 0.0, {self.slot(Operation(*operation)): factor})
 
     def tape(self, outputs: Sequence[Any]) -> Tape:
-        """Return the tape that computes `outputs`, without unused operations."""
         linear = [self._output(axis, each) for axis, each in enumerate(outputs, 1)]
         return _without_unused([*self._slots], linear, self._n_inputs)
 
@@ -200,7 +195,6 @@ class Symbol:
         self.recorder, self._constant, self._terms = recorder, constant, terms
 
     def linear(self) -> Linear:
-        """Return the linear combination as data."""
         return Linear(self._constant, tuple(sorted(self._terms.items())))
 
     def _slot(self) -> tuple[int, float]:
@@ -228,7 +222,6 @@ class Symbol:
 
     @_of_symbols
     def __add__(self, other: "Symbol") -> "Symbol":
-        """Return the sum."""
         terms = dict(self._terms)
         for slot, coefficient in other._terms.items():
             total = terms.pop(slot, 0.0) + coefficient
@@ -239,11 +232,9 @@ class Symbol:
     __radd__ = __add__
 
     def __neg__(self) -> "Symbol":
-        """Return the negative."""
         return self._scaled(-1.0)
 
     def __pos__(self) -> "Symbol":
-        """Return the symbol itself."""
         return self
 
     __sub__ = _of_symbols(lambda x, y: x + -y)
@@ -251,7 +242,6 @@ class Symbol:
 
     @_of_symbols
     def __mul__(self, other: "Symbol") -> "Symbol":
-        """Return the product."""
         if not other._terms:
             return self._scaled(other._constant)
         if not self._terms:
@@ -265,7 +255,6 @@ class Symbol:
 
     @_of_symbols
     def __truediv__(self, other: "Symbol") -> "Symbol":
-        """Return the quotient; raise InputError for the constant 0."""
         if not other._terms:
             if other._constant == 0.0:
                 raise InputError(f"{self.recorder.place}: division by the constant 0")
@@ -309,7 +298,6 @@ class Symbol:
         return 1.0 / result if exponent < 0.0 else result
 
     def __rpow__(self, base: Any) -> "Symbol":
-        """Return a power of a positive number."""
         number = converted(base)
         if not isinstance(number, float) or not number > 0.0:
             raise self.recorder.refusal("a power of a number that is not positive")
@@ -333,7 +321,6 @@ class Symbol:
     _root = _function("sqrt")
 
     def sqrt(self) -> "Symbol":
-        """Return the square root."""
         if not self._terms and self._constant < 0.0:
             place = self.recorder.place
             raise InputError(f"{place}: square root of the constant {self._constant:g}")
@@ -359,17 +346,14 @@ class Symbol:
         return _condition(self.recorder.result("switch", (slot,)))
 
     def ceil(self) -> "Symbol":
-        """Return this symbol rounded up."""
         return -((-self).floor())
 
     def trunc(self) -> "Symbol":
-        """Return this symbol rounded toward 0."""
         return self.sign() * abs(self).floor()
 
     __ceil__, __trunc__ = ceil, trunc
 
     def sign(self) -> "Symbol":
-        """Return 1 if this symbol is positive, else -1."""
         return 2.0 * (self > 0.0) - 1.0
 
     def with_terms_of(self, others: "Iterable[Symbol]") -> "Symbol":
@@ -381,11 +365,9 @@ class Symbol:
         return self.recorder.result("linear", (), linear)
 
     def is_time(self) -> bool:
-        """Return whether this symbol is the time."""
         return not self._constant and self._terms == {TIME: 1.0}
 
     def of_table(self, table: Table) -> "Symbol":
-        """Return a table's value at this symbol; raise InputError unless it is the time."""
         if not self.is_time():
             raise InputError(
                 f"{self.recorder.place}: a table of a variable other than time can't be recorded"
@@ -404,19 +386,16 @@ class Symbol:
     __ne__ = __eq__
 
     def __bool__(self) -> bool:
-        """Refuse the use as a condition."""
         raise self.recorder.refusal(
             "a branch (if, while, and, or, not) on time or state",
             "numpy.where(condition, x, y), &, | and ~",
         )
 
     def __abs__(self) -> "Symbol":
-        """Return the absolute value."""
         found: Symbol = select(self > 0.0, self, -self)
         return found
 
     def __float__(self) -> float:
-        """Refuse the conversion to a number."""
         self.recorder.was_converted = True
         raise self.recorder.refusal(
             "a conversion of time or state to a float, by float(), scipy or an array of floats,",
@@ -446,19 +425,15 @@ class Condition(Symbol):
     __slots__ = ()
 
     def __and__(self, other: Any) -> Any:
-        """Return the condition that both hold."""
         return _condition(select(self, other, False))
 
     def __or__(self, other: Any) -> Any:
-        """Return the condition that one or both hold."""
         return _condition(select(self, True, other))
 
     def __xor__(self, other: Any) -> Any:
-        """Return the condition that exactly one holds."""
         return _condition(select(self, negated(other), other))
 
     def __invert__(self) -> "Condition":
-        """Return the opposite condition."""
         return _condition(1.0 - self)
 
     __rand__, __ror__, __rxor__ = __and__, __or__, __xor__
@@ -469,12 +444,10 @@ def _condition(value: Symbol) -> Condition:
 
 
 def negated(condition: Any) -> Any:
-    """Return the opposite condition."""
     return ~condition if isinstance(condition, Condition) else not condition
 
 
 def select(condition: Any, first: Any, second: Any) -> Any:
-    """Return `first` if the condition holds, else `second`, numbers or symbols."""
     if not isinstance(condition, Symbol):
         return first if condition else second
     if not isinstance(condition, Condition):

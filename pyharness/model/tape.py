@@ -53,11 +53,9 @@ class Table:
         return self.breaks.tobytes(), self.pieces.tobytes()
 
     def __eq__(self, other: object) -> bool:
-        """Return whether all bits are the same."""
         return isinstance(other, Table) and self._key == other._key
 
     def __hash__(self) -> int:
-        """Return the hash of the bits."""
         return hash(self._key)
 
 
@@ -92,7 +90,6 @@ class Tape:
 
     @property
     def needs_attitude(self) -> bool:
-        """Whether the function depends on the attitude."""
         return not self.inputs.isdisjoint(ATTITUDE)
 
     @cached_property
@@ -100,7 +97,6 @@ class Tape:
         return hash((self.operations, self.outputs, self.n_inputs))
 
     def __hash__(self) -> int:
-        """Return the hash of the fields."""
         return self._hash
 
     def __getstate__(self) -> dict[str, Any]:
@@ -114,7 +110,6 @@ class Tape:
 
     @property
     def n_switches(self) -> int:
-        """The number of operations in `SWITCHES`."""
         return sum(each.kind in SWITCHES for each in self.operations)
 
     @property
@@ -127,7 +122,6 @@ class Tape:
 
 
 def slots_of(operation: Operation) -> tuple[int, ...]:
-    """Return the slots that an operation reads."""
     if operation.table is not None:
         return (TIME,)
     if operation.linear is None:
@@ -174,7 +168,6 @@ def _combined(linear: Linear, values: Sequence[Any], functions: Functions[Any]) 
 
 
 def slot_values(tape: Tape, inputs: Sequence[T], functions: Functions[T]) -> list[T]:
-    """Return the values of all slots of a tape."""
     values: list[Any] = list(inputs)
     for operation in tape.operations:
         values.append(_result(operation, values, functions))
@@ -237,7 +230,6 @@ def _sqrt(x: float) -> float:
 
 
 def exponential(x: float) -> float:
-    """Return exp(x), or infinity if it overflows."""
     try:
         return math.exp(x)
     except OverflowError:
@@ -245,29 +237,24 @@ def exponential(x: float) -> float:
 
 
 def logarithm(x: float) -> float:
-    """Return log(x); minus infinity at 0 and NaN below."""
     if x > 0.0:
         return math.log(x)
     return -math.inf if x == 0.0 else math.nan
 
 
 def arcsine(x: float) -> float:
-    """Return asin(x), or NaN if abs(x) exceeds 1."""
     return math.asin(x) if abs(x) <= 1.0 else math.nan
 
 
 def step(x: float) -> float:
-    """Return 1 if x is positive, else 0."""
     return 1.0 if x > 0.0 else 0.0
 
 
 def whole(x: float) -> float:
-    """Return floor(x), or NaN if x is not finite."""
     return float(math.floor(x)) if math.isfinite(x) else math.nan
 
 
 def selected(condition: float, first: float, second: float) -> float:
-    """Return `first` if the condition holds, else `second`."""
     return first if condition else second
 
 

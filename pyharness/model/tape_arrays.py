@@ -9,7 +9,6 @@ from pyharness.model.tape import Functions, Table
 
 
 def table_values(table: Table, times: Any) -> Array:
-    """Return the values of a table at an array of times (s)."""
     piece = np.maximum(0, np.searchsorted(table.breaks, times, side="right") - 1)
     c0, c1, c2, c3 = table.pieces[piece].T
     s = times - table.breaks[piece]
@@ -26,7 +25,6 @@ def without_equal_constants(table: Table) -> Table:
 
 
 def value_of_table(table: Table, time: Any) -> Any:
-    """Return a table's value at a symbol of time; a number for a constant table."""
     return time.of_table(table) if len(table.breaks) > 1 else float(table.pieces[0, 0])
 
 

@@ -72,7 +72,6 @@ class TorqueLaw:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        """Check the fields; convert numbers to floats."""
         for name in ("constant", "rate"):
             object.__setattr__(self, name, three(f"[torque] {name}", getattr(self, name)))
         for name in ("sines", "cosines"):
@@ -198,6 +197,5 @@ def to_body(vector: Any, attitude: Any) -> Array:
 
 
 def body_torque(law: TorqueLaw, time: Any, attitude: Any) -> Array:
-    """Return the body components of a torque law."""
     value = law_value(law, time)
     return to_body(value, attitude) if law.in_space else value

@@ -294,8 +294,8 @@ def digits_left(error: float | None) -> float | None:
 class BatchResult:
     """The angular velocities of n bodies, and how the computation of each ended.
 
-    `omega` (rad/s), shape (n, ..., 3), is NaN without a result. `status`, shape (n,), has codes of
-    `pyharness.model.codes.Statuses`.
+    `omega` (rad/s), shape (n, ..., 3), is NaN without a result. `status`, shape (n, ...), has codes
+    of `pyharness.model.codes.Statuses`.
     """
 
     omega: Array
@@ -305,10 +305,10 @@ class BatchResult:
 
     @property
     def ended(self) -> NDArray[np.str_]:
-        """The statuses as text, such as "complete", shape (n,)."""
+        """The statuses as text, such as "complete", in the shape of `status`."""
         return np.array(ENDS)[self.status]
 
     @property
     def has_result(self) -> NDArray[np.bool_]:
-        """Whether all results of each body are present, shape (n,)."""
+        """Whether each result is present, in the shape of `status`."""
         return np.isin(self.status, _RESULTS)

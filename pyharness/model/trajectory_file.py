@@ -61,7 +61,6 @@ _OPERANDS = {each.name: 1 for each in fields(Functions) if each.name not in ("nu
 
 
 def save(found: "Trajectory", path: str | os.PathLike[str]) -> None:
-    """Write a trajectory to the file `path`, as `Trajectory.save` describes."""
     name = checked_file("trajectory file", path)
     write_files({name: file_content(found)}, "trajectory file")
 

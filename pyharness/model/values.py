@@ -27,7 +27,6 @@ _THREE_FLOATS = [float, float, float]
 
 
 def triple(values: Iterable[T]) -> tuple[T, T, T]:
-    """Return three values as a tuple."""
     first, second, third = values
     return first, second, third
 
@@ -80,7 +79,6 @@ def parsed_float(text: str) -> float:
 
 
 def parsed_whole(text: str) -> int:
-    """Return the whole number in `text`."""
     return int(_read_text(text))
 
 
@@ -91,7 +89,6 @@ def _read_text(text: str) -> str:
 
 
 def three(where: str, values: object) -> Triple:
-    """Return three finite numbers as floats."""
     return triple(finite(where, each) for each in three_floats(where, values))
 
 
@@ -108,7 +105,6 @@ def three_floats(where: str, values: object) -> Triple:
 
 
 def finite(where: str, value: object) -> float:
-    """Return a finite number as a float."""
     found = number(where, value)
     if not math.isfinite(found):
         raise InputError(f"{where}: {found:g} is not finite; allowed: finite numbers")
@@ -134,7 +130,6 @@ def number_list(where: str, values: object, allowed: str) -> Iterable[object]:
 
 
 def integer(where: str, value: object) -> int:
-    """Return a whole number, not a float, as an int."""
     if type(value) is int:
         return value
     if not is_no_number(value):
@@ -146,7 +141,6 @@ def integer(where: str, value: object) -> int:
 
 
 def boolean(where: str, value: object) -> bool:
-    """Return True or False, of Python or NumPy, as a bool."""
     if isinstance(value, bool) or kind_of(value) == "true or false":
         return bool(value)
     raise InputError(f"{where} is {kind_of(value)}; allowed: True or False")
@@ -161,7 +155,6 @@ def tolerance_of(value: object, finest: float) -> float:
 
 
 def checked_effort(effort: Number) -> float:
-    """Return `effort` as a float above 0."""
     value = number("effort", effort)
     if not 0.0 < value < math.inf:
         raise InputError(f"effort: {value:g}; allowed: a finite number above 0")

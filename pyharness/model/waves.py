@@ -27,12 +27,10 @@ _ZERO = (Fraction(0), Fraction(0), Fraction(0))
 
 
 def merged(law: TorqueLaw) -> TorqueLaw:
-    """Return the law with waves of equal frequency summed."""
     return exact_law(law) if is_mergeable(law) else law
 
 
 def is_mergeable(law: TorqueLaw) -> bool:
-    """Return whether `merged` changes a law."""
     for waves in (law.sines, law.cosines):
         # Waves of amplitude 0 do not count.
         counts = Counter(abs(frequency) for amplitude, frequency in waves if any(amplitude))
@@ -80,7 +78,6 @@ def _sum(x: Exact, y: Exact) -> Exact:
 
 
 def with_merged_waves(scene: Scene) -> Scene:
-    """Return the scene with its torque law, if any, merged."""
     if not isinstance(scene.torque, TorqueLaw):
         return scene
     law = merged(scene.torque)

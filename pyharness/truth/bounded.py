@@ -46,29 +46,26 @@ class ErrorBound(NamedTuple):
     warning: str = ""
 
     def text(self, unit: str = "rad/s") -> str:
-        """Return the bound for omega as text: two digits, rounded up, with unit and basis."""
         return f"{' '.join(filter(None, (at_most(self.value), unit)))} ({self.basis})"
 
     def over(self, scale: float) -> "ErrorBound":
-        """Return the bound with omega's divided by `scale` (rad/s), unchanged if `scale` is 0."""
+        """Return the bound with `value` divided by `scale` (rad/s), unchanged if `scale` is 0."""
         return self._replace(value=self.value / scale) if scale else self
 
     @property
     def larger(self) -> "ErrorBound":
-        """Return the larger of the bounds for omega and attitude."""
         if self.turned is None:
             return self
         return joined([self._replace(angle=None, angle_basis=None), self.turned])
 
     @property
     def turned(self) -> "ErrorBound | None":
-        """Return the bound for the attitude alone (rad), or None."""
+        """The bound for the attitude alone (rad), or None."""
         if self.angle is None or self.angle_basis is None:
             return None
         return ErrorBound(self.angle, self.angle_basis, warning=self.warning)
 
     def record(self) -> dict[str, Any]:
-        """Return the bound as a dictionary for JSON."""
         found: dict[str, Any] = {"value": self.value, "basis": self.basis}
         if self.angle is not None:
             found |= {"angle": self.angle, "angle_basis": self.angle_basis}
@@ -154,7 +151,7 @@ def _exact(omega: Array, remainder: Array | None) -> Sequence[Row]:
 
 
 def joined(found: Sequence[ErrorBound]) -> ErrorBound:
-    """Return the largest of one or more bounds."""
+    """Return one bound that is not below any of `found`."""
     angles = [each.angle for each in found if each.angle is not None]
     bases = [each.angle_basis for each in found if each.angle_basis is not None]
     return ErrorBound(
@@ -227,7 +224,7 @@ class _Statement(NamedTuple):
         return omega, attitude
 
     def _digits(self) -> int | None:
-        """Return the digits that make balls small against the estimate; None above 60."""
+        """Return the digits that make balls small against the estimate; None if above 60."""
         largest = max(1.0, *(abs(float(x)) for row in self.omega for x in row))
         if not (0.0 < self.claimed < math.inf):
             # Omega is 0 at all times, or there is no estimate.

@@ -46,14 +46,11 @@ _WORDS = "Taylor steps in integer arithmetic"
 
 @dataclass(frozen=True)
 class Proof:
-    """An enclosure with its certificate."""
-
     enclosure: Enclosure
     _run: "_Run"
 
     @cached_property
     def certificate(self) -> dict[str, Any]:
-        """The certificate as a dictionary for JSON."""
         return self._run.certificate()
 
 
@@ -62,7 +59,6 @@ class _AmplifiedError(Exception):
 
 
 def has_certificate(scene: Scene) -> bool:
-    """Return whether moments or coefficients are constant, and the torque is a law in body axes."""
     constant = scene.changing is None and scene.inertia is None
     return constant and isinstance(scene.torque, TorqueLaw) and not scene.torque.in_space
 

@@ -264,7 +264,6 @@ def check_file(name: str, text: str | None = None) -> tuple[dict[str, Any] | Non
 
 
 def main(names: Sequence[str]) -> int:
-    """Check certificates in files and print what they prove; return 1 unless all hold."""
     found = [(name, *check_file(name)) for name in names]
     for name, proved, why in found:
         lines = [f"not proved: {why}"]

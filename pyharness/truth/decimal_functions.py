@@ -40,7 +40,6 @@ def _alternating(term: Decimal, square: Decimal, n: int) -> Decimal:
 
 
 def arctan(x: Decimal) -> Decimal:
-    """Return the angle (rad) whose tangent is x, by Newton's method."""
     with decimal.localcontext() as context:
         context.prec += 10
         angle = Decimal(math.atan(x))
@@ -94,7 +93,6 @@ def product(x: Row, reversed_y: Row) -> Decimal:
 
 
 def value_at(series: Sequence[Any], offset: Any) -> Any:
-    """Return the value of a Taylor series at `offset` from its centre."""
     total: Any = 0
     for term in reversed(series):
         total = total * offset + term
@@ -102,11 +100,9 @@ def value_at(series: Sequence[Any], offset: Any) -> Any:
 
 
 def unit(row: Row) -> Row:
-    """Return a vector divided by its length."""
     length = sum((x * x for x in row), Decimal(0)).sqrt()
     return [x / length for x in row]
 
 
 def to_decimal(x: Fraction) -> Decimal:
-    """Return a fraction rounded to the digits of the current context."""
     return Decimal(x.numerator) / x.denominator

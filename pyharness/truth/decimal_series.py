@@ -297,7 +297,10 @@ class _Equations:
         self._acceleration = [Decimal(force) / Decimal(scene.masses[0]) for force in scene.forces]
 
     def expand(self, time: Decimal, state: Row, order: int, forward: bool) -> list[Row]:
-        """Return all unknowns' Taylor coefficients to `order`; `forward` selects a break's side."""
+        """Return all unknowns' Taylor coefficients to `order`.
+
+        At a break of a table, `forward` selects its later piece.
+        """
         series = [[x] for x in state]
         torque = self._torque_series(time, order, series, forward)
         elements = [] if self._changing is None else self._changing.elements

@@ -118,7 +118,7 @@ class Switches:
 
 
 def _first_root(terms: Row, length: Decimal, side: int) -> Decimal | None:
-    """Return the distance at which a series first loses the sign `side` in a step."""
+    """Return the distance at which a series first loses the sign `side` in a step, or None."""
     scaled = [each * length**k for k, each in enumerate(terms)]
     if not scaled[0]:
         scaled = scaled[1:]

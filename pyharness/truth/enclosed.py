@@ -41,7 +41,6 @@ class Enclosure:
         return max((rounded_up(each.radius) for each in self.omega), default=0.0)
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return a dictionary for JSON for each time."""
         rows = []
         for n, time in enumerate(self.time):
             row = row_of(time, self.omega[n])
@@ -54,7 +53,6 @@ class Enclosure:
 
 
 def with_energy(scene: Scene, found: Enclosure) -> Enclosure:
-    """Return the enclosure with the rotational energy (J), if the scene has moments."""
     if scene.moments is None:
         return found
     moments = scene.exact_moments or ()
@@ -68,7 +66,6 @@ def with_energy(scene: Scene, found: Enclosure) -> Enclosure:
 
 
 def row_of(time: float, omega: Balls) -> dict[str, Any]:
-    """Return omega's balls at `time` (s) as a dictionary for JSON."""
     texts, radius = decimals(omega)
     return {"time": time, "omega": texts, "radius": radius}
 

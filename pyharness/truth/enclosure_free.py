@@ -129,7 +129,6 @@ class Orbit:
             self.constants = [x.real for x in acb.modular_theta(acb(0), self.tau)]
 
     def omega(self, t: Fraction) -> Balls:
-        """Return omega (rad/s) at time `t` (s)."""
         row = [arb(0)] * 3
         values = self._functions(self.start + self.rate * ball(t))
         for axis, size, value in zip(self.axes, self.sizes, values, strict=True):

@@ -22,7 +22,6 @@ _RADIUS = {"omega": "radius"}
 
 
 def enclosure_report(scene: Scene, digits: int, found: Enclosure) -> Report:
-    """Return the report of an enclosure; `digits` is the requested number."""
     rows = found.rows()
     lines = [line for row in rows for line in _lines(row)]
     steps = f", {counted(found.steps, 'step')}" if found.steps else ""

@@ -113,7 +113,6 @@ def is_steady(scene: Scene) -> bool:
 
 
 def conjugate(q: Row) -> Row:
-    """Return the conjugate of a quaternion."""
     return [q[0], -q[1], -q[2], -q[3]]
 
 

@@ -51,12 +51,12 @@ class Reference:
 
     @property
     def angle_error(self) -> float:
-        """Return the attitude's estimated error (rad), including rounding."""
+        """The attitude's estimated error (rad), including rounding."""
         return self.angle_estimate + 4.0 * _HALF_ULP
 
     @property
     def error(self) -> float:
-        """Return omega's estimated error (rad/s), including the largest rounding error."""
+        """Omega's estimated error (rad/s), including the largest rounding error."""
         largest = float(np.max(np.abs(self.omega), initial=0.0))
         return self.estimate + _HALF_ULP * largest
 

@@ -64,12 +64,10 @@ class Card(NamedTuple):
 
     @property
     def statement(self) -> str:
-        """Return the text with each run of blanks reduced to one."""
         return " ".join(self.text.split())
 
     @property
     def is_comment(self) -> bool:
-        """Return whether column 1 has a C."""
         return self.text.startswith("C")
 
     @property
@@ -118,12 +116,10 @@ class Card(NamedTuple):
 
     @property
     def deviates(self) -> bool:
-        """Return whether the scan lacks the card or differs from our text."""
         return bool(self.lost or self.printed or self.differences)
 
     @property
     def entries(self) -> tuple[str, ...]:
-        """Return the identifiers of the card's apparatus entries."""
         return tuple(
             each["id"]
             for each in facts("apparatus")["entry"]
@@ -151,7 +147,6 @@ class Deck:
 
     @cached_property
     def executable(self) -> frozenset[int]:
-        """Return the numbers of cards with executable statements."""
         found, computes = set(), False
         for card in self.cards.values():
             if not card.continues:
@@ -161,24 +156,22 @@ class Deck:
         return frozenset(found)
 
     def statement_kind(self, card: Card) -> str:
-        """Return ``comment``, ``executable`` or ``specification``."""
         if card.is_comment:
             return "comment"
         return "executable" if card.number in self.executable else "specification"
 
     @cached_property
     def absent(self) -> dict[int, str]:
-        """Return, by card number, why the Fortran port omits a card."""
+        """Return by card number why the Fortran port omits a card."""
         return {n: why for cards, why in self._places["absent"] for n in numbers(cards)}
 
     @cached_property
     def otherwise(self) -> dict[int, str]:
-        """Return, by card number, why the Fortran port changes the form of a statement."""
+        """Return by card number why the Fortran port changes the form of a statement."""
         return {n: why for cards, why in self._places["otherwise"] for n in numbers(cards)}
 
     @cached_property
     def port(self) -> dict[int, list[Place]]:
-        """Return the lines of the Fortran port by card number."""
         file = port_file(self.program)
         lines = enumerate(_lines(shipped(PORT) / file), 1)
         found = ((number, match) for number, text in lines if (match := _MARGIN.match(text)))
@@ -186,7 +179,6 @@ class Deck:
 
     @cached_property
     def twin(self) -> dict[int, list[Place]]:
-        """Return the lines of the Python port by card number."""
         places = self._places["twin"]
         return _by_card((cards, twin_line(file, text)) for cards, file, text in places)
 
@@ -230,7 +222,7 @@ def chosen(asked: Iterable[str]) -> list[Card]:
 
 
 def parallels(card: Card) -> list[Card]:
-    """Return the cards of other programs with equal text; none for a comment or blank card."""
+    """Return the cards of other programs with equal text."""
     if card.is_comment or not card.text[6:].strip():
         return []
     same_text = _by_text().get(tight(card.text), [])
@@ -281,12 +273,10 @@ def _by_card(places: Iterable[tuple[str, Place]]) -> dict[int, list[Place]]:
 
 
 def tight(text: str) -> str:
-    """Return a text without its blanks."""
     return "".join(text.split())
 
 
 def port_file(program: str) -> str:
-    """Return the name of a program's Fortran port."""
     return f"{program.replace('-', '_')}.fypp"
 
 

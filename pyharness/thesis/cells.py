@@ -12,13 +12,11 @@ from pyharness.thesis.equations import initial_torque
 
 
 def subsets(names: tuple[str, ...]) -> Iterator[frozenset[str]]:
-    """Yield every subset of `names`, the empty one first."""
     for bits in range(2 ** len(names)):
         yield frozenset(name for i, name in enumerate(names) if bits >> i & 1)
 
 
 def all_listings(program: str) -> Iterator[Listing]:
-    """Yield all listings of a program: every subset of readings with every subset of defects."""
     for readings in subsets(names_of("reading", program)):
         for defects in subsets(switches(program)):
             yield Listing(program, defects, readings)

@@ -41,9 +41,9 @@ def expected_lines() -> list[tuple[str, str]]:
 
 @cache
 def witness_lines() -> dict[str, str]:
-    """Return each card's line in the scan, by the card's name.
+    """Return each card's line in the scan, with blanks, by the card's name.
 
-    Blanks are from `data/cards/blanks.toml`. Callers must not change the dictionary.
+    Callers must not change the dictionary.
     """
     blanks = facts("cards/blanks")
     found = {}
@@ -143,13 +143,11 @@ class Row(NamedTuple):
 
     @property
     def is_explained(self) -> bool:
-        """Return whether all decks and the thesis agree, or the row explains why not."""
         agrees = self.decks == "agree" and len(self.cards) == len(PROGRAMS)
         return (agrees and self.thesis == "agrees") or bool(self.entries or self.reason)
 
 
 def rows() -> list[Row]:
-    """Return all comparisons, in the order of operations in the decks."""
     found = []
     for given in facts("cards/collation")["row"]:
         thesis = ("agrees" if given["agrees"] else "differs") if "text" in given else "silent"

@@ -87,5 +87,4 @@ def program_arguments(
 
 
 def stop_reads_velocity(listing: Listing, may_stop: bool) -> bool:
-    """Return whether the stop test reads the velocity."""
     return may_stop and listing.has("lipschitz-tests-velocity")

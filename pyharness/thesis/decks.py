@@ -93,7 +93,6 @@ def card_steps(program: str) -> int:
 
 
 def corrected_cards(program: str) -> dict[int, str]:
-    """Return the corrected program's cards by number, including inserted cards."""
     lines = deck_text(Listing.corrected(program)).splitlines()
     return {int(line[73:]): line[:72].rstrip() for line in lines}
 
@@ -233,12 +232,10 @@ def _case_cards(program: str, scene: Scene) -> dict[int, str]:
 
 
 def solver_cards() -> int:
-    """Return the number of cards of our LEQT1F, without comments."""
     return sum(not line.startswith("C") for line in _SOLVER.read_text().splitlines())
 
 
 def compiler() -> str | None:
-    """Return the path of gfortran, or None."""
     return shutil.which(COMPILER)
 
 
@@ -259,7 +256,6 @@ def run_deck(text: str, folder: Path | None = None) -> Run:
 
 
 def solver_object(folder: Path) -> Path:
-    """Return the path of the compiled LEQT1F in `folder`, compiled if missing."""
     found = folder / "leqt1f.o"
     if not found.exists():
         _command([COMPILER, *FLAGS, "-c", str(_SOLVER), "-o", str(found)], folder)

@@ -53,7 +53,6 @@ def card_torque(scene: Scene) -> Vector | None:
 
 
 def all_finite(values: Vector) -> bool:
-    """Return whether no value is NaN or infinite."""
     return all(map(is_finite, values))
 
 

@@ -108,7 +108,6 @@ def run_compiled(
 
 
 def compiled_words() -> tuple[str, ...]:
-    """Return the names of the compiled programs' arithmetics; none without a build."""
     try:
         from pyharness import _build
     except ImportError:
@@ -129,7 +128,6 @@ def _check_angles(scene: Scene) -> None:
 
 
 def n_bytes(word: Word) -> int:
-    """Return the size (bytes) of a number in binary32, binary64 or binary128."""
     return _BITS[word.p] // 8
 
 

@@ -41,7 +41,7 @@ class Program:
         effort: float = 1.0,
         word: str = BINARY64,
     ) -> Trajectory:
-        """Run the program and return its trajectory; see `run_program`."""
+        """Run the program; see `run_program`."""
         checked_scene(scene)
         checked_listing(listing)
         lipschitz = number("lipschitz", lipschitz)
@@ -83,7 +83,6 @@ def work_of(word: str, implementation: str) -> str:
 
 
 def checked_word(word: object, implementation: str) -> str:
-    """Return `word`; raise InputError if the implementation does not support it."""
     if not isinstance(word, str) or word not in WORD_NAMES:
         raise unknown("word", word, WORD_NAMES, "--word")
     if word not in COMPILED_WORDS and implementation == "fortran":

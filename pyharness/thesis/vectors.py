@@ -52,7 +52,6 @@ class Answer(NamedTuple):
 
     @property
     def agrees(self) -> bool:
-        """Return whether our result equals the expected one, blanks ignored."""
         return "".join(self.vector.result.split()) == "".join(self.found.split())
 
 

@@ -212,23 +212,18 @@ class Number:
     __truediv__ = _operator("divide", _quotient)
 
     def __rsub__(self, other: Any) -> "Number":
-        """Return `other` minus this number."""
         return self.word(other) - self
 
     def __rtruediv__(self, other: Any) -> "Number":
-        """Return `other` divided by this number."""
         return self.word(other) / self
 
     def __neg__(self) -> "Number":
-        """Return the number with the opposite sign."""
         return self.__class__(-self.m, self.e) if self.m else self._without_sign_of_zero(-self.e)
 
     def __abs__(self) -> "Number":
-        """Return the magnitude."""
         return self.__class__(abs(self.m), self.e if self.m else abs(self.e))
 
     def __bool__(self) -> bool:
-        """Return whether the number is nan or not zero."""
         return bool(self.m or self.e)
 
     def __eq__(self, other: object) -> bool:
@@ -249,7 +244,6 @@ class Number:
     __gt__, __ge__ = _comparison(operator.gt), _comparison(operator.ge)
 
     def __float__(self) -> float:
-        """Return the nearest float, or an infinity with the same sign."""
         if not self.m:
             return float(self.e)
         try:
@@ -258,17 +252,14 @@ class Number:
             return math.copysign(math.inf, self.m)
 
     def __repr__(self) -> str:
-        """Return format and value, as in ``Word(48, 'FX')(m * 2**e)``."""
         value = f"{self.m} * 2**{self.e}" if self.m else str(self.e)
         return f"{self.word}({value})"
 
     @property
     def is_finite(self) -> bool:
-        """Return whether the number is neither nan nor infinite."""
         return bool(self.m) or self.e == 0.0
 
     def fraction(self) -> Fraction:
-        """Return the exact value of a finite number."""
         return Fraction(self.m) * Fraction(2) ** self.e if self.m else Fraction(self.e)
 
     def sqrt(self) -> "Number":
@@ -362,7 +353,6 @@ class Word:
         self._literals: dict[float, Number] = {}
 
     def __repr__(self) -> str:
-        """Return bits and rounding rule, as in ``Word(48, 'FX')``."""
         return f"Word({self.p}, {self.rule!r})"
 
     def __call__(self, value: Any) -> Number:

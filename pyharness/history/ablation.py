@@ -69,7 +69,6 @@ class CaseEffects:
 
 
 def entries(kind: str | None = None) -> list[dict[str, Any]]:
-    """Return the apparatus entries of one kind, or all."""
     everything: list[dict[str, Any]] = facts("apparatus")["entry"]
     kinds = sorted({entry["kind"] for entry in everything})
     if kind is not None and kind not in kinds:
@@ -78,7 +77,6 @@ def entries(kind: str | None = None) -> list[dict[str, Any]]:
 
 
 def entry(name: str) -> dict[str, Any]:
-    """Return the apparatus entry `name`."""
     by_name = {each["id"]: each for each in entries()}
     if name not in by_name:
         raise unknown("entry", name, list(by_name))
@@ -86,7 +84,6 @@ def entry(name: str) -> dict[str, Any]:
 
 
 def effect(scene: Scene, listing: Listing, truth: Reference, effort: float = 1.0) -> Effect:
-    """Return the outcome of running `listing` on `scene`, with errors against `truth`."""
     run = run_program(scene, listing, effort=effort)
     return Effect(listing, *_errors(scene, run, truth), run.steps, run.ended, run.stop)
 
@@ -98,7 +95,6 @@ def _errors(scene: Scene, run: Trajectory, truth: Reference) -> tuple[float, flo
 
 @cache
 def case_truth(case: int) -> Reference:
-    """Return the reference solution of a case at its steps, with velocity."""
     scene = case_scene(case)
     return reference(scene, scene.times(), velocity=True)
 
@@ -151,7 +147,7 @@ def _size(found: Effect) -> list[float]:
 
 
 def apparatus_report(entries: Sequence[dict[str, Any]], are_all_shown: bool = True) -> Report:
-    """Return the report of apparatus entries, a line for each.
+    """Return a report with a line for each apparatus entry.
 
     Unless `are_all_shown`, its text has only the defects that change numbers.
     """
@@ -181,7 +177,6 @@ def apparatus_report(entries: Sequence[dict[str, Any]], are_all_shown: bool = Tr
 def entry_report(
     entry: dict[str, Any], effects: Sequence[CaseEffects], names: Sequence[str] = FIELDS
 ) -> Report:
-    """Return the report of an apparatus entry: its fields `names` and a table of `effects`."""
     cards = "; ".join(f"{program} {cards}" for program, cards in entry["cards"].items())
     what = {each["siglum"]: each["what"] for each in facts("cards/scan")["ground"]}
     grounds = "; ".join(f"{siglum}, {what[siglum]}" for siglum in entry["grounds"])
@@ -230,7 +225,6 @@ def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
 
 
 def lattice_report(scene: Scene, found: Mapping[str, Sequence[Effect]]) -> Report:
-    """Return the report of the effects of every subset of each program's defects."""
     text: list[Section] = []
     rows = []
     for program, effects in found.items():

@@ -167,7 +167,6 @@ def _named(name: str, texts: Iterable[str]) -> list[str]:
 
 
 def collation_report(found: Sequence[Row]) -> Report:
-    """Return the report on whether the decks and the thesis agree on each operation."""
     told = faults([*found])
     rows, full = [], []
     for row in found:
@@ -192,7 +191,6 @@ def collation_report(found: Sequence[Row]) -> Report:
 
 
 def origins_report(found: Sequence[Disagreement], mistakes: Sequence[str]) -> Report:
-    """Return the report of disagreements, and of `mistakes` in their table."""
     rows, full = [], []
     for each in found:
         having = "".join(_SHORT[program] for program in each.cards) or "-"

@@ -66,7 +66,6 @@ class Member:
     corrections: int = 1
 
     def __post_init__(self) -> None:
-        """Check the fields; set the default points."""
         if self.weighting not in WEIGHTINGS:
             raise unknown("weighting", self.weighting, WEIGHTINGS)
         if not 1 <= self.terms <= MOST_TERMS:
@@ -102,7 +101,6 @@ class Member:
 
     @property
     def points_label(self) -> str:
-        """Return the collocation points as text; a dash for other weightings."""
         if self.points is None:
             return "-"
         if isinstance(self.points, str):
@@ -246,7 +244,6 @@ class OrderFinding:
 
     @property
     def deviation(self) -> float:
-        """Return the measured minus the predicted order, or NaN."""
         return math.nan if self.measured is None else self.measured - self.predicted
 
     @property
@@ -256,7 +253,6 @@ class OrderFinding:
 
 
 def family_members() -> list[Member]:
-    """Return each weighting of `SCHEMES` with 1 to 5 terms and 1 to 8 corrections."""
     return [Member(w, n, p, k) for w, p in SCHEMES for n in range(1, 6) for k in range(1, 9)]
 
 
@@ -338,7 +334,6 @@ def _slopes(errors: Array) -> list[float]:
 
 
 def family_report(scene: Scene, found: Sequence[OrderFinding]) -> Report:
-    """Return the report of orders and errors, by numbers of terms and corrections."""
     names = ("predicted", "measured", "settled", "error")
     members = [each.member for each in found]
     measures = [{name: getattr(each, name) for name in names} for each in found]

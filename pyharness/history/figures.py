@@ -71,25 +71,20 @@ class FigurePlan:
 
     @property
     def files(self) -> list[str]:
-        """Return the names of the figure's files."""
         return [f"{self.stem}.{ending}" for ending in ENDINGS]
 
     @property
     def title(self) -> str:
-        """Return the figure's number, as in `Figure 10, part A`."""
         return f"Figure {self.number}" + (f", part {self.part}" if self.part else "")
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """The run of a program version, drawn as a curve."""
-
     listing: Listing
     trajectory: Trajectory
 
     @property
     def ending(self) -> str:
-        """Return step and reason of an early end; "" for a complete run."""
         run = self.trajectory
         if run.stop is not None:
             return f"stopped at step {run.stop.step} by {run.stop.variable}"
@@ -97,14 +92,11 @@ class Curve:
 
     @property
     def label(self) -> str:
-        """Return the program's name and any early end, for the legend."""
         return self.listing.program + (f" ({self.ending})" if self.ending else "")
 
 
 @dataclass(frozen=True, eq=False)
 class FigureFinding:
-    """A figure's plan, scene, reference solution and curves."""
-
     plan: FigurePlan
     scene: Scene
     reference: Reference
@@ -118,7 +110,6 @@ class FigureFinding:
 
 
 def plans() -> list[FigurePlan]:
-    """Return the plans of all figures, original programs first."""
     found = []
     for each, entry in product(SETS, facts("figures")["figure"]):
         number, part, programs = entry["number"], entry.get("part", ""), tuple(entry[each])
@@ -129,7 +120,6 @@ def plans() -> list[FigurePlan]:
 
 
 def findings() -> Iterator[FigureFinding]:
-    """Yield the data of each figure, in the order of `plans`."""
     for plan in plans():
         scene = case_scene(plan.case)
         truth = case_truth(plan.case)
@@ -143,7 +133,6 @@ def findings() -> Iterator[FigureFinding]:
 
 
 def figures_report(findings: Sequence[FigureFinding]) -> Report:
-    """Return the report on the drawn files."""
     rows = []
     for each in findings:
         curves = ", ".join(curve.label for curve in each.curves)

@@ -24,7 +24,6 @@ They are the cards of each program with the scan's variants, and the apparatus.
 
 
 def content_identifier(content: bytes) -> str:
-    """Return the SWHID of a file, ``swh:1:cnt:...``."""
     return f"swh:1:cnt:{_hash('blob', content).hex()}"
 
 
@@ -48,7 +47,6 @@ def source_files() -> dict[str, bytes]:
 
 
 def data_identifier() -> str:
-    """Return the SWHID of the folder `DATA`."""
     found, within = source_files(), f"{DATA}/"
     names = [name for name in found if name.startswith(within)]
     return directory_identifier({name.removeprefix(within): found[name] for name in names})
@@ -62,7 +60,7 @@ def card_identifier(card: Card) -> str:
 
 @cache
 def card_lines(content: bytes) -> dict[int, int]:
-    """Return each card's line, from 1, in the file of a deck, by card number."""
+    """Return by card number each card's line, from 1, in the file of a deck."""
     lines = enumerate(content.decode().splitlines(), 1)
     keys = ((line.partition(" = ")[0], number) for number, line in lines)
     return {int(key): number for key, number in keys if key.isdigit()}

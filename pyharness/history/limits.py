@@ -75,7 +75,6 @@ class Limit:
 
     @property
     def approach(self) -> str:
-        """Return a phrase on the convergence, such as `order 1.00 toward the limit`."""
         if self.blow_up is not None:
             return f"no order: the limit grows without bound at t = {self.blow_up:.3g} s"
         if self.order is not None:
@@ -207,7 +206,7 @@ def _solved(
 
 
 def invisible(scene: Scene) -> dict[str, tuple[str, ...]]:
-    """Return, by program, defects whose correction alone changes omega only by rounding."""
+    """Return by program the defects whose correction alone changes omega only by rounding."""
     found = {}
     for program in PROGRAMS:
         before = run_program(scene, Listing.original(program))
@@ -225,7 +224,6 @@ def invisible(scene: Scene) -> dict[str, tuple[str, ...]]:
 def limits_report(
     scene: Scene, found: Sequence[Limit], invisible: Mapping[str, Sequence[str]]
 ) -> Report:
-    """Return the report of limits and, by program, of `invisible` defects."""
     ends = [[x.program, x.order, x.halvings[-1].from_truth, x.tends_to] for x in found]
     hidden = [f"{each.program}: {', '.join(invisible[each.program]) or 'none'}" for each in found]
     listings = [Listing.original(each.program) for each in found]

@@ -69,7 +69,6 @@ def fits(
 
 
 def listings_of(program: str) -> dict[str, Listing]:
-    """Return a program's listings: original, corrected, original with each alternative reading."""
     readings = names_of("reading", program)
     return {
         "original": Listing.original(program),
@@ -80,7 +79,6 @@ def listings_of(program: str) -> dict[str, Listing]:
 
 @cache
 def our_page(listing: Listing, case: int, steps: int, word: str) -> str:
-    """Return the page that a program version prints in a case, in arithmetic `word`."""
     scene = replace(case_scene(case), steps=steps)
     return page(scene, listing.program, run_program(scene, listing, "python", word=word))
 
@@ -90,7 +88,6 @@ def _lines(listing: Listing, case: int, steps: int, word: str = BINARY64) -> lis
 
 
 def listing_output_report(path: str, found: Sequence[Fit]) -> Report:
-    """Return the report on program, listing and arithmetic of the page in file `path`."""
     best = found[0]
     rows = [[x.program, x.case, x.listing, x.word, x.fields, len(x.differences)] for x in found]
     text: list[Section] = [printed_page.verdict(path, found), [Table(_TABLE, rows)]]

@@ -49,8 +49,6 @@ class Attempt:
 
 @dataclass(frozen=True)
 class Ranked:
-    """A mistake, with the results of all methods."""
-
     mistake: str
     summary: str
     attempts: tuple[Attempt, ...]
@@ -67,7 +65,6 @@ class Ranked:
 
 
 def ranked(word: str = BINARY64) -> list[Ranked]:
-    """Return the mistakes with all results, most failures in both cases first."""
     limit = facts("lost")["limit"]
     found = []
     for entry in facts("lost")["mistake"]:
@@ -192,7 +189,6 @@ _TABLE = (
 
 
 def lost_report(found: Sequence[Ranked], word: str = BINARY64) -> Report:
-    """Return the report on the mistakes, computed in arithmetic `word`."""
     rows = []
     for each in found:
         shares = [share for attempt in each.attempts for share in attempt.shares.values()]

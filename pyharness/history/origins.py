@@ -38,7 +38,6 @@ class Disagreement(NamedTuple):
 
 
 def disagreements() -> list[Disagreement]:
-    """Return all disagreements in the table's order."""
     found = []
     for given in facts("disagreements")["disagreement"]:
         cards = {

@@ -50,12 +50,10 @@ class Fit:
 
     @property
     def is_whole(self) -> bool:
-        """Return whether all numbers of the pages are equal."""
         return not self.differences
 
     @property
     def name(self) -> str:
-        """Return the name of our page, as in `two-term, case 2, original, in binary64`."""
         return f"{self.program}, case {self.case}, {self.listing}, in {self.word}"
 
 

@@ -68,7 +68,6 @@ def _probability(size: int, first: int, second: int, begin: int, end: int) -> fl
 
 
 def read_cards() -> Iterator[ReadCard]:
-    """Yield each card of the second reading with its texts."""
     given = facts("cards/second-reading")
     for program in PROGRAMS:
         for number, text in given[program].items():
@@ -80,7 +79,7 @@ def read_cards() -> Iterator[ReadCard]:
 
 
 def misread_places(scan: str, reading: str) -> dict[int, str]:
-    """Return, by index in `scan`, the text of `reading` where the two differ.
+    """Return by index in `scan` the text of `reading` where the two differ.
 
     Inserted characters belong to the previous index, or to -1.
     """
@@ -115,12 +114,10 @@ def recaptures() -> Table:
 
 
 def disagreeing() -> list[ReadCard]:
-    """Return the cards on which the readings differ."""
     return [each for each in read_cards() if each.first != each.second]
 
 
 def second_reading_report() -> Report:
-    """Return the report on the two readings and the estimated misreadings."""
     table, cards, differing = recaptures(), [*read_cards()], disagreeing()
     frame = len(witness_lines())
     seed = facts("cards/second-reading")["seed"]

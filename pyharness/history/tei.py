@@ -55,7 +55,6 @@ CERTAINTY = {"certain": "high", "probable": "medium", "conjecture": "low", "unde
 
 
 def tei_document() -> bytes:
-    """Return the TEI document, in UTF-8."""
     root = xml.Element("TEI", xmlns="http://www.tei-c.org/ns/1.0")
     root.set(_XML + "lang", "en")
     root.append(_header())

@@ -41,7 +41,6 @@ class Event(NamedTuple):
 
 
 def timeline() -> tuple[Event, ...]:
-    """Return the events in the order of the data."""
     names = {"from": "first", "to": "last"}
     found = []
     for row in facts("timeline")["entry"]:

@@ -85,7 +85,6 @@ class WordCell:
     runs: tuple[WordRun, ...]
 
     def find_run(self, p: int, rule: str) -> WordRun | None:
-        """Return the run with p bits and `rule`, or None."""
         return next((run for run in self.runs if (run.p, run.rule) == (p, rule)), None)
 
     def settled(self, rule: str, same: Sequence[WordRun]) -> int | None:
@@ -100,7 +99,6 @@ def cells(
     lengths: Sequence[int] = LENGTHS,
     progress: Progress = no_progress,
 ) -> Iterator[WordCell]:
-    """Yield the runs of each program, original and corrected, on each case."""
     kinds = (Listing.original, Listing.corrected)
     listings = [kind(program) for program in programs for kind in kinds]
     words = [WIDEST, *(Word(p, rule) for rule in RULES for p in lengths)]

@@ -65,7 +65,6 @@ class Atlas:
         return sum_of_points([codes[reading, steps] for codes in self.codes.values()])
 
     def none_fails(self, reading: int = 0, steps: int = 0) -> NDArray[np.bool_]:
-        """Return, for each initial omega, whether no claim fails; arguments are as in `score`."""
         held = [codes[reading, steps] != FAILS for codes in self.codes.values()]
         return np.asarray(np.all(held, axis=0))
 
@@ -99,12 +98,10 @@ def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Any], first: Batch) 
 
 
 def sum_of_points(codes: Sequence[Codes]) -> Array:
-    """Return the sum of the claims' points for each initial omega."""
     return np.asarray(sum(_POINTS[each] for each in codes))
 
 
 def shares(codes: Codes) -> tuple[float, float, float]:
-    """Return the fractions of the codes HOLDS, IN_PART and FAILS."""
     whole, part, not_at_all = (float((codes == each).mean()) for each in (HOLDS, IN_PART, FAILS))
     return whole, part, not_at_all
 
@@ -117,7 +114,7 @@ def bits(codes: Codes) -> float:
 
 
 def about(names: Sequence[str]) -> dict[int, list[str]]:
-    """Return, by case, the claims in `names` that concern this case alone."""
+    """Return by case the claims in `names` that concern this case alone."""
     found: dict[int, list[str]] = {}
     for name in names:
         case = claim(name)["parameters"].get("case")
@@ -127,7 +124,7 @@ def about(names: Sequence[str]) -> dict[int, list[str]]:
 
 
 def shown_starts(names: Sequence[str], first: Batch) -> dict[Triple, dict[str, int]]:
-    """Return, for each of `starts`, the verdict codes by claim, with the programs of `first`."""
+    """Return for each of `starts` the verdict codes by claim, with the programs of `first`."""
     given = starts()
     batch = replace(first, arrays={"omega": np.array(given)})
     found = {name: FUNCTIONS[name](batch) for name in names}
@@ -135,7 +132,6 @@ def shown_starts(names: Sequence[str], first: Batch) -> dict[Triple, dict[str, i
 
 
 def atlas_report(atlas: Atlas) -> Report:
-    """Return the report of `claims --atlas`, mainly for the first reading."""
     claims = _claims(atlas)
     score = atlas.score()
     first = f"reading {atlas.readings[0]}, {atlas.steps[0]} steps"
@@ -248,7 +244,7 @@ def _by_choice(atlas: Atlas) -> Table:
 
 
 def _percentage_turned(atlas: Atlas) -> Table:
-    """Return, by claim, the percentage of verdicts that readings or steps change."""
+    """Return by claim the percentage of verdicts that readings or steps change."""
     places = [(k, 0) for k in range(1, len(atlas.readings))]
     places += [(0, m) for m in range(1, len(atlas.steps))]
     rows = []

@@ -50,14 +50,11 @@ _RULE = (
 
 @dataclass(frozen=True)
 class Combination:
-    """A combination of choices, with verdicts on the testable claims."""
-
     assumptions: Assumptions
     verdicts: dict[str, str]
 
     @property
     def score(self) -> float:
-        """Return the sum of the verdicts' points, 1 if reproduced, 1/2 if in part."""
         return sum(POINTS.get(each, 0.0) for each in self.verdicts.values())
 
     @property
@@ -66,7 +63,6 @@ class Combination:
         return sum(each in POINTS for each in self.verdicts.values())
 
     def choices(self) -> dict[str, str]:
-        """Return the value of each choice as text, by name."""
         given = self.assumptions
         active = given.readings | (given.conjectures or frozenset())
         found = {"omega(0)": ",".join(f"{x:g}" for x in given.start or ()) or "adopted"}
@@ -76,12 +72,10 @@ class Combination:
         return found | {"steps": str(given.steps)}
 
     def verdict_on(self, name: str) -> str:
-        """Return the verdict on the claim `name`, by default "not testable"."""
         return self.verdicts.get(name, NOT_TESTABLE)
 
 
 def evidence() -> Iterator[Combination]:
-    """Yield every combination with its verdicts on the testable claims."""
     scored = {entry["id"]: entry for entry in claims() if entry["kind"] in KINDS}
     for chosen in combinations():
         found = {name: _verdict(name, _relevant(entry, chosen)) for name, entry in scored.items()}
@@ -100,13 +94,12 @@ def combinations() -> list[Assumptions]:
 
 
 def discriminating(found: list[Combination]) -> list[str]:
-    """Return the claims whose verdict differs between combinations."""
     every = dict.fromkeys(name for each in found for name in each.verdicts)
     return [name for name in every if len({each.verdict_on(name) for each in found}) > 1]
 
 
 def undecided(found: list[Combination]) -> dict[str, list[str]]:
-    """Return, by choice, the values that occur with the highest score."""
+    """Return by choice the values that occur with the highest score."""
     best = max(each.score for each in found)
     choices = [each.choices() for each in found if each.score == best]
     return {axis: sorted({each[axis] for each in choices}) for axis in choices[0]}
@@ -129,7 +122,6 @@ def _verdict(identity: str, assumptions: Assumptions) -> str:
 
 
 def evidence_report(found: Sequence[Combination]) -> Report:
-    """Return the report of the combinations, highest score first."""
     ordered = sorted(found, key=lambda each: -each.score)
     axes = list(ordered[0].choices())
     columns = [

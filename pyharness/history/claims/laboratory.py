@@ -54,7 +54,6 @@ class Laboratory:
     fixed: frozenset[str] = frozenset()
 
     def listing(self, program: str) -> Listing:
-        """Return the listing of a program; the assumptions affect only an original listing."""
         if not self.is_original:
             return Listing.corrected(program)
         readings = self.assumptions.readings & set(names_of("reading", program))
@@ -63,7 +62,6 @@ class Laboratory:
         return subset(program, "original", fixed, readings=readings, conjectures=assumed)
 
     def scene(self, case: int, parts: int = 1) -> Scene:
-        """Return the scene of a case under these assumptions, each step divided into `parts`."""
         scene, given = case_scene(case), self.assumptions
         is_open = case in open_starts()
         start = scene.omega if given.start is None or not is_open else given.start
@@ -71,7 +69,6 @@ class Laboratory:
         return replace(scene, omega=start, step_size=h, steps=steps)
 
     def run(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Trajectory:
-        """Return the run of a program on a case."""
         return self.run_on(self.scene(case, parts), self.listing(program), may_stop)
 
     def run_on(
@@ -81,11 +78,9 @@ class Laboratory:
         return _run(listing, scene, may_stop, lipschitz, self.assumptions.word)
 
     def truth(self, case: int) -> Reference:
-        """Return the reference solution of a case at its steps."""
         return _truth(self.scene(case))
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
-        """Return a program's run on a case, at the undivided steps."""
         run = self.run(program, case, may_stop, parts)
         reached = run.omega[parts - 1 :: parts]
         omega = np.full((self.assumptions.steps, 3), np.nan)
@@ -127,7 +122,6 @@ def starts() -> list[Triple]:
 
 
 def start_text(start: Triple) -> str:
-    """Return an initial omega (rad/s) as text, as in ``0, 1, 10``."""
     return ", ".join(f"{x:g}" for x in start)
 
 

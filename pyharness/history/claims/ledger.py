@@ -58,12 +58,10 @@ class Assignment:
 
 
 def claims() -> list[dict[str, Any]]:
-    """Return all claims in `data/claims.toml`."""
     return list(facts("claims")["claim"])
 
 
 def claim(identity: str) -> dict[str, Any]:
-    """Return the claim `identity`."""
     by_name = {each["id"]: each for each in claims()}
     if identity not in by_name:
         raise unknown("claim", identity, list(by_name))
@@ -72,7 +70,6 @@ def claim(identity: str) -> dict[str, Any]:
 
 @cache
 def judgement(identity: str, word: str = BINARY64) -> Judgement:
-    """Return the verdicts on a claim, in the floating-point arithmetic `word`."""
     entry = claim(identity)
 
     def outcomes(entry: dict[str, Any], assumptions: Assumptions) -> list[Judged]:
@@ -93,7 +90,6 @@ def judgement(identity: str, word: str = BINARY64) -> Judgement:
 
 
 def judgements() -> list[Judgement]:
-    """Return the judgements of all claims."""
     return [judgement(entry["id"]) for entry in claims()]
 
 
@@ -177,7 +173,6 @@ KINDS = {
 
 
 def claims_report(judgements: Sequence[Judgement]) -> Report:
-    """Return the report of our verdicts, a line for each claim."""
     rows = []
     for each in judgements:
         place = [each.claim[name] for name in ("id", "kind", "where")]
@@ -198,7 +193,6 @@ def claims_report(judgements: Sequence[Judgement]) -> Report:
 
 
 def kinds_table(judgements: Sequence[Judgement]) -> Table:
-    """Return the numbers of claims by kind and verdict, as "original / corrected"."""
     columns = [*words("kind"), Column("claims"), *map(Column, _VERDICTS)]
     rows = []
     for kind in KINDS:
@@ -212,7 +206,6 @@ def kinds_table(judgements: Sequence[Judgement]) -> Table:
 
 
 def explanation(judgement: Judgement) -> Report:
-    """Return the report of one claim: quotation, rule, verdicts and numbers."""
     entry = judgement.claim
     labels = {"kind": "kind", "statement": "says", "rule": "rule", "source": "by"}
     fields = [Field(f"{x:6s}", entry[name]) for name, x in labels.items() if name in entry]
@@ -232,7 +225,6 @@ def explanation(judgement: Judgement) -> Report:
 
 
 def assignments_report(assignments: Sequence[Assignment]) -> Report:
-    """Return the report on the initial omegas with which the claims about each case hold."""
     head = (
         "omega(0) of Cases 1, 3, 4, 6 and 7 is not given. With each start that the thesis shows, "
         "and (1, 1, 1), which is ours, the claims about that case alone, for the original "

@@ -31,14 +31,13 @@ _EFFORT = 1e9  # so large that there is no limit; a sweep reports its expected t
 
 
 class Starts:
-    """Runs for `rules` from n initial omegas.
+    """Runs for `rules` from n initial omegas `omega0` (rad/s), shape (n, 3).
 
     The reference solution is a Taylor series of relative tolerance 1e-12. Arrays have the shape (n,
     steps, 3), or (steps, 3) in cases for which the thesis gives omega(0).
     """
 
     def __init__(self, one: Laboratory, omega0: Array) -> None:
-        """Store the laboratory and the initial omegas (rad/s), shape (n, 3)."""
         self._one, self._omega0 = one, omega0
         # As in `Laboratory`.
         self.scene = one.scene
@@ -48,7 +47,6 @@ class Starts:
         self._kept = cache(self._run)
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
-        """Return the runs of a program on a case from every initial omega."""
         # Only undivided runs are cached: the others are needed once, for their error.
         return (self._kept if parts == 1 else self._run)(program, case, may_stop, parts)
 

@@ -95,7 +95,6 @@ def fails(bench: Bench, case: int, share: float) -> Grade:
 
 
 def diverged(bench: Bench, case: int) -> Grade:
-    """Test whether the run of the two-term collocation program diverged in a case."""
     runs, error = bench.runs("two-term", case), bench.error("two-term", case)
     numbers = {"steps": runs.steps, "largest error (rad/s)": error}
     return Grade(numbers, runs.overflow | (error > largest_of(bench.solution(case))))

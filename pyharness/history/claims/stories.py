@@ -56,7 +56,6 @@ def prose(x: float, digits: int = 3) -> str:
 
 
 def power_of_ten(exponent: int) -> str:
-    """Return a power of ten as text with a superscript exponent."""
     return f"10{str(exponent).translate(_SUPERSCRIPTS)}"
 
 

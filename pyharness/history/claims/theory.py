@@ -307,7 +307,6 @@ def points_inside(lab: Laboratory, cases: list[int]) -> Judged:
 
 
 def possible_bodies(lab: Laboratory, cases: list[int]) -> Judged:
-    """Judge whether every case is a possible rigid body."""
     excess = {}
     for case in cases:
         first, second, third = sorted(lab.scene(case).moments or (), reverse=True)

@@ -37,24 +37,20 @@ class Judged:
 def graded(
     numbers: dict[str, float], whole: bool, part: bool = False, otherwise: str = NOT_REPRODUCED
 ) -> Judged:
-    """Return "reproduced" if `whole`, "reproduced in part" if `part`, else `otherwise`."""
     return Judged(REPRODUCED if whole else IN_PART if part else otherwise, numbers)
 
 
 def judged(grade: rules.Grade, otherwise: str = NOT_REPRODUCED) -> Judged:
-    """Return the verdict for a grade from one initial omega."""
     numbers = {name: float(each) for name, each in grade.numbers.items()}
     return graded(numbers, bool(grade.whole), bool(grade.part), otherwise)
 
 
 def constant_solution(lab: Laboratory, case: int) -> Judged:
-    """Judge whether the solution of a case is constant, within 1e-12 rad/s."""
     moved = float(rules.spread_of(lab.truth(case).omega).max())
     return graded({"change over the run (rad/s)": moved}, moved <= 1e-12, otherwise=FALSE)
 
 
 def known_solution(lab: Laboratory, case: int) -> Judged:
-    """Judge whether the solution of a case is (sin 5t, cos 5t, 10) rad/s, as printed."""
     truth = lab.truth(case)
     t = truth.time
     printed = np.column_stack([np.sin(5 * t), np.cos(5 * t), np.full_like(t, 10.0)])
@@ -65,7 +61,6 @@ def known_solution(lab: Laboratory, case: int) -> Judged:
 
 
 def omega3_varies(lab: Laboratory, case: int, limit: float) -> Judged:
-    """Judge whether omega3 varies in a case by more than `limit` (rad/s)."""
     return judged(rules.omega3_varies(lab, case, limit), FALSE)
 
 
@@ -93,7 +88,6 @@ def coincident(lab: Laboratory, case: int, share: float) -> Judged:
 
 
 def error_size(lab: Laboratory, case: int, low: float, high: float) -> Judged:
-    """Judge whether collocation errors are from `low` to `high` times the amplitude."""
     amplitude = _amplitude(lab, case)
     numbers = {
         f"{program}: largest error over the amplitude": lab.error(program, case) / amplitude
@@ -113,7 +107,6 @@ def _amplitude(lab: Laboratory, case: int) -> float:
 
 
 def error_constant(lab: Laboratory, case: int) -> Judged:
-    """Judge whether the error of collocation does not grow during the run."""
     truth = lab.truth(case).omega
     numbers = {}
     for program in COLLOCATION:
@@ -174,7 +167,6 @@ def differ(lab: Laboratory, case: int, share: float) -> Judged:
 
 
 def more_reliable(lab: Laboratory, case: int) -> Judged:
-    """Judge whether the four-term program is more accurate than the two-term program."""
     ratio = lab.error("four-term", case) / lab.error("two-term", case)
     return graded({"four-term error over two-term error": ratio}, ratio <= 0.5, ratio <= 0.8)
 

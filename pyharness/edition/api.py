@@ -38,7 +38,6 @@ class Entry(NamedTuple):
 
 
 def entries() -> list[Entry]:
-    """Return an entry for each public name."""
     return [_entry(name, getattr(pyharness, name)) for name in pyharness.__all__]
 
 

@@ -79,7 +79,6 @@ def moments_of_box(edges: list[float], mass: float) -> list[float]:
 
 
 def files() -> dict[str, bytes]:
-    """Return the picture and its numbers, by file name."""
     return saved(_picture(_first()), "body.svg")
 
 

@@ -36,7 +36,6 @@ def codemeta() -> dict[str, Any]:
 
 
 def release_date() -> str:
-    """Return the date of publication or, before it, the year of the copyright."""
     described = codemeta()
     return str(described.get("datePublished", described["copyrightYear"]))
 
@@ -110,7 +109,6 @@ def _title(place: str) -> str:
 
 
 def thesis_record() -> dict[str, Any]:
-    """Return the thesis's record in terms of schema.org."""
     return {**codemeta()["referencePublication"], "@type": "Report"}
 
 
@@ -129,12 +127,10 @@ def linked_data() -> dict[str, Any]:
 
 
 def data_name() -> str:
-    """Return the data's name for catalogues."""
     return f"{facts('account')['edition']['name']}: data"
 
 
 def data_description() -> str:
-    """Return the data's description for catalogues."""
     thesis = codemeta()["referencePublication"]
     return (
         f"The cards of the three FORTRAN programs in the thesis {thesis['name']} "
@@ -187,7 +183,6 @@ _DATA = "Software Heritage identifier of the edition's data"
 
 
 def crate_record(parts: Sequence[Part]) -> dict[str, Any]:
-    """Return the RO-Crate record of `parts` and `KEPT`."""
     software, thesis = codemeta(), thesis_record()
     files = [_file(each) for each in (*parts, *KEPT) if each.path != CRATE]
     people = [{"@id": f"#author-{n}", **each} for n, each in enumerate(software["author"], 1)]

@@ -143,7 +143,6 @@ _ROWS = "program listing step time omega1 omega2 omega3 velocity1 velocity2 velo
 
 
 def run_parts() -> Iterator[Part]:
-    """Yield the files on the runs: cases, ends and results."""
     yield described("cases", (facts_folder() / "cases.toml").read_bytes())
     yield described("ends", csv_text(numbers(_ENDS, [*_ends()])).encode())
     for case in case_numbers():
@@ -227,7 +226,6 @@ def machine_parts() -> Iterator[Part]:
 
 
 def outcomes_table() -> str:
-    """Return a Markdown table of the outcomes of a run on the machine, with conclusions."""
     rows = [[each["seen"], each["learned"], each["open"]] for each in facts("machine")["outcome"]]
     return table("outcome | what would be learned | what remains open", rows).rstrip()
 

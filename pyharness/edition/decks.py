@@ -54,7 +54,6 @@ class Note(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """The kind of note, such as ``defect``."""
         return str(self.entry["kind"])
 
 
@@ -149,7 +148,6 @@ def _change(one: float, other: float) -> float:
 
 
 def card_views(program: str) -> list[CardView]:
-    """Return the views of a program's cards."""
     found, every = deck(program), notes(program)
     corrected, changed = corrected_cards(program), corrections(program)
     phantoms = _phantoms(program)

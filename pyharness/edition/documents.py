@@ -68,7 +68,6 @@ def documents(folder: Path) -> Iterator[tuple[str, Document]]:
 
 
 def page_of(name: str) -> str:
-    """Return a document's path in the site."""
     return f"docs/{name.removesuffix('.md')}.html"
 
 
@@ -83,13 +82,11 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 def with_notebooks(folder: Path) -> list[Path]:
-    """Return the documents that become notebooks too."""
     files = [path for name in _NOTEBOOKS for path in sorted((folder / name).glob("*.md"))]
     return [path for path in files if "```python\n" in path.read_text(encoding="utf-8")]
 
 
 def notebooks(folder: Path) -> dict[str, bytes]:
-    """Return the notebooks, with outputs and pictures, by path in the site."""
     found = {}
     for path in with_notebooks(folder):
         beside = [file for file in path.parent.iterdir() if file.suffix in _PICTURES]

@@ -51,7 +51,6 @@ def context() -> dict[str, Any]:
 
 
 def data() -> dict[str, Any]:
-    """Return the data with which the page's script runs the programs."""
     cases = {number: case_scene(number) for number in case_numbers()}
     return {
         "scenes": list(map(requested_scene, cases.values())),

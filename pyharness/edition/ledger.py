@@ -28,8 +28,6 @@ from pyharness.views.pictures import saved
 
 
 class SentenceVerdicts(NamedTuple):
-    """A sentence of the thesis, and the judgements of its claims."""
-
     sentence: Sentence
     judged: list[Judgement]
     anchor: str
@@ -52,14 +50,13 @@ class Formula(NamedTuple):
 
     @property
     def title(self) -> str:
-        """The title, as in ``Equation 34a, III.1``."""
         if not self.number:
             return f"Without a number, {self.where}"
         return f"Equation{'s' if '-' in self.number else ''} {self.number}, {self.where}"
 
 
 def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
-    """Return, by verdict, the counts of claims on results, for original and corrected programs."""
+    """Return by verdict the counts of claims on results, for original and corrected programs."""
     results = [each for each in judged if each.claim["kind"] == "result"]
     pairs = [(each.original.verdict, each.corrected.verdict) for each in results]
     original, corrected = map(Counter, zip(*pairs, strict=True))
@@ -121,7 +118,6 @@ def claims_context(judged: Sequence[Judgement], told: Sequence[SentenceVerdicts]
 
 
 def thesis(judged: Sequence[Judgement]) -> list[SentenceVerdicts]:
-    """Return the thesis's sentences with verdicts, in order."""
     by_name = {each.claim["id"]: each for each in judged}
     return [
         SentenceVerdicts(each, [by_name[name] for name in each.claims], f"sentence-{number}")
@@ -154,7 +150,6 @@ def thesis_context(told: Sequence[SentenceVerdicts]) -> dict[str, Any]:
 
 
 def formulas() -> dict[str, list[Formula]]:
-    """Return the displayed formulas of sections II to IV, by section."""
     found: dict[str, list[Formula]] = {}
     for row in facts("formulas")["formula"]:
         lines = [inline(f"${tex}$") for tex in row["tex"].strip().split("\n")]

@@ -57,7 +57,6 @@ def document(text: str, link: Callable[[str], str | None]) -> Document:
 
 
 def inline(text: str) -> Markup:
-    """Return one line of Markdown as HTML."""
     return Markup(_parser().renderInline(text))
 
 

@@ -48,14 +48,11 @@ class AlignedRow(NamedTuple):
 
 
 class Operation(NamedTuple):
-    """An operation of the programs: its row of the collation, and aligned cards."""
-
     row: collation.Row
     aligned: list[AlignedRow]
 
 
 def operations() -> list[Operation]:
-    """Return the operations that have cards, without comment cards."""
     return [Operation(row, _aligned(row.cards)) for row in collation.rows() if row.cards]
 
 

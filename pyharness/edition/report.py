@@ -24,7 +24,6 @@ _KINDS = (*words("files"), Column("number"), Column("kB", digits(".0f", 1e-3)))
 
 
 def check_libraries() -> None:
-    """Raise InputError if a library is missing, with the command to install it."""
     for name in LIBRARIES:
         check_package(name, "edition", install_command("edition"))
 
@@ -35,13 +34,11 @@ def listed(content: Mapping[str, bytes]) -> dict[str, Any]:
 
 
 def edition_report(folder: str, content: Mapping[str, bytes]) -> Report:
-    """Return the report on the site's files, with number and size (kB) by suffix."""
     text: list[Section] = [[_sizes(content)], [f"Open {folder}/index.html in a browser."]]
     return Report("edition", text, lambda: {"folder": folder, **listed(content)})
 
 
 def package_report(folder: str, content: Mapping[str, bytes]) -> Report:
-    """Return the report on the package's files and identifiers."""
     package, data, digest = directory_identifier(content), data_identifier(), text_digest()
     names = (("Identifier of the package:", package), ("Identifier of its sources:", data))
     named = [Line(f"{name:28s}{each}") for name, each in (*names, ("Digest of the text:", digest))]

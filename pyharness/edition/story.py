@@ -65,7 +65,6 @@ class Chart(NamedTuple):
 
 
 def data() -> dict[str, Any]:
-    """Return the values with which the script runs the programs."""
     cases = sorted({*BLIND_CASES, *RACE_CASES})
     scenes = {number: requested_scene(case_scene(number)) for number in cases}
     original = {name: list(switches(name)) for name in PROGRAMS}
@@ -76,7 +75,6 @@ def data() -> dict[str, Any]:
 
 @cache
 def context() -> dict[str, Any]:
-    """Return the story's charts and numbers, from original and corrected runs."""
     stopped = _run(2, "runge-kutta")
     assert stopped.velocity is not None
     velocity = [0.0, *stopped.velocity[:, 1].tolist()]

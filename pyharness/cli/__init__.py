@@ -61,7 +61,6 @@ def progress(done: int, total: int, what: str) -> None:
 
 
 def end_progress() -> None:
-    """Remove the progress bar, if any."""
     global _bar
     if _bar is not None:
         bar, _bar = _bar, None

@@ -28,7 +28,6 @@ def fields(whole: dict[str, Any], part: dict[str, Any], path: str) -> Iterator[t
 
 
 def json_help(verb: str) -> str:
-    """Return the fields of a verb's JSON output as text."""
     whole = schema()
     lines = [f"fields of pyharness {verb} --format json:", ""]
     for path, meaning in fields(whole, whole["$defs"][f"verb-{verb}"], ""):

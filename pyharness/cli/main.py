@@ -119,7 +119,7 @@ def _run(arguments: list[str]) -> int:
 
 
 def _complete() -> int:
-    """Print completions; return 1 without argcomplete."""
+    """Print completions for the shell; return 1 without argcomplete."""
     from argparse import ArgumentParser
 
     try:

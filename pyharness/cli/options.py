@@ -110,29 +110,24 @@ def outputs(formats: Sequence[str] = FORMATS, plot: str = "the results") -> dict
 
 
 def chosen_effort(options: argparse.Namespace) -> float:
-    """Return --effort, the factor on work limits; 1 by default."""
     return positive(options.effort, "--effort", 1.0)
 
 
 def chosen_case(options: argparse.Namespace) -> int | None:
-    """Return the case of --case, or None."""
     check_known("case", options.case, [str(each) for each in case_numbers()])
     return None if options.case is None else int(options.case)
 
 
 def chosen_cases(options: argparse.Namespace) -> list[int]:
-    """Return the case of --case, by default all."""
     case = chosen_case(options)
     return list(case_numbers()) if case is None else [case]
 
 
 def chosen_tolerance(options: argparse.Namespace) -> float | None:
-    """Return --tolerance; None for the method's default."""
     return None if options.tolerance is None else positive(options.tolerance, "--tolerance", 1.0)
 
 
 def chosen_seed(options: argparse.Namespace) -> str | None:
-    """Return --seed, which must be printable, or None."""
     if options.seed is not None and not options.seed.isprintable():
         raise InputError(
             "--seed: contains characters that can't be printed; allowed: printable characters"
@@ -142,7 +137,6 @@ def chosen_seed(options: argparse.Namespace) -> str | None:
 
 
 def check_known(what: str, name: str | None, allowed: Sequence[str]) -> None:
-    """Raise InputError if `name`, the value of option `what`, is neither None nor allowed."""
     if name is not None and name not in allowed:
         raise unknown(what, name, allowed, f"--{what}")
 
@@ -187,7 +181,6 @@ def chosen_scene(options: argparse.Namespace, **allowed: bool) -> Scene:
 
 
 def warn_of_attitude(scene: Scene) -> None:
-    """Warn if the attitude was normalised."""
     if abs(scene.attitude_length - 1.0) > NEAR_ONE:
         norm = f"the norm {scene.attitude_length:.6g}"
         if math.isinf(scene.attitude_length):
@@ -196,13 +189,11 @@ def warn_of_attitude(scene: Scene) -> None:
 
 
 def chosen_programs(options: argparse.Namespace) -> tuple[str, ...]:
-    """Return the program of --program, by default all three."""
     check_known("program", options.program, PROGRAMS)
     return PROGRAMS if options.program is None else (options.program,)
 
 
 def chosen_listing(options: argparse.Namespace) -> Listing:
-    """Return the chosen version of --program; warn of readings and conjectures without effect."""
     chosen_programs(options)
     listing = subset(options.program, options.listing, **changes_of(options))
     tell_inactive(options, [listing])
@@ -249,7 +240,6 @@ def tell_inactive(options: argparse.Namespace, listings: Iterable[Listing]) -> N
 
 
 def listing_text(listing: Listing) -> str:
-    """Return the listing's label, with its defects, readings and conjectures."""
     active = ", ".join(sorted(listing.defects)) or "no defects"
     more = {"readings": listing.readings, "conjectures": listing.conjectures}
     told = [f"; {what}: {', '.join(sorted(names))}" for what, names in more.items() if names]
@@ -282,17 +272,14 @@ def refuse(
 
 
 def names(text: str | None) -> list[str]:
-    """Return the names in a text such as a,b; none for None."""
     return [] if text is None else [name.strip() for name in text.split(",")]
 
 
 def numbers(text: str, option: str) -> list[float]:
-    """Return the numbers in a text such as 1,2."""
     return [number(part, option) for part in text.split(",")]
 
 
 def number(text: str, option: str) -> float:
-    """Return an option's finite number."""
     try:
         value = parsed_float(text)
     except ValueError:
@@ -303,7 +290,6 @@ def number(text: str, option: str) -> float:
 
 
 def positive(text: str | None, option: str, default: float) -> float:
-    """Return an option's number above 0, or the default."""
     if text is None:
         return default
     value = number(text, option)
@@ -313,7 +299,6 @@ def positive(text: str | None, option: str, default: float) -> float:
 
 
 def whole(text: str, option: str) -> int:
-    """Return an option's whole number."""
     try:
         return parsed_whole(text)
     except ValueError:
@@ -321,7 +306,6 @@ def whole(text: str, option: str) -> int:
 
 
 def whole_up_to(most: int, text: str | None, option: str, default: int) -> int:
-    """Return an option's whole number, 1 to `most`, or the default."""
     count = default if text is None else whole(text, option)
     if not 1 <= count <= most:
         raise InputError(f"{option}: {count}; allowed: 1 to {most}")
@@ -351,12 +335,10 @@ def chosen_count(text: str | None, option: str, default: int, least: int, cost: 
 
 
 def warn(message: str) -> None:
-    """Print a warning on stderr."""
     say(f"pyharness: warning: {message}\n")
 
 
 def also_files(options: argparse.Namespace) -> dict[str, str]:
-    """Return each --also file's format, from its ending."""
     found: dict[str, str] = {}
     for path in names(getattr(options, "also", None)):
         suffix = path[path.rfind(".") :] if "." in path else ""
@@ -448,7 +430,6 @@ def show(
 
 
 def emit(content: str | bytes, out: str | None) -> None:
-    """Write `content` to the file `out`, or to stdout."""
     if out is not None:
         data = content if isinstance(content, bytes) else shown(content).encode()
         write_files({out: data}, "--out")

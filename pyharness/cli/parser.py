@@ -41,7 +41,6 @@ class _Once(argparse.Action):
     def __call__(
         self, parser: object, namespace: argparse.Namespace, values: Any, option: str | None = None
     ) -> None:
-        """Store the value; raise InputError if the option has one."""
         if getattr(namespace, self.dest) is not None:
             raise InputError(f"{option} is given twice; allowed: once")
         setattr(namespace, self.dest, values)
@@ -88,7 +87,6 @@ class Parser(argparse.ArgumentParser):
         groups["output"].add_argument("-h", "--help", action="help", help="Print this help.")
 
     def format_help(self) -> str:
-        """Return the help in the terminal's width, 80 to 100 columns."""
         from shutil import get_terminal_size
 
         self._width = min(max(get_terminal_size().columns, _NARROWEST), _WIDEST)
@@ -99,11 +97,9 @@ class Parser(argparse.ArgumentParser):
         raise InputError(message)
 
     def option_names(self) -> list[str]:
-        """Return the long names, as in ``--case``."""
         return [name for name in self._option_string_actions if name.startswith("--")]
 
     def read(self, verb: str, arguments: Sequence[str]) -> argparse.Namespace:
-        """Return the parsed options, or raise InputError."""
         options, rest = self.parse_known_args(self._joined(arguments))
         if rest:
             raise unknown("option", rest[0], self.option_names(), verb)

@@ -59,7 +59,6 @@ EXAMPLE = "bench --case 5 --peers none"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Measure run time against error of our and third-party solvers."""
     if options.ensemble:
         return _ensemble(options)
     if options.terms:

@@ -36,11 +36,6 @@ EXAMPLE = "claims --explain abstract-superior"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print verdicts on whether the programs reproduce the claims of the thesis.
-
-    With --assignments, --evidence or --atlas, print the values, omitted in the thesis, with which
-    the claims hold.
-    """
     if options.assignments:
         shared.refuse(options, "--assignments", ("explain", "evidence", "word"))
         shared.check_known("format", options.format, ("table", "json"))

@@ -31,7 +31,6 @@ EXAMPLE = "deck --program runge-kutta --dialect gfortran --out runge-kutta.f"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write a program of the thesis as a deck of cards in fixed-form FORTRAN."""
     if options.program is None:
         raise InputError("give --program two-term, four-term or runge-kutta")
     listing = shared.chosen_listing(options)

@@ -22,7 +22,6 @@ EXAMPLE = "defects stage-base"
 
 
 def run(options: argparse.Namespace) -> int:
-    """List apparatus entries, such as defects, or print one with its evidence and effects."""
     listed = entries(options.kind)
     if options.name is None:
         shared.check_outputs(options)

@@ -21,7 +21,6 @@ EXAMPLE = "edition --out pages"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the edition as a static web site or as plain data, and list the files."""
     from pyharness.cli.output import check_tree, write_tree
     from pyharness.edition.report import MARK, check_libraries, edition_report, package_report
 

@@ -33,10 +33,7 @@ EXAMPLE = "family --case 5 --weighting galerkin --terms 3"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the orders of weighted residual methods, measured and derived.
-
-    Return 1 if a measured order is below the derived one.
-    """
+    """Print measured and derived orders; return 1 if a measured order is below the derived one."""
     if options.lost:
         return _lost(options)
     shared.refuse(options, "the measurement of orders; give --lost", ("word",))

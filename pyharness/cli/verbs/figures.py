@@ -17,7 +17,6 @@ EXAMPLE = "figures --out figures"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Draw Figures 6 to 12 of the thesis by original and corrected programs; list the files."""
     from pyharness.cli.output import check_folder, write_folder
     from pyharness.views.pictures import check_matplotlib, saved
 

@@ -20,10 +20,6 @@ EXAMPLE = "limits --case 5 --program runge-kutta"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print each original program's distance from its limit and from the true solution.
-
-    The limit is the result as the step size goes to 0.
-    """
     scene = shared.chosen_scene(options)
     programs = shared.chosen_programs(options)
     halvings = shared.whole_up_to(12, options.halvings, "--halvings", 6)

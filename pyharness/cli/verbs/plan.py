@@ -24,7 +24,6 @@ EXAMPLE = "plan --case 5 --tolerance 1e-9"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print which computations a scene requires, which are omitted, and why."""
     kinds = ("any_torque", "any_state", "changing", "states")
     scene = shared.chosen_scene(options, **dict.fromkeys(kinds, True))
     method = options.method or "auto"

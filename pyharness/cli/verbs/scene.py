@@ -30,7 +30,6 @@ EXAMPLE = "scene new --out brick.toml"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write a sample scene file, check one, or print the schema of scene files."""
     action = options.action
     if action is None:
         raise InputError(f"give an action; allowed: {', '.join(_ACTIONS)}")

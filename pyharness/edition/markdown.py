@@ -61,7 +61,6 @@ def inline(text: str) -> Markup:
 
 
 def formula(tex: str, display: bool = False) -> Markup:
-    """Return LaTeX as MathML, on its own line if `display`."""
     return Markup(convert(tex, display="block" if display else "inline"))
 
 

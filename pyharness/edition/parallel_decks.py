@@ -41,8 +41,6 @@ class Cell(NamedTuple):
 
 
 class AlignedRow(NamedTuple):
-    """Corresponding cards by program, and their kinds of differences."""
-
     cells: dict[str, Cell | None]
     differences: list[str]
 

@@ -100,10 +100,7 @@ def case_truth(case: int) -> Reference:
 
 
 def effects_of(name: str) -> Iterator[CaseEffects]:
-    """Yield the effects of an apparatus entry in each of its programs and every case.
-
-    `original` always has the entry.
-    """
+    """Yield an apparatus entry's effects by program and case; `original` always has the entry."""
     known = entry(name)
     for program in known["programs"]:
         printed = Listing.original(program).active
@@ -137,7 +134,6 @@ def lattice(
 
 
 def switched(scene: Scene, program: str) -> tuple[str, ...]:
-    """Return a program's defects and, under varying torque, conjectures."""
     return switches(program) if scene.torque.varies else names_of("defect", program)
 
 

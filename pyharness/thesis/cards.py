@@ -59,7 +59,6 @@ class Card(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Return a name such as ``two-term:1660``."""
         return f"{self.program}:{self.number}"
 
     @property
@@ -128,8 +127,6 @@ class Card(NamedTuple):
 
 
 class Deck:
-    """The cards of a program, with their lines in the Fortran and the Python port."""
-
     def __init__(self, program: str) -> None:
         self.program = program
         self._places = facts("cards/places")[program]

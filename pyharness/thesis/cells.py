@@ -38,7 +38,6 @@ def all_cells() -> Iterator[tuple[Listing, int]]:
 
 
 def cell_name(listing: Listing, case: int) -> str:
-    """Return a name such as ``two-term/case-3/dt-accumulates+torque-held``."""
     return f"{listing.program}/case-{case}/{listing_name(listing)}"
 
 

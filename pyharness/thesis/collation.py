@@ -231,7 +231,6 @@ def _renamed(statement: str, names: str) -> str:
 
 
 def names_a_card(entry: dict[str, Any], cards: Mapping[str, Iterable[int]]) -> bool:
-    """Return whether an apparatus entry names one of the `cards`, or no card."""
     return not entry["cards"] or any(
         set(numbers(entry["cards"].get(program, ""))) & set(named)
         for program, named in cards.items()

@@ -98,7 +98,7 @@ def corrected_cards(program: str) -> dict[int, str]:
 
 
 def corrections(program: str) -> dict[int, list[str]]:
-    """Return, by card number, the defects whose correction changes the card."""
+    """Return by card number the defects whose correction changes the card."""
     found: dict[int, list[str]] = {}
     for each in facts("cards/alterations")["alteration"]:
         if each["program"] == program and "corrects" in each and "case" not in each:

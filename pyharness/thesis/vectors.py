@@ -56,7 +56,6 @@ class Answer(NamedTuple):
 
 
 def answers(path: str | Path = OURS) -> list[Answer]:
-    """Return a JSON file's vectors with our results."""
     content = read_input(path, f"vectors '{path}'", _LARGEST, "a JSON file")
     try:
         data = json.loads(content)

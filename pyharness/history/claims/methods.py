@@ -228,7 +228,6 @@ def complexity(lab: Laboratory, factors: Sequence[float]) -> Judged:
 
 
 def others_failed(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -> Judged:
-    """Judge whether the weightings other than collocation failed."""
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
     numbers, useless, worst = {}, False, 0.0
@@ -274,7 +273,6 @@ def computer_error(
 
 
 def only_collocation(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -> Judged:
-    """Judge whether of the four weightings only collocation succeeds."""
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
     numbers = {}
@@ -291,7 +289,6 @@ def only_collocation(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]
 def all_succeed(
     lab: Laboratory, cases: Sequence[int], terms: Sequence[int], share: float
 ) -> Judged:
-    """Judge whether the weighted residual methods integrate the rigid body problem."""
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
     numbers = {

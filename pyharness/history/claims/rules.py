@@ -101,7 +101,6 @@ def diverged(bench: Bench, case: int) -> Grade:
 
 
 def models_concur(bench: Bench, case: int, share: float, terms: Sequence[int]) -> Grade:
-    """Test whether collocation models with different numbers of terms agree in a case."""
     first, *others = terms
     model, largest = bench.models(case, first), largest_of(bench.solution(case))
     numbers = {}

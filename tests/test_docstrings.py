@@ -1,5 +1,7 @@
 """Docstrings of the public API are complete, by numpydoc's own validation."""
 
+import inspect
+
 import pytest
 from numpydoc.docscrape import get_doc_object
 from numpydoc.validate import validate
@@ -21,3 +23,18 @@ def test_public_docstring_is_complete(name: str) -> None:
         found = [each for each in found if each[0] != "PR01"]
         assert attributes >= set(getattr(getattr(pyharness, name), "__dataclass_fields__", ()))
     assert found == []
+
+
+@pytest.mark.parametrize(
+    "name", [name for name in pyharness.__all__ if inspect.isclass(getattr(pyharness, name))]
+)
+def test_public_method_has_a_docstring(name: str) -> None:
+    found = getattr(pyharness, name)
+    fields = " ".join(part.name for part in get_doc_object(found)["Attributes"])
+    without = [
+        each
+        for each, value in vars(found).items()
+        if not each.startswith("_") and (inspect.isfunction(value) or isinstance(value, property))
+        if not value.__doc__ and each not in fields.replace(",", " ").split()
+    ]
+    assert without == []

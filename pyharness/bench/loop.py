@@ -16,7 +16,7 @@ class Task(Protocol):
     """Something to measure, such as a workload; messages name it by `place`."""
 
     @property
-    def place(self) -> str: ...  # noqa: D102
+    def place(self) -> str: ...
 
 
 _Task = TypeVar("_Task", bound=Task)

@@ -41,7 +41,7 @@ else:
         from pyharness._solver import BoundKernel
     except ImportError:  # not built: `extension` raises NotBuiltError when a solver is made
 
-        class BoundKernel:  # noqa: D101
+        class BoundKernel:
             __class_getitem__ = classmethod(GenericAlias)
 
 

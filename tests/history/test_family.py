@@ -128,6 +128,22 @@ def test_slopes_that_agree_by_chance_are_no_order() -> None:
     assert abs(found.deviation) <= SLACK
 
 
+def test_settled_order_replaces_one_that_is_too_low(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The slopes of the first horizon agree better, by chance."""
+    horizons = iter([(1.5, 1.0), (2.0, 1.03)])
+
+    def ladder(scene: Scene, members: list[Member], horizon: float, end: Any) -> Any:
+        order, last = next(horizons)
+        errors = 1e-3 * 2.0 ** (-0.5 * order * np.arange(8.0))
+        errors[-1] *= last
+        return np.repeat(errors[:, None], len(members), axis=1)
+
+    monkeypatch.setattr(f"{order_table.__module__}._ladder", ladder)
+    (found,) = order_table(case_scene(6), [Member("collocation", 2)])
+    assert found.settled
+    assert abs(found.deviation) <= SLACK
+
+
 def _conditions(member: Member, h: float, columns: int) -> Array:
     """Return the weighted integrals of j t**(j-1), j = 1 ... columns, over a step of length h.
 

@@ -76,11 +76,15 @@ def test_certificate_reaches_the_least_times() -> None:
         assert [row["time"] for row in certificate["rows"]] == [end]
 
 
-def test_work_limit_is_on_bits_too() -> None:
+def test_work_limit_is_on_bits_too(monkeypatch: pytest.MonkeyPatch) -> None:
     """Regression test: steps of numbers with 1000 bits took a minute up to the limit."""
     law = TorqueLaw((1e300, 1e300, 1e300))
     scene = Scene("h", (1.0, 2.0, 3.0), moments=(3.0, 2.0, 1.5), torque=law)
     with pytest.raises(InputError, match=r"more than 6\d steps; .*effort"):
+        prove(scene, [3e-150], 25, effort=100 / 20_000)
+    # A product of ten times the bits takes more than ten times as long.
+    monkeypatch.setattr(f"{prove.__module__}._BITS_OF_PRODUCT", 100)
+    with pytest.raises(InputError, match=r"more than [67] steps"):
         prove(scene, [3e-150], 25, effort=100 / 20_000)
 
 

@@ -164,8 +164,9 @@ def _reduction(entry: object, claims: Mapping[str, Claim]) -> ReductionSpec:
     samples = integer(f"{where} samples", given.get("samples", 1))
     if not 1 <= samples <= _MOST_SAMPLES:
         raise InputError(f"{where} samples {samples}; allowed: 1 to {_MOST_SAMPLES}")
-    if "offset" in given and not 0.0 < number(f"{where} offset", given["offset"]) <= 1.0:
-        raise InputError(f"{where} offset {given['offset']:g}; allowed: above 0, to 1")
+    # The rounding errors of two trajectories would hide a smaller offset.
+    if "offset" in given and not 1e-12 <= number(f"{where} offset", given["offset"]) <= 1.0:
+        raise InputError(f"{where} offset {given['offset']:g}; allowed: 1e-12 to 1")
     if "of" in given:
         check_name("axis", given["of"], RANKS, f"{where} of")
     if "above" in given and not 0.0 <= number(f"{where} above", given["above"]) <= math.pi:

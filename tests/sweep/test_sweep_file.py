@@ -204,6 +204,7 @@ REFUSED = {
     f"reductions = [{{name = 'end', of = 3}}]\n{CASE}{OMEGA}": "unknown parameter",
     f"reductions = [{{name = 'end', as = '?'}}]\n{CASE}{OMEGA}": "reductions: end as: allowed",
     f"{CASE}{OMEGA}{axis('omega.2', [1, 2])}dimension = 'omega.1'\n": "omega.1 has 1 values",
+    f"reductions = [{{name = 'growth', offset = 1e-13}}]\n{CASE}{OMEGA}": "offset 1e-13; allowed",
     CASE + OMEGA + OMEGA: "omega.1: two axes vary this field; give one axis",
     f"{CASE}{axis('lipschitz', [1.0])}": "lipschitz has no meaning without a program",
     f"axis = 3\n{CASE}": "axis is missing; give at least one table [[axis]]",

@@ -1,7 +1,7 @@
 """Ready terms: predefined torques that depend on time and state.
 
-A sum of terms, torque laws and Python functions is a torque for `pyharness.Scene`. Each + needs a
-term, or a sum with one, on one side.
+A sum of terms, torque laws and Python functions is a torque for `pyharness.Scene`. One side of
+each + must be a term, or a sum with a term.
 """
 
 from pyharness.engine.field_terms import (

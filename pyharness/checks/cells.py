@@ -3,9 +3,9 @@
 A cell is a combination of a program, a case of Table 1, defects and readings (interpretations of
 doubtful cards).
 
-A deck is compiled from the author's cards and shares no code with our versions. Its TAPE5 and
-printed page must equal our Fortran's. After an overflow the deck continues, unlike ours, but must
-not produce finite omega.
+A deck is compiled from the author's cards and shares no code with our versions. Its output, TAPE5
+and a printed page, must equal that of our Fortran version. After an overflow our version ends; the
+deck continues, but must not produce a finite omega.
 """
 
 from collections.abc import Iterator, Sequence
@@ -41,7 +41,7 @@ _EVALUATIONS = {"two-term": 3, "four-term": 5, "runge-kutta": 4}
 
 
 def cells(chosen: Selection) -> Iterator[Attempt]:
-    """Yield checks that Fortran and Python agree, for every program version in every case."""
+    """Yield checks that Fortran and Python agree, for the cells (few if `chosen.thin`)."""
     divergences = facts("divergences")["divergence"]
     listed = {entry["cell"] for entry in divergences if entry["kind"] == "cross-language"}
     for listing, case in all_cells():
@@ -96,10 +96,10 @@ _VECTORS = Basis(
 
 
 def words(chosen: Selection) -> Iterator[Attempt]:
-    """Yield checks of our simulated machine arithmetic, bit for bit.
+    """Yield bit-for-bit checks of our simulated machine arithmetic.
 
     CDC instructions must give the expected results. Programs in our 53-bit arithmetic must agree
-    with floats; compiled programs in other arithmetics, with their Python versions.
+    with programs in floats. In other arithmetics, Python and compiled programs must agree.
     """
     yield Attempt(Name("words", "vectors"), _vectors)
     for listing, case in all_cells():
@@ -121,7 +121,7 @@ def _vectors(name: Name) -> Check:
 
 
 def _in_word(listing: Listing, case: int, word: str | None, name: Name) -> Check:
-    """Return the check of Python against Fortran in `word`; if None, of binary64 against floats."""
+    """Return the check of Python against Fortran in `word`; if None, of our binary64 and floats."""
     scene = case_scene(case)
     ours = in_word.run(scene, listing, WORDS[word or BINARY64])
     if word is None:
@@ -176,7 +176,7 @@ def _compared(folder: Path, asked: tuple[Name, Listing, int]) -> Check:
     overflowed = port.ended == "overflow"
     if not (deck.page.startswith(whole) if overflowed else deck.page == whole):
         faults.append("the page differs")
-    # The records that the deck writes after the port's last row.
+    # The records that the deck writes after our version's last row.
     rest = deck.tape5[port.steps :]
     if not overflowed:
         faults += [f"{len(rest)} records more"] if len(rest) else []

@@ -35,7 +35,7 @@ BITS = Basis(
 
 @dataclass(frozen=True)
 class Name:
-    """The name of a check; its id joins the parts by slashes, as in ``cells/two-term``."""
+    """The name of a check; its id joins the fields by slashes, as in ``cells/two-term``."""
 
     suite: str  # kind of check of `verify`, or trial of `stress`
     subject: str = ""  # program or method
@@ -136,7 +136,7 @@ _OF_ANY = len(fields(Check))
 
 @dataclass(frozen=True)
 class Sample(Check):
-    """A check in a random scene, with fields to group reports by."""
+    """A check in a random scene, with fields by which a report groups checks."""
 
     entrance: str = ""  # call that solved the scene, as in ``solve-taylor``
     tolerance: float = math.nan
@@ -191,8 +191,8 @@ def run_suites(
 ) -> Iterator[Check]:
     """Yield the requested checks of all suites (kinds of checks).
 
-    An exception becomes a failed check, except NotBuiltError and, in the suites `of_the_user`,
-    which read the user's files, InputError.
+    An exception becomes a failed check. NotBuiltError is raised instead, and so is InputError in
+    the suites `of_the_user`, which read the user's files.
     """
     for suite, attempts in suites.items():
         raised = (NotBuiltError, InputError) if suite in of_the_user else (NotBuiltError,)

@@ -1,8 +1,8 @@
-"""Amplification of perturbations by the programs, and divergent step sizes.
+"""Amplification of perturbations by the programs, and step sizes at which runs diverge.
 
 The amplification by a step, measured in runs, may differ from the matrix of `theory.amplification`
-by rounding errors only. The step size at which a run diverges is compared with the prediction of
-linear stability.
+by rounding errors only. The step size at which a run diverges is compared with that
+predicted by linear stability theory.
 """
 
 import math
@@ -57,7 +57,7 @@ ROUNDED = Basis(
 
 @dataclass(frozen=True)
 class Probe:
-    """A vector or matrix, measured by running a program and derived from theory."""
+    """A vector or matrix, as measured by running a program and as derived from theory."""
 
     found: Array  # measured
     derived: Array  # derived, of the same shape
@@ -91,10 +91,10 @@ def eigenvalues(scene: Scene) -> Array:
 
 
 def first_step(scene: Scene, listing: Listing) -> Probe:
-    """Return the 3 x 3 derivative of omega after the first step of a steady rotation.
+    """Return the derivative, 3 x 3, of omega after a first step with respect to the initial omega.
 
-    It is measured by central differences, exact except for rounding, because a step is a polynomial
-    of omega with known degree.
+    The rotation is steady. Central differences are exact except for rounding, because a step is a
+    polynomial of omega with known degree.
     """
 
     def stepped(omega: Array) -> Array:
@@ -133,7 +133,7 @@ def later_steps(scene: Scene, listing: Listing) -> Probe:
 
 
 def complex_step(listing: Listing, step: int, z: complex) -> Probe:
-    """Return the growth factor of a 1 s collocation step, number `step` of a run, for x' = z x."""
+    """Return the factor on x in collocation step number `step`, of 1 s, for x' = z x."""
     program = listing.program
     moved = _moved(listing, step)
 
@@ -153,8 +153,8 @@ def complex_step(listing: Listing, step: int, z: complex) -> Probe:
 def observed_boundary(listing: Listing, direction: complex) -> Probe:
     """Return the distance of z from 0 at which perturbations begin to grow.
 
-    z is the step size times an eigenvalue of the Jacobian. The distance is bisected along
-    `direction`, -1 or 1j, in runs of a spinning top. With the defect `base-not-restored`, the
+    z is the step size times an eigenvalue of the Jacobian. The distance is found by bisection
+    along `direction`, -1 or 1j, in runs of a spinning top. With the defect `base-not-restored`, the
     change of omega from step to step is measured, because a constant part might hide the growth.
     """
     matrix = amplification(listing)
@@ -190,7 +190,7 @@ def _moved(listing: Listing, step: int) -> float:
 
 
 def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
-    """Return the derivative of a collocation step at an unsteady omega.
+    """Return the derivative of a collocation step by omega, where omega is not constant.
 
     A step h takes omega to omega + h F + h**2/2 J F + w h**3 Q(F), where F is the right-hand side,
     J its Jacobian and Q its quadratic part. Only the weight w depends on the collocation points.
@@ -236,7 +236,7 @@ def _differentiated(
 
 
 def _units(scene: Scene, program: str, sizes: Array, moved: float = 1.0) -> Array:
-    """Return a bound on omega's rounding error in a step, in 2**-53 rad/s, from bounds on omega."""
+    """Return a bound on omega's rounding error in a step, in 2**-53 rad/s; `sizes` bound omega."""
     on = Numbers(scene, scene.step_size, sizes=True)
     if program == "runge-kutta":
         # In the original program each stage starts from the previous one, so the terms are larger.
@@ -274,8 +274,8 @@ def divergence(
 ) -> tuple[float, float, float]:
     """Return measured and predicted step size (s) of divergence, and a bound on their difference.
 
-    With the predicted step size, to which the bound is relative, the wobble (omega1, omega2)
-    doubles within `time` (s) by linear theory. The body spins about axis 3, which is stable.
+    The bound is relative to the predicted step size, with which, by linear theory, the wobble
+    (omega1, omega2) doubles within `time` (s). The body spins about axis 3, which is stable.
     """
     found = smallest_divergent(scene, time, runner, smallest)
     a, b, c = scene.euler_coefficients
@@ -290,7 +290,7 @@ def divergence(
         wobble = 2.0 * max(bounds[:2])
         change = abs(c) / min(abs(a), abs(b)) * wobble**2 / (2.0 * spin * spin)
     low = _doubling(matrix, rate * (1.0 + change), time, smallest)
-    # A peak may be missed by half the angle of a step.
+    # The wobble may peak between two steps, up to half the angle of a step from both.
     missed = -math.log(math.cos(min(1.5, 0.5 * rate * predicted)))
     high = _doubling(matrix, rate * (1.0 - change), time, smallest, missed)
     limit = max(predicted - low, high - predicted) / predicted + 2.0 * predicted / time
@@ -301,7 +301,7 @@ def smallest_divergent(scene: Scene, time: float, runner: Runner, smallest: floa
     """Return the smallest step size (s) with which a run diverges.
 
     A run diverges if a component of omega exceeds twice its largest true value, or if it ends
-    early. Return 0 if steps of `smallest` (s) diverge too, infinity if none do.
+    early. Return 0 if steps of `smallest` (s) diverge too, infinity if no step does.
     """
     bounds = 2.0 * np.array(_bounds(scene, time))
 

@@ -1,4 +1,4 @@
-"""The golden record of trajectories, as exact text.
+"""The golden record: trajectories of an earlier version, as exact text.
 
 Each program or method has a file. An entry has the command that prints a trajectory, its ending, a
 digest of all rows, and four rows of hexadecimal floats: the first, tenth and last, and the mean of
@@ -139,7 +139,7 @@ def _compared(
 
 
 def read_record(folder: Path) -> dict[str, dict[str, Any]]:
-    """Return the files by program or method; raise InputError if one is invalid."""
+    """Return the record's files by program or method; raise InputError if one is invalid."""
     found = {}
     places: dict[str, str] = {}
     for path in sorted(folder.glob("*.toml")):
@@ -166,7 +166,7 @@ def read_record(folder: Path) -> dict[str, dict[str, Any]]:
 def files_made(folder: Path) -> set[str]:
     """Return the names of the files in `folder` that `verify --update` made.
 
-    If any was, all files with the name of a record are included, even damaged ones.
+    If there is one, all files with the name of a record are included, even damaged ones.
     """
     found = set()
     for path in folder.glob("*.toml"):
@@ -179,7 +179,7 @@ def files_made(folder: Path) -> set[str]:
 def update(folder: Path) -> tuple[dict[str, bytes], list[str]]:
     """Return a new golden record's files by name, and its differences from the old one."""
     known: dict[str, dict[str, Any]] = {}
-    # Beside a damaged old record, every trajectory counts as new.
+    # If the old record is damaged, every trajectory counts as new.
     with suppress(InputError):
         known = read_record(folder) if folder.is_dir() else {}
     entries = {entry["command"]: entry for file in known.values() for entry in file["trajectory"]}

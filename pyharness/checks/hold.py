@@ -118,10 +118,10 @@ def check_methods(
     """Yield checks of each method's error at `time` (s) in the scene of `name`.
 
     By default, the limit is the sum of the amplified tolerance, the amplified rounding error, and
-    the true solution's error. For fixed steps without torque, a bound from the order replaces the
-    tolerance. Other runs without tolerance have no limit; nor has a run whose sum leaves fewer than
-    two digits of omega. Without torque, energy and momentum always have a limit, because their
-    errors are not amplified. A refusal fails, unless `refusable` permits it.
+    the true solution's error. For fixed steps without torque, a bound from the order of convergence
+    replaces the tolerance. Other runs without tolerance have no limit; nor has a run if the sum
+    would exceed 1 % of omega. Without torque, energy and momentum always have a limit, because
+    their errors are not amplified. A refusal fails, unless `refusable` permits it.
     """
     scene = scene_of(name)
     known = cache(partial(truth, scene, time))
@@ -169,7 +169,8 @@ def _derived(truth: Truth, tried: MethodRun) -> float | None:
         # A closed form has no steps; only the rounding of A, B and C is added.
         return min(MOST, (made or 0.0) + truth.data + truth.relative_error)
     if made is None:
-        # In steps of this size the method only conserves energy and momentum.
+        # Gauss collocation in steps of this size only conserves energy and momentum; other fixed
+        # steps under a torque have no bound.
         return None
     growth, steps = truth.flow.amplification, _roundings(tried, truth)
     return linear(allowed(truth, made, growth, steps=steps))

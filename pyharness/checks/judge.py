@@ -109,7 +109,7 @@ class Truth:
 
     @cached_property
     def bound(self) -> ErrorBound | None:
-        """Return the error bound (relative, or rad) of the reference, if one was used."""
+        """Return the error bound of the reference, relative or in rad; None without a reference."""
         if self.scene is None or self.reference is None:
             return None
         bound = bound_of(self.scene, self.reference, any_torque=True, effort=self.effort)
@@ -170,10 +170,10 @@ class Policy:
 
 
 def allowed(truth: Truth, made: float, growth: float, steps: float = 0.0) -> float:
-    """Return an error's limit: errors of the steps, of rounding and of the true solution, added.
+    """Return an error's limit: the sum of step errors, rounding errors and the truth's error.
 
-    `made`, the steps' error, is multiplied by `growth`; `steps` counts uncompensated roundings of
-    omega.
+    `made`, the sum of step errors, is multiplied by `growth`; `steps` counts uncompensated
+    roundings of omega.
     """
     if truth.attitude is not None:
         return truth.flow.angle_limit(made * growth, truth.end) + truth.angle_error
@@ -181,7 +181,7 @@ def allowed(truth: Truth, made: float, growth: float, steps: float = 0.0) -> flo
 
 
 def lively(growth: float) -> float:
-    """Return the factor on the tolerance in an error's limit."""
+    """Return the factor on the tolerance: the error amplification `growth` if large, else 1."""
     return growth if growth > LIVELY else 1.0
 
 

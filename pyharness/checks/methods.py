@@ -50,8 +50,8 @@ START: Quaternion = (0.5, -0.1, 0.7, 0.5)
 # Times (s): one that is long after the end of the cases, and those for prepared solvers.
 _LATER = 3.0
 _ENDS = (1.0, 3.0, -1.0)
-# Methods with a tolerance, and those that propagate the attitude; without those for weak torques,
-# which no case has.
+# Methods with a tolerance, and those among them that propagate the attitude. Methods for weak
+# torques, which no case has, are omitted.
 _TOLERANT = {x: each for x, each in METHODS.items() if each.finest < 1.0 and x != "reference"}
 _SOLVED = tuple(name for name, each in _TOLERANT.items() if not each.weak_torque)
 _TURNED = tuple(name for name in _SOLVED if METHODS[name].attitude)
@@ -128,7 +128,7 @@ def run_of_solve(method: str, tolerance: float, scene: Scene, times: Sequence[fl
 
 
 def run_of_call(method: str, tolerance: float, scene: Scene, time: float) -> MethodRun:
-    """Return a deferred call of a prepared solver to `time` (s), after one with another omega."""
+    """Return a deferred call of a prepared solver to `time` (s) after one with another omega."""
     candidate = prepared_candidate(method, tolerance, primed=True, attitude=bool(scene.attitude))
     return by_end(method, candidate, tolerance, scene, time)
 
@@ -138,7 +138,7 @@ def _judged(tried: Callable[[], MethodRun], truth: Callable[[], Truth], name: Na
 
 
 def _same_steps(scene: Scene, name: Name) -> Check:
-    """Return the check that 100 prepared steps equal those of `solve` or the kernel."""
+    """Return the check that 100 steps of a prepared solver equal those of `solve` or the kernel."""
     method, time = name.subject, 100.0 * scene.step_size
     found = prepared_candidate(method, 1.0).end(scene, time).omega
     if method in FIXED_STEP:
@@ -216,7 +216,7 @@ def order_if_seen(scene: Scene, truth: Callable[[], Reference], name: Name) -> C
     """Return the check of a fixed-step method's order.
 
     The order is only reported if the scene is too fast or sensitive for 4096 steps, or if the
-    torque has a table, whose changes lower it.
+    torque has a table, which lowers it.
     """
     method = name.setting or name.subject
     found = _order_of_method(scene, method, truth(), most_steps=_MOST)

@@ -78,10 +78,10 @@ def port_cells(programs: Sequence[str], cases: Sequence[int], cells: Sequence[st
 def random_cells(
     seed: str, draws: int, cells: Sequence[str] = (), programs: Sequence[str] = PROGRAMS
 ) -> list[Cell]:
-    """Return runs in random scenes, named as in ``random/7/two-term`` and ordered by number.
+    """Return runs in random scenes, named as in ``random/7/two-term`` and ordered by scene number.
 
-    `cells` has beginnings of the requested names, whose numbers may exceed `draws`; if empty, all
-    `draws` scenes are requested.
+    `cells` has beginnings of the requested names; their scene numbers may exceed `draws`. If it is
+    empty, all `draws` scenes are requested.
     """
     named = {int(match[1]) for each in cells if (match := _DRAWN.match(each))}
     found = []
@@ -202,7 +202,7 @@ def port_report(command: str, checks: Sequence[PortCheck], asked: int, seed: str
     seconds = sum(check.seconds or 0.0 for check in checks)
     steps = [step_section(check) for check in checks if check.difference][:_MOST_STEPS]
     text = summary(title, checks, depth=2, more=_times(checks))
-    # Steps follow the list of failures, the second section.
+    # The tables of steps follow the second section, the list of failures.
     text[2:2] = steps
     page = summary_page("verify --port", checks, title, depth=2, more=[*steps, _times(checks)])
     known = {"seed": seed} if seed else {}

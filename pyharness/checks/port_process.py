@@ -16,7 +16,7 @@ from pyharness.model.errors import InputError, printable
 PATIENCE = 60.0  # s, including the start of an interpreter that compiles
 _LARGEST = 1 << 26  # most bytes of an answer
 _PIECE = 1 << 16
-_TO_END = 1.0  # time (s) to end after closing input or output
+_TO_END = 1.0  # time (s) in which a process must end after it closed input or output
 # Rounds of searching for child processes, and of reading the last output.
 _ROUNDS = 100
 _PROBE = 10.0  # time limit (s) for one request of the other protocol
@@ -75,7 +75,7 @@ class PortProcess:
         self._patience = patience
 
     def __enter__(self) -> Self:
-        """Start the port in its own process group, to end child processes too."""
+        """Start the port in its own process group, so that child processes can be ended too."""
         self._mark = f"{_MARK}={os.urandom(16).hex()}"
         self._told = b""  # end of the output to stderr
         try:

@@ -84,7 +84,7 @@ def marks(checks: Sequence[Check]) -> str:
 
 
 def basis_note(checks: Sequence[Check]) -> list[str]:
-    """Return a legend of the marks, with numbers of limits; empty without limits."""
+    """Return a legend of the marks, with the number of limits of each; empty without limits."""
     counts = Counter(check.mark for check in checks if check.mark)
     told = ", ".join(f"{counts[mark]} {mark}" for mark in MARKS)
     legend = (
@@ -115,7 +115,7 @@ def _groups(checks: Sequence[Check], depth: int) -> Table:
 
 
 def listed_singly(checks: Sequence[Check]) -> list[str]:
-    """Return lines on failed checks, or on all if few, with commands to repeat the failed."""
+    """Return lines on the failed checks and commands to repeat them, or on all checks if few."""
     failed = [check for check in checks if not check.passed]
     lines = []
     for check in failed[:_MOST_FAILURES]:
@@ -145,8 +145,8 @@ _SAMPLES = (
 def samples(checks: Sequence[Check], rounding: float) -> Section:
     """Return a table of the largest ratios of error to tolerance.
 
-    From the error, `rounding` times the error amplification is first subtracted. Rows are entry
-    points and tolerances, columns amplifications.
+    First, `rounding` times the error amplification is subtracted from the error. Rows are entry
+    points and tolerances, columns ranges of the amplification.
     """
     cells: dict[tuple[str, str], list[list[float]]] = {}
     for check in checks:

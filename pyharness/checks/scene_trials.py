@@ -146,7 +146,7 @@ def _invariance(scene: Scene, name: Name) -> Iterator[Attempt]:
             yield Attempt(own, partial(_compared, scene, tolerance, make))
 
 
-# From a scene, a method and its tolerance, it returns two states that must agree, and a bound on
+# Returns, from a scene, a method and its tolerance, two states that must agree, and a bound on
 # their relative difference.
 Way = Callable[[Scene, str, float], tuple[State, State, float]]
 

@@ -1,12 +1,13 @@
 """Checks of the programs' steps and stops, by recomputing every step from its scheme.
 
-Each step of the corrected programs is recomputed from the previous state, to within rounding
-errors. This detects faults that Fortran and Python share, even too small to change the order.
+Each step of the corrected programs is recomputed from the previous state, and must agree within
+rounding errors. This detects faults that Fortran and Python share, even if too small to change the
+order.
 
 The stop test of the Runge-Kutta program (equation 19 of the thesis) divides the change of K
 (right-hand side) in a step by the change of U (state). A quotient above the stop constant ends the
 run. The quotients are recomputed, and the program is run with constants just below and above each
-new maximum.
+new maximum of the quotients.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -52,7 +53,7 @@ _Stages = tuple[_Stage, _Stage, _Stage, _Stage]
 def schemes(chosen: Selection) -> Iterator[Attempt]:
     """Yield checks of the programs' steps.
 
-    The value is the largest difference from the recomputed step, over its rounding bound.
+    The value is the largest difference from the recomputed step, divided by its rounding bound.
     """
     for case in cases(chosen, (7,)):
         compare = partial(_compare_steps, case_scene(case))
@@ -155,7 +156,7 @@ class _Quotients:
 def stops(chosen: Selection) -> Iterator[Attempt]:
     """Yield checks of stops, for every combination of the stop test's defects.
 
-    The value is the largest difference from a recomputed quotient, over its rounding bound.
+    The value is the largest difference from a recomputed quotient, divided by its rounding bound.
     """
     ways = tuple(name for name in names_of("defect", _PROGRAM) if name.startswith("lipschitz"))
     for case in cases(chosen, (3,)):
@@ -220,7 +221,7 @@ def _quotients(scene: Scene, run: Trajectory, kutta: _Stages, listing: Listing) 
 
 
 def _constants(quotients: _Quotients) -> list[float]:
-    """Return stop constants (1/s) below and above each new largest quotient, beyond rounding."""
+    """Return stop constants (1/s) around each new largest quotient, beyond its rounding error."""
     constants = []
     below = 0.0
     for values, rounding in zip(quotients.values, quotients.rounding, strict=True):

@@ -41,7 +41,8 @@ _SHORTER, _LONGER, _HARDLY_LONGER = 0.5, 4.0, 1.2
 _RELATIVE = 1.3  # ratio of the first macro-step to the angle in which the motion changes
 _APPROACH = 2.0  # the length is divided by this if the motion approaches the separatrix
 _WAVE = 4.0  # phase of a wave (rad) that counts as a relative change of 1
-# The number of angles gives oscillations the relative error exp(-_DIGITS/2), means exp(-_DIGITS).
+# The number of angles is such that oscillations have the relative error exp(-_DIGITS/2), and means
+# exp(-_DIGITS).
 _DIGITS = 56.0
 _FEWEST_ANGLES, _MOST_ANGLES = 16, 512
 # Highest frequency of a torque wave, relative to the frequency of the motion.
@@ -67,7 +68,7 @@ def estimates(
 ) -> tuple[float, float]:
     """Return the estimated error of omega (rad/s), and the error amplification.
 
-    Both are maxima over up to five macro-steps, including the last.
+    Both are maxima over the ends of up to five macro-steps, including the last.
     """
     a, b, c = coefficients
     error, growth, count = 0.0, 1.0, len(done)

@@ -1,4 +1,4 @@
-"""Coordinates of omega that a weak torque changes slowly, and the torque, for `averaged`.
+"""For `averaged`: the torque, and coordinates of omega that a weak torque changes slowly.
 
 The body rotates about principal axis a; axes b and c follow in cyclic order. Euler's equations are
 w_b' = P w_c w_a + n_b, w_c' = Q w_a w_b + n_c and so on, where n is torque over moment (rad/s2),
@@ -41,9 +41,9 @@ class Coordinates(NamedTuple):
     """
 
     axes: tuple[int, int, int]  # b, c, a
-    on_b: float  # x over w_b
-    on_c: float  # y over w_c, with its sign
-    rate: float  # dpsi/dt over |w_a|
+    on_b: float  # x divided by w_b
+    on_c: float  # y divided by w_c, with the sign of y
+    rate: float  # dpsi/dt divided by |w_a|
     bend: float  # k
     sign: float  # of w_a
 
@@ -75,7 +75,7 @@ class Coordinates(NamedTuple):
         return np.array([self.on_b * b, y, a * a - self.bend * y * y, 0.0])
 
     def modulus(self, point: Array) -> Array:
-        """Return the squared elliptic modulus: 0 about axis a, 1 on the separatrix, inf beyond."""
+        """Return the squared elliptic modulus: 0 in rotation about axis a, 1 on the separatrix."""
         one = point[2]
         other = one + self.bend * (point[0] * point[0] + point[1] * point[1])
         low, high = np.minimum(one, other), np.maximum(one, other)
@@ -118,7 +118,7 @@ class Coordinates(NamedTuple):
     def slopes(
         self, point: Array, time: Array, cosine: Array, sine: Array, torque: Torque, mean: float
     ) -> Array:
-        """Return d/dpsi of points (p1, p2, p3, t), less `mean` (s/rad) in dt/dpsi."""
+        """Return d/dpsi of points (p1, p2, p3, t), with `mean` (s/rad) subtracted from dt/dpsi."""
         omega, y, fast = self.omega(point, cosine, sine)
         pace = 1.0 / (self.rate * fast)
         torques = torque(time, omega)

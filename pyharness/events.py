@@ -1,6 +1,6 @@
 """Ready events: predefined functions whose roots `pyharness.solve` finds along a trajectory.
 
-Pass an event, or a list, as the argument `events`, which also takes Python functions of time and omega.
+Pass one or more as the argument `events`, which also takes Python functions of time and omega.
 """
 
 from pyharness.engine.event_functions import Event

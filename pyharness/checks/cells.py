@@ -4,8 +4,8 @@ A cell is a combination of a program, a case of Table 1, defects and readings (i
 doubtful cards).
 
 A deck is compiled from the author's cards and shares no code with our versions. Its output, TAPE5
-and a printed page, must equal that of our Fortran version. After an overflow our version ends; the
-deck continues, but must not produce a finite omega.
+and a printed page, must equal the output of our Fortran version. After an overflow our version
+ends; the deck continues, but must not produce a finite omega.
 """
 
 from collections.abc import Iterator, Sequence

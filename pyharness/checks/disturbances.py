@@ -1,8 +1,8 @@
 """Amplification of perturbations by the programs, and step sizes at which runs diverge.
 
 The amplification by a step, measured in runs, may differ from the matrix of `theory.amplification`
-by rounding errors only. The step size at which a run diverges is compared with that
-predicted by linear stability theory.
+by rounding errors only. The step size at which a run diverges is compared with the
+prediction of linear stability theory.
 """
 
 import math

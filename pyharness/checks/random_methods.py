@@ -91,8 +91,8 @@ def may_refuse(tried: MethodRun, truth: Truth, why: str) -> bool:
     """Return whether a method may refuse its run `tried` with the message `why`.
 
     `auto` never may, `quick` always, a closed form only near the limits of binary64. Other methods
-    may refuse scenes of `_MAY_REFUSE`, or scenes with an error amplification above 10. SciPy's methods may
-    also refuse tolerances finer than they meet, or below 1e-9 if the work is too much.
+    may refuse scenes of `_MAY_REFUSE`, or scenes with an error amplification above 10. SciPy's
+    methods may also refuse tolerances finer than they meet, or below 1e-9 if the work is too much.
     """
     method, kind = tried.method, tried.scene.name
     if method == "auto":

@@ -12,9 +12,9 @@ equivalent form is
     V + <W> = V(0) + <W>(0) + length (integral of <F> over s from 0),
     W = integral of G - <G> over psi from 0, where G = F - (1/length) dW/ds.
 
-A sweep inserts V and W on the right, and raises the order of averaging by one. Newton's method
-solves the first equation at Chebyshev points (nodes) of s. Two more sweeps, with more nodes and
-angles, measure the error.
+A sweep puts the last V and W into the right-hand sides, and raises the order of averaging by one.
+Newton's method solves the first equation at Chebyshev points (nodes) of s. Two more sweeps, with
+more nodes and angles, measure the error.
 """
 
 from functools import lru_cache
@@ -201,7 +201,7 @@ class MacroStep:
         return right + (offset[:, :1] - offset) - mean, waves
 
     def _linearise(self, mean: Array, few: Fast) -> Array:
-        """Set Newton's matrices; return the mean slopes over psi, (4, nodes)."""
+        """Set the matrices of Newton's method; return the mean slopes over psi, (4, nodes)."""
         n, count = self._n_unknowns, self._sizes[0]
         shift = _DIFFERENCE * self.scale[:n, None]
         shifted = np.repeat(mean[:, None], n + 1, axis=1)

@@ -23,7 +23,7 @@ _MOST_ROWS = 16
 
 
 def period_of(scene: Scene) -> float:
-    """Return the period of omega (s); 0 without one, with a torque, or with a changing inertia."""
+    """Return the period of omega (s); 0 if aperiodic, or with a torque or a changing inertia."""
     if scene.changing is not None or not scene.torque.is_zero:
         return 0.0
     bare = principal(scene)[0]
@@ -34,7 +34,7 @@ def period_of(scene: Scene) -> float:
 def _largest_estimate(
     scene: Scene, times: Sequence[float], noise: float
 ) -> tuple[float | None, float | None]:
-    """Return error estimate and amplification at the end; if large, their maxima at 16 times."""
+    """Return estimated error and amplification at the end or, if large, maxima at 16 times."""
     error, growth = closed_form_estimate(scene, scene.omega, times[-1], noise)
     if error is None or growth is None or growth < _CALM:
         return error, growth

@@ -1,4 +1,4 @@
-"""A prepared solver as a function for compiled code; checks of refused arguments."""
+"""A prepared solver as a function for compiled code; checks of arguments that C code refused."""
 
 import math
 import reprlib

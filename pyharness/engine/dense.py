@@ -32,7 +32,7 @@ from pyharness.model.trajectory import Trajectory
 # may have larger errors between its nodes. The second applies if the first can't be met.
 _NODE_TOLERANCE = 0.25
 _LARGEST_NODE_TOLERANCE = 0.75
-# Largest ratio of a polynomial's last coefficients, relative to the state, to the tolerance.
+# Largest last coefficients of a polynomial, relative to the state, divided by the tolerance.
 _LAST = 0.02
 # Ratio of a method's rounding errors, which are not smooth in time, to the error amplification; and
 # the smallest bound of the last coefficients.
@@ -50,12 +50,12 @@ _SHORT = 0.25  # a change in a shorter part of an interval might be hidden betwe
 
 @dataclass(frozen=True, eq=False)
 class _Open:
-    """An interval (s) without a polynomial yet."""
+    """An interval (s) that has no polynomial yet."""
 
     low: float
     high: float
-    tail: float = math.inf  # size of the last coefficients of the polynomial on the longer interval
-    whole: Pieces | None = None  # this polynomial
+    tail: float = math.inf  # size of the last coefficients on the longer interval that was divided
+    whole: Pieces | None = None  # the polynomial there
 
     def is_rough(
         self, tail: float, times: Array, values: Array, sizes: Array, rough: float

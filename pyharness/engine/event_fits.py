@@ -22,10 +22,10 @@ from pyharness.model.errors import InputError
 
 # Largest of the last coefficients of a polynomial that has converged, relative to its values.
 _LAST = 2e-14
-_RUN = 3  # adjacent nodes at which a function is 0 that remains 0 between them
+_RUN = 3  # a function that is 0 at so many adjacent nodes is 0 between them
 _TAIL = 3  # last coefficients, whose magnitude estimates the omitted ones
 _MOST_DIVISIONS = 44  # halvings of an interval after which a function counts as not smooth
-MUCH = 1e3  # ratio of values that are not 0 to their error
+MUCH = 1e3  # a value this many times its error is not 0
 # Relative rounding error of the state's polynomials.
 STATE_ROUNDING = 2.0**-46
 _MOST_PIECES = 100_000  # intervals that are divided at the same time
@@ -86,7 +86,7 @@ class Solution:
     def values_and_noise(
         self, g: EventFunction, times: Array, states: Array | None = None, shift: float = _SHIFT
     ) -> tuple[Array, Array, Array]:
-        """Return a function's values, their errors (noise), and the part due to rounding."""
+        """Return a function's values, their errors (noise), and the errors due to rounding alone."""
         states = self.states(times) if states is None else states
         n, width = states.shape
         # One call with all arguments: the state at a later time, the state itself, and the state
@@ -159,7 +159,7 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
         if not is_done.all():
             near = np.flatnonzero(~is_done)
             noise = noise_of(g, solution, low[near], high[near])
-            # A function that is 0 in a part of the interval alone has a kink, which noise must not
+            # A function that is 0 only in a part of the interval has a kink, which noise must not
             # smooth: the ends of the part are events.
             is_zero = np.lib.stride_tricks.sliding_window_view(values[near] == 0.0, _RUN, axis=1)
             is_partly_zero = np.any(is_zero.all(axis=2), axis=1) & (largest[near] > 2.0 * noise)

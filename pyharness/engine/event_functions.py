@@ -54,8 +54,8 @@ class Event:
 class EventFunction:
     """A checked event.
 
-    Event number `limit`, from 1, ends the integration; if infinite, no event does. `is_vectorized`
-    says whether the function accepts arrays; None means unknown.
+    Event number `limit`, counted from 1, ends the integration; if infinite, no event does.
+    `is_vectorized` says whether the function accepts arrays; None means unknown.
     """
 
     name: str

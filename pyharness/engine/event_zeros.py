@@ -17,7 +17,7 @@ from pyharness.model.dense_output import sizes_of
 # A function reaches 0 by a kink or a jump, not by decay, if it exceeds _SUDDEN times its error at
 # a distance of _BEFORE times the length of the solution's polynomial.
 _SUDDEN, _BEFORE = 32.0, 0.01
-# Samples between two times at which a function is 0 if it is 0 throughout.
+# Fractions of an interval at which a function is sampled, to show that it is 0 throughout.
 _PARTS = np.array([0.1459, 0.382, 0.618, 0.8541, 1.0])
 
 
@@ -129,7 +129,8 @@ def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroInte
         fits.noise[unknown] = noise_of(g, solution, fits.low[unknown], fits.high[unknown])
     zero = near[sizes[near] <= 2.0 * fits.noise[near]]
     if zero.size:
-        # A jump beside an interval is a smaller part of a derivative over a longer distance.
+        # Over a longer distance, a jump beside an interval contributes less to a numerical
+        # derivative.
         again = noise_of(g, solution, fits.low[zero], fits.high[zero], LONG_SHIFT)
         fits.noise[zero] = np.minimum(fits.noise[zero], again)
     noise = 2.0 * fits.noise

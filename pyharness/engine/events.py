@@ -97,7 +97,7 @@ def _bisected(g: EventFunction, solution: Solution, times: Array, changes: Index
     while k.size:
         middle = 0.5 * low[k] + 0.5 * high[k]
         k, middle = (x[(middle > low[k]) & (middle < high[k])] for x in (k, middle))
-        # Of an interval of zeros, the root is the end that integration from time 0 reaches first.
+        # The root of an interval of zeros is the end that integration from time 0 reaches first.
         is_before = times[k] < 0.0
         values = solution.values(g, middle) * changes[k]
         is_late = (values > 0.0) | ((values == 0.0) & ~is_before)
@@ -145,7 +145,7 @@ def _grouped(roots: Roots, is_same: Index, ends: tuple[float, ...]) -> Roots:
 
 
 def _have_one_extremum(g: EventFunction, solution: Solution, roots: Roots, noise: Array) -> Index:
-    """Return which pairs of adjacent roots enclose one extremum, 0 to within `noise`."""
+    """Return which pairs of adjacent roots enclose one extremum that is 0 to within `noise`."""
     found: Index = np.zeros(len(noise), dtype=bool)
     widest = np.sqrt(8.0 * roots.near / np.abs(roots.curvature))
     # A distant root belongs to another extremum, however flat the function is here.
@@ -211,7 +211,7 @@ def side_events(g: EventFunction, solution: Solution, roots: Roots, side: int) -
 def _repeated(
     g: EventFunction, solution: Solution, times: Array, side: int, period: float
 ) -> Array:
-    """Return event times (s) on one side of 0, repeated periodically after the polynomials' end."""
+    """Return event times (s) on one side of 0, repeated periodically beyond the polynomials."""
     last, end = solution.pieces.edges[-1], solution.sol.t_max
     if side < 0:
         last, end = solution.pieces.edges[0], solution.sol.t_min

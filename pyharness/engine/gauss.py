@@ -1,4 +1,4 @@
-"""Methods with equal steps: Gauss collocation, and those of section III.2 of Jacobs 1982."""
+"""Methods with equal steps: Gauss collocation, and the methods of section III.2 of Jacobs 1982."""
 
 import math
 from collections.abc import Sequence
@@ -16,8 +16,8 @@ from pyharness.model.extension import COMPLETE, GAVE_UP, REFUSED, SENSITIVE, ext
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import ROUNDING, Array, Trajectory
 
-# Work limit: the right-hand sides of all trial integrations, some ten seconds. A wave of the torque
-# counts as half a right-hand side.
+# Work limit: evaluations of right-hand sides in all trial integrations, some ten seconds. A wave of
+# the torque counts as half an evaluation.
 _MOST_EVALUATIONS = 200_000_000
 _ORDER_THAT_SHOWS = 8  # highest order that the error estimate assumes
 # Shorter steps do not reduce a relative difference of two solutions below this limit.
@@ -40,9 +40,9 @@ def gauss(
     """Return the trajectory by Gauss collocation with 1 to 8 `stages`.
 
     The step is halved until the estimated relative error of omega meets the tolerance, or the last
-    two solutions differ only by rounding. The estimate is 2 d / (r**p - 1), with a safety factor 2.
-    Here d is the largest relative difference of the solutions, r, at most 2, the smallest ratio of
-    their numbers of steps between requested times, and p = min(2 `stages`, 8).
+    two solutions differ only by rounding. The estimate is 2 d / (r**p - 1), where 2 is a
+    safety factor, d the largest relative difference of these solutions, and p = min(2 `stages`, 8).
+    The ratio r, at most 2, is the smallest of their numbers of steps between requested times.
     """
     given, most = normalized(scene), effort * _MOST_EVALUATIONS / (1.0 + 0.5 * waves(scene))
     if times[-1] == 0.0:
@@ -60,7 +60,7 @@ def gauss(
     # The first step has at most half a radian of phase, and divides the shortest interval.
     step = max(1e-300, shortest / max(1.0, math.ceil(min(1e18, 2.0 * rate * shortest))))
     spent, reached = 0, 0.0
-    more = 1.0  # estimated steps of the final solution, over those of the next
+    more = 1.0  # ratio of estimated steps of the final solution to steps of the next
     pace = 2.0 * stages  # right-hand sides per step
     order = min(2 * stages, _ORDER_THAT_SHOWS)
     before: _Solution | None = None

@@ -1,4 +1,4 @@
-"""C code for Taylor series of many bodies, one per vector lane, in fortran/many/tape_lanes.c.
+"""C code for Taylor series of many bodies, one per vector lane, for fortran/many/tape_lanes.c.
 
 To save loads, sums of products for four successive terms begin together.
 """

@@ -1,6 +1,6 @@
 """Solution of many bodies in one call, side by side in the kernel and in threads.
 
-Results are bit for bit independent of other bodies, their order and threads.
+The result of a body is bit for bit independent of other bodies, their order and the threads.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -214,7 +214,7 @@ def solve_many(
             sensitivities=sensitivities, has_rows=rows is not None, **settings,
         )  # fmt: skip
     bodies, ends = scene, t_end
-    if rows is not None:  # a body for each body and time
+    if rows is not None:  # a copy of each body for each time
         if isinstance(scene, Scene):
             # Normalised twice, a quaternion may have another last bit.
             copies = checked_copies(arrays, as_given=True)

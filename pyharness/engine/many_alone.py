@@ -75,7 +75,7 @@ def solve_one_by_one(
     scene: Scene, t_end: Any, arrays: dict[str, Any], out: "Ensemble | Array | None", *,
     method: str, tolerance: float, effort: float, estimates: bool, threads: int, compiled: bool,
 ) -> Ensemble:  # fmt: skip
-    """Return the final states of bodies by prepared solvers; invalid bodies are REFUSED.
+    """Return final states of bodies by prepared solvers; invalid bodies have the status REFUSED.
 
     Raise InputError for a missing attitude, an unsuitable method, or a torque in space with
     coefficients.

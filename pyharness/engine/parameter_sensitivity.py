@@ -97,7 +97,7 @@ def checked_names(
 def sensitivities_at(
     scene: Scene, found: Trajectory, names: Sequence[str], effort: float, states: States
 ) -> dict[str, Array]:
-    """Return the derivatives of k unknowns at n times by m values, (n, k, m), for each parameter.
+    """Return, for each parameter, the derivatives of k unknowns at n times by m values, (n, k, m).
 
     `states` returns the unknowns of a changed scene. The tolerance is relative to the largest
     derivative by the same value so far.
@@ -116,7 +116,7 @@ def sensitivities_at(
         return {name: np.stack(each, 2) for name, each in slopes.items()}
     # Near the separatrix, a large error of omega would lead to the derivatives of another motion.
     tolerance = max(_FINEST, (found.tolerance or 1.0) / max(1.0, found.growth or 1.0))
-    # Closed forms alone take no evaluations.
+    # Only closed forms take no evaluations.
     is_closed = not found.evaluations and not attitude and set(names) <= _PERIODIC
     period = 0.0
     # A function of time that is 0 for these parameters may have derivatives that depend on time.

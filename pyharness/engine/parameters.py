@@ -24,7 +24,7 @@ from pyharness.model.torque_law import TorqueLaw, body_torque
 from pyharness.model.values import Matrix, Triple
 
 OMEGA, ATTITUDE = "omega", "attitude"
-TORQUE = "torque."  # prefix of the names of its parameters
+TORQUE = "torque."  # prefix of the names of torque parameters
 # The elements of an inertia matrix that are parameters, in this order.
 INERTIA_ELEMENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 

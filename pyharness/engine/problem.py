@@ -102,7 +102,8 @@ def rows_trajectory(
 def closed_form(scene: Scene) -> str | None:
     """Return the kind of closed form of a scene, or None.
 
-    ``sphere`` has A = B = C = 0, ``symmetric`` two equal moments, ``elliptic`` none.
+    A ``sphere`` has A = B = C = 0, a ``symmetric`` body two equal moments, an ``elliptic`` body
+    none.
     """
     law = scene.torque
     if not isinstance(law, TorqueLaw) or law.in_space or scene.changing is not None:

@@ -255,8 +255,8 @@ def packed_scene(
 ) -> Array:
     """Return a scene and its method's settings as one array, in the order of `Places`.
 
-    `leaves` is the address of compiled code for the torque; 0 if built with the package, or
-    missing.
+    `leaves` is the address of compiled code for the torque; 0 if this was built with the package,
+    or is missing.
     """
     if code == Methods.TAPE:
         tape = system_of(with_constant_body(scene))

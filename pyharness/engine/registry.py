@@ -85,7 +85,7 @@ def _no_rows(*given: object) -> Trajectory:
 
 
 def _from(room: str, name: str, *arguments: str | int) -> Integrator:
-    """Return a function that imports solver `name` at a call, and passes `arguments` first."""
+    """Return a function that imports solver `name` when called, and passes it `arguments` first."""
 
     def solve(*given: Any) -> Trajectory:
         solver = getattr(importlib.import_module(f"pyharness.engine.{room}"), name)
@@ -205,7 +205,7 @@ PREPARED_WITH_ATTITUDE = tuple(
 
 
 def requested_tolerance(method: str, tolerance: Number | None) -> float:
-    """Return the tolerance, its range unchecked, or the default of the method for None."""
+    """Return the tolerance, without a check of its range; for None, the method's default."""
     chosen = REGISTRY[method]
     return chosen.default if tolerance is None else tolerance_of(tolerance, chosen.finest)
 

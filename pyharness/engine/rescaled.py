@@ -33,7 +33,7 @@ _MULTIPLE = 16
 _SAMPLES = 9  # times at which a torque that depends on the state is evaluated
 # Omega (rad/s) up to which, and above whose inverse, products of components keep their digits.
 _LARGE = 2.0**300
-# Relative change of omega that a torque may cause whose numbers underflow in rescaled time.
+# Relative change of omega by terms of a torque that may underflow in rescaled time.
 _NEGLIGIBLE = 2.0**-60
 
 

@@ -51,8 +51,8 @@ _MOST_GUESSES = 200
 _NODES_PER_RADIAN = 4.0
 _FEWEST_NODES, _MOST_NODES = 30, 20_000
 
-# Work limit in right-hand sides, five to ten seconds. Each wave of a torque adds an eighth to the
-# work. Radau also solves linear systems.
+# Work limit in evaluations of right-hand sides, five to ten seconds. Each wave of a torque adds an
+# eighth to the work. Radau also solves linear systems.
 _MOST_EVALUATIONS = 500_000
 _RADAU_SHARE = 2
 

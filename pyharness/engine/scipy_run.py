@@ -56,8 +56,8 @@ class NoNumberError(Exception):
 class Run:
     """The integrations of one problem from 0 to `end` (s) by `solve_ivp`.
 
-    Together they may use `most` right-hand sides. The state begins with omega (rad/s). The phase
-    (rad) is `rate`, the largest Euler coefficient, times omega and time.
+    Together they may evaluate `most` right-hand sides. The state begins with omega (rad/s). The
+    phase (rad) is `rate`, the largest Euler coefficient, times omega and time.
     """
 
     def __init__(
@@ -211,7 +211,7 @@ def bounds_of(scene: Scene, end: float) -> list[float]:
 
 
 def series_beside(scene: Scene, times: Sequence[float], tolerance: float) -> Beside | None:
-    """Return states at `times` (s) by Taylor series; None if the last is not reached."""
+    """Return states by Taylor series at `times` (s), and spans; None if the last is not reached."""
     end, bounds = times[-1], bounds_of(scene, times[-1])
     attitude = scene.attitude is not None
     rows = [[*scene.omega, *(scene.attitude or ())]] if times[0] == 0.0 else []

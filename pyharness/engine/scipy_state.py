@@ -44,8 +44,8 @@ def solve_state(
     """Return the trajectory under a torque that depends on the state, by SciPy's method `name`.
 
     The estimated error at `times` (s) is at most `tolerance`. `most` is the work limit, in
-    torque-free right-hand sides. With `with_steps`, `sol` has SciPy's interpolants if the torque is
-    opaque.
+    evaluations of torque-free right-hand sides. With `with_steps`, `sol` has SciPy's interpolants
+    if the torque is opaque.
 
     The ending is ``overflow`` if omega grows without bound or the torque is singular, ``unchecked``
     if the Taylor series that checks a recorded torque ends early. Raise InputError if an opaque

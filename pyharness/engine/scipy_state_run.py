@@ -18,8 +18,8 @@ from pyharness.model.state_torque import StateTorque
 from pyharness.model.symbols import HAS_MEMORY
 from pyharness.model.trajectory import Array
 
-# The longest step is the time span over a number that grows with each integration, so that no two
-# integrations pass a short pulse or sample a wave alike.
+# The longest step is the time span divided by a number that grows with each integration, so that no
+# two integrations pass a short pulse or sample a wave alike.
 _FEWEST_STEPS, _MORE_STEPS = 32, 7
 _COARSE = 1e-3
 # As in scipy_ivp.py.
@@ -228,7 +228,7 @@ class StateRun(Run):
         return np.empty((0, len(self.start)))
 
     def steps(self, scene: Scene) -> DenseOutput | None:
-        """Return the last integration's steps as dense output; None for 0 or over 20 000."""
+        """Return the last integration's steps as dense output; None for no steps or over 20 000."""
         edges, values = [0.0], []
         for sol in self._solutions:
             for (first, last), step in zip(

@@ -43,11 +43,11 @@ def is_sensitive(growth: float | None, tolerance: float, noise: float = 0.0) -> 
 def torque_noise(
     scene: Scene, omega0: Triple, t_end: float, steps: float = math.inf, scale: float | None = None
 ) -> float:
-    """Return the rounding error of nearly cancelling torque terms, relative to omega's.
+    """Return the rounding error of nearly cancelling torque terms, divided by omega's.
 
-    It is the |omega| that the terms cause one by one until `t_end` (s), rounded in each of `steps`
-    steps, divided by `scale` (rad/s). The default scale is the larger of the initial |omega| and
-    the omega that the whole torque causes. The result is 0 if no terms nearly cancel.
+    It is the |omega| that the single terms would cause until `t_end` (s), rounded in each of
+    `steps` steps, divided by `scale` (rad/s). The default scale is the larger of the initial
+    |omega| and the omega that the whole torque causes. The result is 0 if no terms nearly cancel.
     """
     if isinstance(scene.torque, StateTorque) or not (scene.law.sines or scene.law.cosines):
         return 0.0
@@ -59,7 +59,7 @@ def torque_noise(
 
 
 def growth_of_rounding(scene: Scene, growth: float | None) -> float | None:
-    """Return a closed form's amplification of rounding errors, from `growth`."""
+    """Return a closed form's amplification of rounding errors; `growth` is the motion's."""
     if growth is None or growth >= _NEGLIGIBLE_TO or isinstance(scene, PrincipalScene):
         return growth
     return 1.0
@@ -70,8 +70,8 @@ def closed_form_estimate(
 ) -> tuple[float | None, float | None]:
     """Return a closed form's estimated error at `t_end` (s), and the error amplification.
 
-    The error is the larger of omega's, relative to the largest |omega| so far, and the attitude's
-    (rad).
+    The error is the larger of the error of omega, relative to the largest |omega| so far, and the
+    error of the attitude (rad).
     """
     growth: float | None = 1.0
     # A sphere does not amplify perturbations.

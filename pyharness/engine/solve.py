@@ -53,8 +53,8 @@ from pyharness.model.values import (
 from pyharness.model.waves import with_merged_waves
 
 _OF_DIFFERENCES = 1e-13  # tolerance of solutions whose differences are derivatives
-# Radians until the first time at which a terminal event is expected, and for SciPy's methods, which
-# are slow; and the ratio of such times.
+# Phase (rad) at the end of the first trial integration to a terminal event, by our methods and by
+# SciPy's, which are slow; and the ratio of the end times of successive trials.
 _PHASES, _LONGER = (200.0, 10.0), 4.0
 
 
@@ -120,10 +120,10 @@ def solve(
     ------
     InputError
         If the method is unknown, or can't solve the scene or its attitude; if the torque needs the
-        attitude, and `attitude` is false; if the times are not in order; if a changing moment
-        reaches 0; if the tolerance can't be met within `effort`; if dense output needs too many
-        polynomials; if the function of an event has wrong arguments or results; or if sensitivities
-        can't be computed.
+        attitude, and `attitude` is false; if the times are not in order; if a changing moment of
+        inertia reaches 0; if the tolerance can't be met within `effort`; if dense output needs too
+        many polynomials; if the function of an event has wrong arguments or results; or if
+        sensitivities can't be computed.
     NotBuiltError
         If the method needs the extension, and it is not built.
 

@@ -159,8 +159,8 @@ class Solver(BoundKernel[Result]):
         and `t_end` (s), a number or of shape (n,). It returns omega (rad/s), shape (n, 3), in the
         array `out` if given, and the statuses of `Ensemble`, int8, shape (n,). A row depends on no
         other row, nor on `threads`, but may differ by rounding from a single call's result. Invalid
-        arguments raise an InputError; a body with a moment that reaches 0 before `t_end` has the
-        status `refused`.
+        arguments raise an InputError; a body with a moment of inertia that reaches 0 before `t_end`
+        has the status `refused`.
 
         For a solver with attitude, it is ``solver.many(omega, t_end, attitude=None, threads=1,
         out=None)`` with quaternions of shape (n, 4) or (4,), and returns omega, attitudes and
@@ -232,7 +232,7 @@ class Solver(BoundKernel[Result]):
 
     @property
     def steps(self) -> int:
-        """Return the last call's number of steps; for Gauss collocation, of right-hand sides."""
+        """Return the last call's number of steps; Gauss collocation counts evaluations instead."""
         return 0 if self._ending is None else abs(self._ending[1])
 
     def _judge(self) -> tuple[str, float | None, float | None]:
@@ -316,8 +316,8 @@ def prepare(
     InputError
         If the method is unknown, or can't solve the scene or its attitude; if the torque needs the
         attitude, and `attitude` is false; or if the tolerance or effort is out of range. A call
-        raises it if a changing moment reaches 0; for a moment given by a function, the status is
-        `overflow` instead.
+        raises it if a changing moment of inertia reaches 0; for one given by a function, the status
+        is `overflow` instead.
     NotBuiltError
         If the extension is not built.
 

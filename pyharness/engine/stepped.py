@@ -33,7 +33,7 @@ def steps_to(
 def step_lengths(
     scene: Scene, attitude: bool, end: float, tolerance: float, bounds: Sequence[float]
 ) -> dict[float, float]:
-    """Return each step's length (s) by its end (s), except of steps that end at `bounds`."""
+    """Return each step's length (s) by its end (s), without steps that end at `bounds`."""
     cuts = frozenset(bounds)
     return {
         stepper.time: abs(stepper.time - before)

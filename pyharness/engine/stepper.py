@@ -25,7 +25,7 @@ from pyharness.model.values import boolean, finite, number, three_floats, tolera
 
 FINEST = 1e-14  # smallest tolerance of a step
 _DEFAULT = 1e-9
-_MOST, _LOOK = 1e8, 100_000  # steps of `until`, and steps between forecasts
+_MOST, _LOOK = 1e8, 100_000  # most steps of `until`, and steps between its forecasts
 
 
 class Stepper:
@@ -188,7 +188,7 @@ class Stepper:
 
     @property
     def held_torque(self) -> Array:
-        """The torque added to the scene's, about the body axes (N m or rad/s2), shape (3,)."""
+        """The torque added to the torque of the scene (N m or rad/s2), shape (3,)."""
         return _copy_fixed(self._state[-3:])
 
     @held_torque.setter

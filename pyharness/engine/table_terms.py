@@ -1,6 +1,6 @@
 """Torque terms given by tables over time, and pulses, about the body axes.
 
-Taylor series begin a step where a table changes, and remain accurate.
+Taylor series begin a new step where a table changes, and so remain accurate.
 """
 
 import math
@@ -273,7 +273,7 @@ def _other_number(where: str, what: str, given: int, wanted: int) -> InputError:
 
 
 def _before(first: float, second: float) -> float:
-    """Return the start of a piece before `first`, as long as the next piece."""
+    """Return the start of a piece that ends at `first` and has the length of the next piece."""
     return min(2.0 * first - second, math.nextafter(first, -math.inf))
 
 

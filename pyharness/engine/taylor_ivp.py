@@ -33,8 +33,8 @@ _LEAST_SCALE = 2.0**-1000
 _FIRST_CHANGE = 0.01
 _MOST_GROWTH = 10.0
 # An event at a switch is 0 there, but for rounding, which hides its sign until a short step later.
-_AFTER_SWITCH = 0.01  # over the step that ended at the switch
-_FIRST_PARTS = 1e-12, 1e-2  # least and largest first step, over the step that the tolerances allow
+_AFTER_SWITCH = 0.01  # times the step that ended at the switch
+_FIRST_PARTS = 1e-12, 1e-2  # least and largest first step, in steps that the tolerances allow
 
 
 class Taylor(OdeSolver):  # type: ignore[misc]

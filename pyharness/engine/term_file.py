@@ -82,7 +82,7 @@ def _term(table: object, where: str, body: dict[str, Any]) -> StateTorque:
 
 
 def _argument(where: str, value: object, key: str, frame: str | None) -> object:
-    """Return a term's argument; with a `frame`, a table becomes a law about its axes."""
+    """Return a term's argument; a table becomes a law about the axes of `frame`, if given."""
     if key == "per_axis":
         return boolean(where, value)
     if frame is None:

@@ -86,7 +86,7 @@ class Solution:
     def values_and_noise(
         self, g: EventFunction, times: Array, states: Array | None = None, shift: float = _SHIFT
     ) -> tuple[Array, Array, Array]:
-        """Return a function's values, their errors (noise), and the errors due to rounding alone."""
+        """Return a function's values, their errors (noise), and errors due to rounding alone."""
         states = self.states(times) if states is None else states
         n, width = states.shape
         # One call with all arguments: the state at a later time, the state itself, and the state

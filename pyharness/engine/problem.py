@@ -102,8 +102,8 @@ def rows_trajectory(
 def closed_form(scene: Scene) -> str | None:
     """Return the kind of closed form of a scene, or None.
 
-    A ``sphere`` has A = B = C = 0, a ``symmetric`` body two equal moments, an ``elliptic`` body
-    none.
+    ``sphere`` has A = B = C = 0, ``symmetric`` two equal moments, ``elliptic`` three different
+    ones.
     """
     law = scene.torque
     if not isinstance(law, TorqueLaw) or law.in_space or scene.changing is not None:

@@ -86,7 +86,7 @@ def _drift_in_space(scene: Scene, trajectory: Trajectory) -> float:
 
 
 def _scaled(vector: Array) -> Array:
-    """Return a vector times a power of 2, less than 1 in magnitude: no square overflows."""
+    """Return a vector times a power of 2, less than 1 in magnitude, so that no square overflows."""
     return np.asarray(np.ldexp(vector, -_exponent(vector)))
 
 
@@ -103,7 +103,7 @@ def distance(first: Trajectory, second: Trajectory) -> float:
 
 
 def differences(first: Trajectory, second: Trajectory) -> list[str]:
-    """Return the names of differing counts and endings or, without any, of differing arrays."""
+    """Return the names of counts and endings that differ or, if none do, of arrays that differ."""
     names = {"steps": "steps", "evaluations": "evaluations", "ended": "ending", "stop": "stop"}
     found = [told for name, told in names.items() if getattr(first, name) != getattr(second, name)]
     if found:

@@ -33,7 +33,7 @@ _EFFORT = 1e9  # factor on the work limit; so large because the caller requested
 
 @dataclass(frozen=True)
 class Solver:
-    """The method or program of the thesis that solves a batch; the other field is None.
+    """The method or program of the thesis that solves a batch; one of the two is None.
 
     `t_end` (s) is by default the step size times the number of steps. The fields from `listing` to
     `may_stop` are for programs; `lipschitz` (1/s) is the limit of their stop test.
@@ -135,7 +135,7 @@ class Batch:
     def attitudes(self, samples: int) -> Array:
         """Return quaternions at the ends of `samples` equal parts, shape (n, samples, 4).
 
-        They are scalar first, and rotate from the body's axes to those at time 0.
+        They are scalar first, and rotate from the body's axes to its axes at time 0.
         """
         ends = [each.attitude for each in self._samples(samples) if each.attitude is not None]
         found = np.stack(ends, axis=1)
@@ -213,7 +213,7 @@ class Batch:
         return self._solve(method, tolerance, t_end, **more)
 
     def _solve(self, method: str, tolerance: float, t_end: Array, **more: Any) -> Ensemble:
-        """Return the states at `t_end` (s), scene by scene if no kernel solves many bodies."""
+        """Return the states at `t_end` (s), scene by scene if the method has no kernel for many."""
         by_state = isinstance(self.scene.torque, StateTorque)
         tolerance = max(tolerance, REGISTRY[method].finest)
         if method not in (PREPARED_FOR_STATE if by_state else PREPARED):

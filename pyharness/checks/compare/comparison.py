@@ -1,7 +1,7 @@
 """Comparisons of programs (original and corrected) and methods on one scene.
 
-Errors (rad/s) below the reference's own have no meaning. Differences between Fortran and Python are
-in units in the last place.
+Errors (rad/s) below the error of the reference have no meaning. Differences between Fortran and
+Python are in units in the last place.
 """
 
 import itertools
@@ -71,8 +71,8 @@ def compare_programs(
     may_stop : bool
         Whether the stop test may end a run.
     tolerance : float, optional
-        The tolerance of each method of `solve_ivp`, relative to the largest component of omega; by
-        default that of `solve`.
+        The tolerance of each method of `solve_ivp`, relative to the largest component of omega; the
+        default is as in `solve`.
     effort : float
         Factor on the work limits of the programs, the methods and the reference.
     attitude : bool
@@ -194,8 +194,8 @@ def compare_methods(
     methods : sequence of str
         Names in `pyharness.engine.registry.METHODS`.
     tolerance : float, optional
-        The tolerance of each method, relative to the largest component of omega; by default that of
-        `solve`. Methods with a fixed step ignore it.
+        The tolerance of each method, relative to the largest component of omega; the default is as
+        in `solve`. Methods with a fixed step ignore it.
     effort : float
         Factor on the work limits of the methods and the reference.
     attitude : bool

@@ -69,7 +69,7 @@ class Comparison:
     programs : tuple of ProgramFinding
         One for each listing.
     methods : tuple of MethodFinding
-        One for each method: SciPy's, or those requested.
+        One for each of SciPy's methods, or of the requested methods.
     growth : float or None
         The error amplification, if known: the largest norm of the state-transition matrix of omega
         from any time to the last.
@@ -114,8 +114,8 @@ class Comparison:
         """Return a sentence for each unexpected result.
 
         For programs, these are differences between Fortran and Python, and a missed order; for
-        methods alone, errors above the limit from the tolerance, missing times, and no result at
-        all.
+        methods alone, errors above the limit that follows from the tolerance, missing times, and no
+        result at all.
         """
         found = [] if self.programs else [*filter(None, map(self._excess, self.methods))]
         if not self.programs and all(each.trajectory is None for each in self.methods):

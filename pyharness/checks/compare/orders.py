@@ -74,7 +74,7 @@ class Order:
 
 
 class _SingularError(Exception):
-    """A run failed, perhaps because its matrix is singular."""
+    """A run failed, perhaps because its collocation matrix is singular."""
 
 
 def measured_order(
@@ -117,10 +117,10 @@ def order_of(
 ) -> Order:
     """Return the order of a numerical solution, measured by halving the step size.
 
-    `solution` returns `quantity` after each step, shape (n, 3), fewer after an overflow. The
-    measurement ends when `pairs` successive orders are all at least `due` - 0.5 or all smaller, or
-    the error is only rounding. A run has at most `most_steps` steps, by default 2**18 or, if more,
-    those of eight halvings.
+    `solution` returns `quantity` after each step, shape (n, 3), with fewer rows after an overflow.
+    The measurement ends when `pairs` successive orders are all at least `due` - 0.5 or all smaller,
+    or the error is only rounding. A run has at most `most_steps` steps, by default 2**18 or, if
+    more, those of eight halvings.
     """
     n = len(truth.time)
     if n < scene.steps:

@@ -1,6 +1,6 @@
 """Known faults of integrators, each with the motion that a faulty integrator computes.
 
-The motion is computed from a changed scene, or by changing the right states. An integrator that
+The motion is computed from a changed scene, or by changing the true states. An integrator that
 converges to it has the fault.
 """
 
@@ -36,7 +36,7 @@ class Fault:
 
     `scene` returns the scene that the faulty integrator solves, or None if the fault has no effect.
     `times` returns the times (s) of its states, from the requested times and the step size (s).
-    `state` then changes the states; its second argument is the right scene. If `of_step`, the
+    `state` then changes the states; its second argument is the unchanged scene. If `of_step`, the
     states approach the true ones as the step decreases.
     """
 
@@ -227,7 +227,7 @@ FAULTS = (
 """The known faults; faults of omega are first."""
 
 OUTPUTS = ("quaternion-transposed", "scalar-last", "attitude-from-identity")
-"""The faults of the attitude alone, whose `state` changes any states."""
+"""The faults of the attitude alone, whose `state` can change any states."""
 
 
 def motions(scene: Scene, times: Array, step: float) -> Iterator[tuple[Fault, State]]:

@@ -93,7 +93,7 @@ def judge_integrator(
 
     `chosen` are random scenes; `due` is the required order of convergence. ``again(name)`` returns
     the command that repeats a scene's checks. `told` receives the number of finished problems and
-    the next one's name. An invalid answer ends the checks.
+    the name of the next. An invalid answer ends the checks.
     """
     found = Verdict(command, again)
     where = "start"

@@ -169,7 +169,7 @@ class Convergence:
         return self.order is None or self.order >= _ORDER_ONE
 
     def predicted(self, level: int) -> float:
-        """Return a level's error, extrapolated from the next by the order."""
+        """Return a level's error, extrapolated from the error of the next level by the order."""
         ratio = self.settings[level] / self.settings[level + 1]
         return self.errors[level + 1] * math.pow(ratio, self.order or 0.0)
 
@@ -179,8 +179,9 @@ def convergence(
 ) -> Convergence:
     """Return a part's errors and their order of convergence, measured above `floor`.
 
-    The order is measured between the last two settings. If `overall`, for tolerances, with which
-    errors decrease irregularly, it is the smaller of the orders over all and over the last four.
+    The order is measured between the last two settings. With tolerances, errors decrease
+    irregularly; then `overall` requests the smaller of the orders over all and over the last four
+    settings.
     """
     seen = [k for k in range(1, len(errors)) if not errors[k] <= floor]
     order = None
@@ -248,7 +249,7 @@ def problems(seed: str, draws: int, names: Sequence[str] = ()) -> list[Problem]:
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """The drifts since time 0 at n `times` (s), and the largest `change` between successive times.
+    """The drifts since time 0 at n `times` (s), and the largest `change` of any from time to time.
 
     `named` has the drifts, shape (n,), of "energy", "momentum" and, with an attitude, "direction".
     """

@@ -26,9 +26,9 @@ class Motion:
     """An integrator's states at the requested times, or its refusal.
 
     `omega` (rad/s) is about the body axes, shape (n, 3). `attitude` is from body to space, scalar
-    first, normalised, shape (n, 4); before, its norm deviated from 1 by at most `norm`. `control`
-    is the request's field that sets the accuracy; `rounding` is the relative rounding error of the
-    arithmetic.
+    first, normalised, shape (n, 4); before normalisation, its norm deviated from 1 by at most
+    `norm`. `control` is the request's field that sets the accuracy; `rounding` is the relative
+    rounding error of the arithmetic.
     """
 
     omega: Array
@@ -60,7 +60,7 @@ def request(scene: Scene, times: Sequence[float], step_size: float, tolerance: f
 
 
 Ask = Callable[[bytes, int], Motion]
-"""A function that sends a request for as many states as the number, and returns the answer."""
+"""A function that sends a request for a number of states, and returns the answer."""
 
 
 def asking_of(process: PortProcess) -> Ask:

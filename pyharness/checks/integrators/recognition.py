@@ -57,14 +57,14 @@ def recognised(results: Sequence[Judged]) -> list[Finding]:
 
 
 def _explained(judged: Judged) -> list[str]:
-    """Return a fault that explains all errors, else one of omega with those of the output."""
+    """Return a fault that explains all errors, else a fault of omega and faults of the output."""
     true = judged.convergences
     if judged.lost or all(each.is_higher for each in true):
         return []
     converges = all(each.converges for each in true)
     if converges and judged.finest.control == "tolerance":
         return []
-    # Other faults' motions do not converge to the true one.
+    # Motions of other faults do not converge to the true motion.
     known = [(f, state) for f, state in judged.problem.faulty if f.of_step or not converges]
     both = _best(judged, known, range(len(true)))
     if both is not None:

@@ -45,7 +45,8 @@ _FLIPS = 5
 
 def quarter(disturbance: float) -> float:
     """Return a quarter of the period (s) of the motion from omega = (`disturbance`, 1, 0) rad/s."""
-    # The complete elliptic integral K(k) over the frequency, by the arithmetic-geometric mean.
+    # The complete elliptic integral K(k) divided by the frequency, by the arithmetic-geometric
+    # mean.
     mean, other = math.sqrt(_A * _A + _A * _B * disturbance**2), math.sqrt(_A * _B) * disturbance
     while mean - other > 1e-9 * mean:
         mean, other = 0.5 * (mean + other), math.sqrt(mean * other)

@@ -16,7 +16,7 @@ from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw
 
 COARSEST = 1e-3
-# Defects that are drawn after all others, so that a seed keeps its draws.
+# Defects that are drawn after all others, so that a seed still gives the same draws.
 _LATER = ("three-masses",)
 _LIPSCHITZ = (500.0, 60.0, 1.0, 1e-3)
 MODERATE = ("free", "constant", "wave")

@@ -66,7 +66,7 @@ class Amplification:
     def moving(self) -> "Amplification":
         """Return the matrix without the row and column of the step's result.
 
-        It is returned whole if the old result affects more than the new one.
+        The whole matrix is returned if the old result affects more than the new one.
         """
         column = self.coefficients[:, -1]
         if self.size > 1 and not column[:-1].any() and not column[-1, 1:].any():
@@ -150,10 +150,10 @@ def _polynomial_text(coefficients: Fractions) -> str:
 
 
 def boundary(matrix: Amplification, direction: complex) -> tuple[float, float]:
-    """Return the distance of the stability boundary from z = 0, and the slope there.
+    """Return the distance of the stability boundary from z = 0, and a slope there.
 
-    `direction` is -1 (negative real axis) or 1j (imaginary axis). The slope is that of the spectral
-    radius just beyond the boundary. Return (0, 1) if perturbations grow at a distance of 1/16.
+    `direction` is -1 (negative real axis) or 1j (imaginary axis). The spectral radius has
+    this slope just beyond the boundary. Return (0, 1) if perturbations grow at a distance of 1/16.
     """
 
     def grows(distance: float) -> bool:

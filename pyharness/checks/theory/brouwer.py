@@ -59,11 +59,11 @@ class Orbit:
     slopes: Array
     jacobians: Array
     largest: float  # largest abs(omega), rad/s
-    frequency: float  # of the motion about the polhode: 2 pi over the period (rad/s)
-    # Largest factors from an error of omega, over `largest`, to the errors of energy and momentum
-    # (both relative) and of the frequency (rad/s).
+    frequency: float  # of the motion about the polhode: 2 pi divided by the period (rad/s)
+    # Largest factors from an error of omega, divided by `largest`, to the errors of energy and
+    # momentum (both relative) and of the frequency (rad/s).
     gains: dict[str, float]
-    turn: float  # largest factor from an error of omega, over `largest`, to a phase error (rad)
+    turn: float  # largest factor from such an error of omega to a phase error (rad)
 
     def limits(self, noise: Noise, steps: float) -> dict[str, float]:
         """Return bounds after `steps` steps: "energy", "momentum" (relative), "phase" (rad)."""
@@ -114,7 +114,7 @@ def floats(rows: Sequence[Sequence[Decimal]]) -> Array:
 
 
 def taylor_noise(body: Orbit, scene: Scene, step: float, order: int, left_out: float) -> Noise:
-    """Return error bounds of a Taylor step (s), by running error analysis.
+    """Return bounds on the errors of a Taylor step (s), by running error analysis.
 
     `left_out` is the truncation error relative to the largest omega.
     """
@@ -135,7 +135,7 @@ def taylor_noise(body: Orbit, scene: Scene, step: float, order: int, left_out: f
 
 
 def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
-    """Return error bounds of a step (s) of Gauss collocation."""
+    """Return bounds on rounding and truncation errors of a step (s) of Gauss collocation."""
     from pyharness.checks.theory.tableau import tableau
 
     matrix = tableau("collocation", stages, "gauss").matrix
@@ -143,19 +143,19 @@ def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
     stiffness = float(np.abs(body.jacobians).sum(axis=2).max())
     spread = float(np.abs(matrix).sum(axis=1).max())
     eye = np.eye(3 * stages)
-    # With s stages and a step h, the sum at each node has s + 3 roundings of the right-hand sides
-    # and one of omega. Its error is multiplied by the inverse of 1 - h A J, where A is the
-    # tableau's matrix and J the Jacobian.
+    # With s stages and a step h, the sum that gives omega at a node has s + 3 roundings of the
+    # right-hand sides and one of omega. Its error is multiplied by the inverse of 1 - h A J, where
+    # A is the tableau's matrix and J the Jacobian.
     inverses = [np.linalg.inv(eye - step * np.kron(matrix, each)) for each in body.jacobians[::8]]
     resolvent = max(float(np.abs(each).sum(axis=1).max()) for each in inverses)
     state = body.largest
     at_node = step * spread * ((stages + 3.0) * rate + stiffness * state) * resolvent
     total = step * ((stages + 4.0) * rate + stiffness * (state + at_node))
     # The truncation error is the integral of the state-transition matrix times the residual, which
-    # is zero at the nodes, the zeros of an orthogonal polynomial. In the Taylor series of the
-    # integrand over this polynomial, only the power s of time contributes. By Leibniz's rule its
-    # coefficient is a sum over j of multiples of (h J)**j / j! times the Taylor term 2s + 1 - j of
-    # omega.
+    # is zero at the nodes, the zeros of an orthogonal polynomial. Divide the integrand by this
+    # polynomial. In the Taylor series of the quotient, powers of time below s contribute nothing;
+    # the power s is retained. By Leibniz's rule its coefficient is a sum over j of multiples of (h
+    # J)**j / j! times the Taylor term 2s + 1 - j of omega.
     factor = math.factorial(stages) ** 4 / math.factorial(2 * stages) ** 2 / (2 * stages + 1)
     terms = [float(np.abs(each).max()) for each in _terms(body, scene, step, 2 * stages + 1)]
     left_out = factor * sum(
@@ -209,13 +209,13 @@ def root_mean_square(found: Array) -> Array:
 
 
 def exponent(steps: Sequence[float] | Array, found: Array) -> float:
-    """Return the p of error ~ steps**p by least squares; column j of `found` is after steps[j]."""
+    """Return p in error ~ steps**p by least squares; column j of `found` has errors at steps[j]."""
     size = np.log(np.maximum(root_mean_square(found), 1e-300))
     return float(np.polyfit(np.log(np.asarray(steps)), size, 1)[0])
 
 
 def _frequency(a: Array, omega: Array) -> float:
-    """Return 2 pi over the period of torque-free omega (rad/s)."""
+    """Return 2 pi divided by the period of torque-free omega (rad/s)."""
     (odd,) = (i for i in range(3) if a[i] * a[i - 1] < 0.0 and a[i] * a[i - 2] < 0.0)
     squares = [abs(a[i - 1] * a[i - 2]) * omega[i] * omega[i] for i in range(3)]
     small, large = sorted((squares[odd - 1], squares[odd - 2]))

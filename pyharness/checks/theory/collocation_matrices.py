@@ -106,7 +106,8 @@ class Solved:
     residual: float = math.nan
     forward: float = math.nan
     increment: float = math.nan
-    # Error of the increment, over the step size times the largest element of the right-hand side.
+    # Error of the increment, divided by the step size times the largest element of the right-hand
+    # side.
     increment_error: float = math.nan
     yardstick: float = math.nan  # `forward` for `numpy.linalg.solve` instead of LEQT1F
 
@@ -275,8 +276,8 @@ def _columns(
     matrix: Fractions, order: Sequence[int] | None = None
 ) -> Iterator[tuple[int, dict[int, Fraction], Fractions]]:
     """Eliminate exactly; before each column, yield the pivot's row, scaled candidates, and rows."""
-    # A candidate is an element's magnitude over the largest in its row of `matrix`. `order` has the
-    # pivots' rows; by default the largest candidate is the pivot, as in LEQT1F.
+    # A candidate is an element's magnitude divided by the largest in its row of `matrix`. `order`
+    # has the pivots' rows; by default the largest candidate is the pivot, as in LEQT1F.
     rows = matrix.copy()
     scale = 1 / abs(matrix).max(axis=1)
     left = list(range(len(rows)))

@@ -59,22 +59,22 @@ class Conditioning:
 
     # Largest factor, at least 1, from an error of omega at any time to the error at the end.
     amplification: float
-    # Final error over `largest` if every term of the right-hand side, the initial omega and the
-    # result are wrong by a few roundings, in the worst direction.
+    # Final error, divided by `largest`, if every term of the right-hand side, the initial omega and
+    # the result are wrong by a few roundings, in the worst direction.
     rounding: float
-    storing: float  # final error over `largest` from each step that rounds omega
-    # Sum of the terms' rounding errors over `largest`, without amplification.
+    storing: float  # final error, divided by `largest`, from each step that rounds omega
+    # Sum of the terms' rounding errors, divided by `largest`, without amplification.
     unamplified: float
     largest: float  # largest abs(omega) until the end (rad/s)
 
     def limit(self, made: float, steps: float = 0.0) -> float:
-        """Return the largest error of omega at the end, relative to `largest`; at most 2."""
+        """Return the largest allowed final error of omega, relative to `largest`; at most 2."""
         allowed = made * self.amplification + self.rounding + steps * self.storing
         # NaN allows no error.
         return 0.0 if math.isnan(allowed) else min(2.0, allowed)
 
     def angle_limit(self, made: float, time: float) -> float:
-        """Return the largest error of an attitude at `time` (s), in rad."""
+        """Return the largest allowed error (rad) of an attitude at `time` (s)."""
         turned = self.rounding * (1.0 + math.sqrt(3.0) * self.largest * abs(time))
         return made + turned + ATTITUDE
 
@@ -119,7 +119,7 @@ def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
 def sampled(
     sample: Callable[[Array], tuple[float, _Sample]], time: float, fewest: int, most: int
 ) -> tuple[Array, _Sample]:
-    """Return equally spaced times (s), close enough for the rates, and their results.
+    """Return equally spaced times (s), close enough for the rates, and the results of `sample`.
 
     `sample` takes times up to `time`, and returns the largest rate (1/s) and the results. It is
     first called with `fewest` intervals, finally with at most `most`.
@@ -129,7 +129,7 @@ def sampled(
         times = np.linspace(0.0, time, count + 1)
         rate, found = sample(times)
         wanted = rate * abs(time) * _NODES_PER_RADIAN
-        # NaN where the torque is singular, or very large numbers have no product.
+        # NaN where the torque is singular, or a product overflows.
         if not wanted <= most:
             raise InputError(
                 "conditioning: the motion is too fast for so long a time; use a shorter time"
@@ -191,9 +191,9 @@ _OF_ANGLE = 0.5
 def conditioning_at(scene: Scene, times: Sequence[float]) -> Conditioning:
     """Return the sensitivity of a scene's solution at `times` (s) to earlier errors.
 
-    Under a torque law, return that of the last time; under other torques, where damping may reduce
-    errors, the largest. Raise InputError as `conditioning` does, or if the torque can't be
-    recorded.
+    Under a torque law, this is the sensitivity at the last time; under other torques, where damping
+    may reduce errors, the largest at any of the times. Raise InputError as `conditioning` does, or
+    if the torque can't be recorded.
     """
     if not isinstance(scene.torque, StateTorque):
         return conditioning(scene, times[-1])

@@ -34,7 +34,7 @@ def flip_times(moments: ArrayLike, omega0: ArrayLike) -> Array:
     lower = np.sqrt(np.abs(about1 - about3)) * np.sqrt(about1 + about3)
     turns = (lower > 0.0) & ((w2 > 0.0) | ((w1 > 0.0) & (w3 > 0.0)))
     with np.errstate(divide="ignore", invalid="ignore"):
-        # Half the period is pi over the arithmetic-geometric mean of two rates (1/s).
+        # Half the period is pi divided by the arithmetic-geometric mean of two rates (1/s).
         return np.where(turns, np.pi / mean(upper, lower), np.inf)
 
 

@@ -72,7 +72,7 @@ class SteadyRotations:
 
 
 def steady_rotations(scene: Scene, disturbance: float) -> SteadyRotations:
-    """Return a scene's steady rotations; `disturbance` is the perturbation over the rotation."""
+    """Return a scene's steady rotations; `disturbance` is the relative perturbation."""
     if scene.body_torque.varies:
         raise InputError(
             "rotations: the torque varies with time, so that no rotation is steady; "
@@ -173,7 +173,7 @@ def _phase(coefficients: Sequence[float], rate: float, share: float) -> float | 
     """Return the time (s) when the phase error about a stable axis reaches 0.1 rad."""
     # `coefficients` are in cyclic order from the axis; `rate` is the frequency (rad/s) by linear
     # theory. A tilt by `share` (rad) towards another axis changes the frequency by the fraction
-    # `share`**2 / 4 times the first coefficient over that of the other axis.
+    # `share`**2 / 4 times the ratio of the first coefficient to the other axis's.
     spun, *others = map(abs, coefficients)
     if spun != 0.0 and rate == 0.0:
         return None  # only the spin drifts
@@ -240,7 +240,7 @@ def _axes(coefficients: Triple, spin: float) -> tuple[str, Places]:
 
 def _hyperbola(coefficients: Triple, product: float, held: int) -> tuple[str, Places]:
     """Return a text on one branch and its points, for a torque about the axis `held` (from 0)."""
-    # `product` is that of the other components (rad2/s2). The other branch is opposite.
+    # `product` is the product of the other two components (rad2/s2). The other branch is opposite.
     one, other = (held + 1) % 3, (held + 2) % 3
     told = (
         f"torque about axis {held + 1}: the hyperbola w{one + 1} w{other + 1} = {product:.6g}, "

@@ -130,8 +130,8 @@ _POINTS = 181
 def rotations_picture(scene: Scene) -> Picture:
     """Return the picture of a scene's polhodes and of the growth rates of all bodies.
 
-    The scene must have moments. The right panel shows the growth rate about the middle axis over
-    the spin.
+    The scene must have moments. The right panel shows the growth rate about the middle axis,
+    divided by the spin.
     """
     from matplotlib.figure import Figure
 

@@ -1,4 +1,4 @@
-"""Trial of torque-free attitude: separatrix, symmetry, 1e6 revolutions, poles of Euler angles."""
+"""Trial of torque-free attitudes: near a separatrix, over 1e6 revolutions, near angle poles."""
 
 import math
 import random

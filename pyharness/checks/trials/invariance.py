@@ -1,4 +1,4 @@
-"""Trial of invariance: results must transform with a rotated or rescaled problem.
+"""Trial of invariance: rotating or rescaling a problem must rotate or rescale its results.
 
 Methods whose operations differ only in axes, signs or exponents must return equal bits; the rest
 must agree within an error bound.

@@ -30,7 +30,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 from pyharness.truth.elliptic import torque_free
 
-# A revolution takes the time 2 pi over the largest component of omega.
+# A revolution takes the time 2 pi divided by the largest component of omega.
 REVOLUTIONS = tuple(10.0 ** (k / 2.0) for k in range(2, 13))
 MOTIONS = {
     # Case 4: fast precession about the axis of the spin.
@@ -49,7 +49,7 @@ _HALFWAY = 0.25
 # Largest phase error (rad) that is measured accurately.
 _LOST = 0.1
 
-# Bound on the last two terms of the Taylor series at the finest tolerance, over omega.
+# Bound on the last two terms of the Taylor series at the finest tolerance, relative to omega.
 _LEFT_OUT = Series.SLACK * Series.LEAST_LOCAL_TOLERANCE
 # Step size by number of stages, in radians of the fastest rate. With 8 stages the truncation error
 # is far below rounding; with 4 stages it dominates the phase error, but must not change the energy.
@@ -70,8 +70,8 @@ class Integrator:
     """A method whose error growth is measured.
 
     `run` returns omega, shape (n, 3), and the number of steps until each time; `noise` bounds the
-    errors of a step of given size (s). `revolutions` is the length of the first run, `others` that
-    of runs from other initial conditions. `preference` means biased rounding.
+    errors of a step of given size (s). `revolutions` is the length of the first run, `others` is
+    the length of runs from other initial conditions. `preference` means biased rounding.
     """
 
     run: Runner
@@ -138,7 +138,7 @@ def _attempts() -> Iterator[Attempt]:
 
 
 def check_growth(integrator: Integrator, name: Name) -> Iterator[Check]:
-    """Yield checks of the fitted powers of growth, and of errors after numbers of revolutions."""
+    """Yield checks of the fitted powers of growth, and of errors after given revolutions."""
     motion = name.circumstance
     for what, found, steps, limits in measured(integrator, MOTIONS[motion], orbit_of(motion)):
         horizons = np.array(REVOLUTIONS[: len(steps)])

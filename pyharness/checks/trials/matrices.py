@@ -68,8 +68,8 @@ def _threshold(name: Name) -> Check:
     program = name.subject
     wanted = singular_below(program)
     found = declared_singular_below(program)
-    # The last pivot is proportional to a power of the step, by which the relative rounding error is
-    # divided.
+    # The last pivot is proportional to a power of the step, whose exponent divides the relative
+    # rounding error.
     _, rounding = solved(program, 1.01 * wanted).pivoting
     limit = rounding / (len(PARTS[program]) - 1)
     return name.bounded(abs(found / wanted - 1.0), limit, PIVOTS, f"{found:.6g} s")

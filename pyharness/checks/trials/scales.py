@@ -72,7 +72,7 @@ def _flow() -> Conditioning:
 
 
 def _truth(scene: Scene, time: float) -> Truth:
-    """Return a scaled motion's true omega, with the original's amplification."""
+    """Return a scaled motion's true omega, with the amplification of the original motion."""
     size = max(map(abs, scene.omega)) / max(map(abs, ORDINARY.omega))
     return truth_of(scene, time, replace(_flow(), largest=_flow().largest * size))
 

@@ -29,7 +29,7 @@ TIME = 1.0
 SMALLEST = 1e-6
 # Numbers of steps in `TIME` (s), half a decade apart.
 COUNTS = tuple(round(10.0 ** (k / 2.0)) for k in range(13))
-# Time (s) of a further search for divergence, down to a step size (s) without it.
+# Time (s) of a longer search for divergence, and its smallest step size (s), too small to diverge.
 _LONG, _SMALLEST_LONG = 100.0, 2e-3
 _SPINNING = (2, 3, 4)
 _CROSSING = Basis(

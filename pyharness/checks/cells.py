@@ -41,7 +41,7 @@ _EVALUATIONS = {"two-term": 3, "four-term": 5, "runge-kutta": 4}
 
 
 def cells(chosen: Selection) -> Iterator[Attempt]:
-    """Yield checks that Fortran and Python agree, for the cells (few if `chosen.thin`)."""
+    """Yield checks that Fortran and Python agree in each cell (in few cells if `chosen.thin`)."""
     divergences = facts("divergences")["divergence"]
     listed = {entry["cell"] for entry in divergences if entry["kind"] == "cross-language"}
     for listing, case in all_cells():

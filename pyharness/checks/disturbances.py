@@ -37,7 +37,7 @@ from pyharness.thesis.programs import PROGRAM_REGISTRY
 # doubles the degree.
 _DEGREE = {"two-term": 4, "four-term": 4, "runge-kutta": 16}
 # Number of roundings along the longest chain of operations in a step, without linear systems: seven
-# in each of four stages (a rate and a sum), and those of the result.
+# in each of four stages (a rate and a sum), and the rest in the result.
 _LONGEST = 40.0
 # A derivative is computed from neighbours of omega. This is their largest distance relative to
 # omega.

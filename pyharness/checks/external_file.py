@@ -175,7 +175,7 @@ def _pointing(
     count, prints = {"attitude": 4, "angles_deg": 3}[key], entry[key]
     if not isinstance(prints, list) or len(prints) != count:
         raise InputError(f"{where}: {key} must be a list of {count} texts")
-    # If an omega is given too, `good_to` is its accuracy and not that of the attitude.
+    # If an omega is given too, `good_to` is the accuracy of omega, not of the attitude.
     alone = 0.0 if "omega" in entry else good_to
     figures = [figure(f"{where}: {key}", text, alone) for text in prints]
     values = [float(each.value) for each in figures]

@@ -85,7 +85,7 @@ def by_rows(method: str, tolerance: float, scene: Scene, times: Sequence[float])
 def by_end(
     method: str, candidate: Candidate, tolerance: float, scene: Scene, time: float
 ) -> MethodRun:
-    """Return a deferred run of a candidate to `time` (s); its limits are those of `method`."""
+    """Return a deferred run of a candidate to `time` (s); its limits are as for `method`."""
     return MethodRun(method, tolerance, scene, lambda: of_end(method, candidate.end(scene, time)))
 
 
@@ -100,7 +100,7 @@ class Truth:
     attitude: Array | None = None  # shape (n, 4), quaternions to compare instead of omega
     angle_error: float = 0.0  # bound on the error of the attitude, rad
     is_signed: bool = False  # whether the sign of a quaternion counts
-    data: float = 0.0  # change of omega by rounding A, B and C, over the largest abs(omega)
+    data: float = 0.0  # change of omega by rounding A, B and C, relative to the largest omega
     exact: bool = False  # torque-free closed form, with known `data`
     # The reference solution, its scene and its factor on the work limit, if one was used.
     scene: Scene | None = None

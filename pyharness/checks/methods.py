@@ -1,6 +1,6 @@
 """Checks of methods against the reference in the cases of Table 1 of the thesis.
 
-The limit of an error is the tolerance. Errors of omega are relative to the largest omega; those of
+The limit of an error is the tolerance. Errors of omega are relative to the largest omega; errors of
 the attitude are angles (rad).
 
 To measure orders of convergence, the programs' omega is compared with `solve_ivp`; their velocity,

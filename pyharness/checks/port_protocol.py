@@ -36,7 +36,7 @@ def request(
 ) -> bytes:
     """Return the line of JSON that requests a run; its decimals represent floats exactly.
 
-    `lipschitz` is the constant of the stop test (1/s), by default that of the author's decks.
+    `lipschitz` is the constant of the stop test (1/s), by default as in the author's decks.
     """
     asked = {
         "schema": SCHEMAS["port request"],

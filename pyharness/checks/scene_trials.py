@@ -1,6 +1,6 @@
 """Stress trials of a user's scene, with any torque whose arithmetic can be recorded.
 
-Results are compared with the reference, and with those of transformed scenes.
+Results are compared with the reference, and with results in transformed scenes.
 """
 
 from collections.abc import Callable, Iterator

@@ -210,7 +210,7 @@ class _Run(Run):
         largest = max(largest, float(sizes.max()))
         radians, phases = self.rate * length * float(np.mean(sizes)), 0.0
         for push, frequency in _pushes(self.scene):
-            # A wave adds its phase, but at most the omega that it can cause, over `largest`.
+            # A wave adds its phase, but at most the omega that it can cause, divided by `largest`.
             phases += min(frequency * length, push * length / largest if largest > 0.0 else 0.0)
         turned = 0.0
         if self.scene.attitude is not None:

@@ -43,7 +43,7 @@ def is_sensitive(growth: float | None, tolerance: float, noise: float = 0.0) -> 
 def torque_noise(
     scene: Scene, omega0: Triple, t_end: float, steps: float = math.inf, scale: float | None = None
 ) -> float:
-    """Return the rounding error of nearly cancelling torque terms, divided by omega's.
+    """Return the rounding error of nearly cancelling torque terms, in rounding errors of omega.
 
     It is the |omega| that the single terms would cause until `t_end` (s), rounded in each of
     `steps` steps, divided by `scale` (rad/s). The default scale is the larger of the initial
@@ -59,7 +59,7 @@ def torque_noise(
 
 
 def growth_of_rounding(scene: Scene, growth: float | None) -> float | None:
-    """Return a closed form's amplification of rounding errors; `growth` is the motion's."""
+    """Return a closed form's amplification of rounding errors, from the error amplification."""
     if growth is None or growth >= _NEGLIGIBLE_TO or isinstance(scene, PrincipalScene):
         return growth
     return 1.0

@@ -120,7 +120,7 @@ def order_of(
     `solution` returns `quantity` after each step, shape (n, 3), with fewer rows after an overflow.
     The measurement ends when `pairs` successive orders are all at least `due` - 0.5 or all smaller,
     or the error is only rounding. A run has at most `most_steps` steps, by default 2**18 or, if
-    more, those of eight halvings.
+    larger, the number after eight halvings.
     """
     n = len(truth.time)
     if n < scene.steps:

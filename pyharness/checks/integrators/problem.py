@@ -263,8 +263,8 @@ def long_motion(free: Judged) -> tuple[int, Array, float | None]:
     """Return level and times (s) of a long motion, and the limit of drift between successive times.
 
     The level, a step size or tolerance, is the coarsest at which enough times have a useful limit.
-    Otherwise it is the finest or, if errors do not decrease, the coarsest. The limit is None if the
-    errors in `free` are too large.
+    If no level has, it is the finest or, if errors do not decrease, the coarsest. The limit is None
+    if the errors in `free` are too large.
     """
     control = free.finest.control
     levels = range(_FIRST[control], LEVELS)

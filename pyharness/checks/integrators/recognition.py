@@ -69,7 +69,7 @@ def _explained(judged: Judged) -> list[str]:
     both = _best(judged, known, range(len(true)))
     if both is not None:
         return [both.name]
-    # Otherwise at most one fault of omega, and one of the attitude, is sought.
+    # If there is no such fault, at most one fault of omega, and one of the attitude, is sought.
     base = None if true[0].is_higher or len(true) == 1 else _best(judged, known, range(1))
     if base is None:
         return []

@@ -87,7 +87,7 @@ def random_scene(kind: str, seed: str | int, name: str = "") -> Scene:
 def draw_moderate(seed: str, kind: str, number: int) -> Scene:
     """Return scene `number` of a seed, with a torque of `kind`, an element of `MODERATE`.
 
-    The moments are those of a possible body, and differ by at least a tenth. The body rotates by
+    A body can have these moments, which differ by at least a tenth. The body rotates by
     several radians in 12 steps of 0.5 s; torques over moments are a few tenths of 1 rad/s2.
     """
     source = Random(f"{seed}/moderate/{kind}/{number}")

@@ -154,8 +154,8 @@ def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
     # The truncation error is the integral of the state-transition matrix times the residual, which
     # is zero at the nodes, the zeros of an orthogonal polynomial. Divide the integrand by this
     # polynomial. In the Taylor series of the quotient, powers of time below s contribute nothing;
-    # the power s is retained. By Leibniz's rule its coefficient is a sum over j of multiples of (h
-    # J)**j / j! times the Taylor term 2s + 1 - j of omega.
+    # the power s is retained. By Leibniz's rule its coefficient is a sum over j of multiples of
+    # (h J)**j / j! times the Taylor term 2s + 1 - j of omega.
     factor = math.factorial(stages) ** 4 / math.factorial(2 * stages) ** 2 / (2 * stages + 1)
     terms = [float(np.abs(each).max()) for each in _terms(body, scene, step, 2 * stages + 1)]
     left_out = factor * sum(

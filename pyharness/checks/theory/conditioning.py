@@ -29,10 +29,10 @@ from pyharness.model.trajectory import Array
 
 ROUNDING = 2.0**-53
 # Largest number of roundings in a right-hand side of Euler's equations: two in each of A, B, C, two
-# in the products, and those of the sums.
+# in the products, and the rest in the sums.
 _ROUNDINGS = 8.0
-# Rounding error of an attitude (rad), twice that of a quaternion's component, which has some twenty
-# roundings.
+# Rounding error of an attitude (rad), twice the error of a quaternion's component, which has some
+# twenty roundings.
 ATTITUDE = 40.0 * ROUNDING
 # Up to this amplification a method's error must be at most its tolerance; above it, the limit is
 # the amplified tolerance.

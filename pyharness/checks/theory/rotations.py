@@ -173,7 +173,8 @@ def _phase(coefficients: Sequence[float], rate: float, share: float) -> float | 
     """Return the time (s) when the phase error about a stable axis reaches 0.1 rad."""
     # `coefficients` are in cyclic order from the axis; `rate` is the frequency (rad/s) by linear
     # theory. A tilt by `share` (rad) towards another axis changes the frequency by the fraction
-    # `share`**2 / 4 times the ratio of the first coefficient to the other axis's.
+    # `share`**2 / 4 times the first coefficient divided by the coefficient of
+    # the other axis.
     spun, *others = map(abs, coefficients)
     if spun != 0.0 and rate == 0.0:
         return None  # only the spin drifts

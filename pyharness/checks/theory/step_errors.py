@@ -63,7 +63,7 @@ class Forecast:
     # Bound of truncation and rounding together; infinite for too large steps.
     bound: float
     rounding: float  # bound of the rounding error
-    wandering: float  # expected rounding error if those of the steps are independent
+    wandering: float  # expected rounding error if the steps' errors are independent
 
 
 def path(scene: Scene, time: float) -> Path:

@@ -119,8 +119,8 @@ def solve_many(
         A name in `pyharness.engine.solver.PREPARED`. `auto` uses a closed form if there is one,
         else the Taylor series.
     tolerance : float
-        Largest allowed error of a component of omega, relative to the largest |omega| from time 0
-        to the end, and of the attitude, an angle (rad). The default depends on the method.
+        Largest allowed error: for a component of omega, relative to the largest |omega| from time 0
+        to the end; for the attitude, an angle (rad). The default depends on the method.
     step : float, optional
         Step size of Gauss collocation and fixed-step methods, s; by default the scene's.
     effort : float

@@ -67,7 +67,7 @@ def flip(axis: int, *, terminal: bool | int = False, direction: int = 0) -> Even
     terminal : bool or int
         As in `crosses`.
     direction : {-1, 0, 1}
-        1 for changes to positive, -1 to negative, in the direction of integration; 0 for both.
+        1 if it becomes positive, -1 if negative, in the direction of integration; 0 for both.
 
     Returns
     -------
@@ -110,8 +110,8 @@ def extremum(axis: int, *, terminal: bool | int = False, direction: int = 0) -> 
     terminal : bool or int
         As in `crosses`.
     direction : {-1, 0, 1}
-        1 for changes of the derivative to positive, -1 to negative, in the direction of
-        integration; 0 for both. Forward in time, 1 selects minima and -1 maxima; backward, the
+        1 if the derivative becomes positive, -1 if negative, in the direction of integration; 0 for
+        both. Forward in time, 1 selects minima and -1 maxima; backward, the
         reverse.
 
     Returns

@@ -322,9 +322,9 @@ def taylor_step(
 ) -> Step:
     """Return a step of y' = tape(t, y) from the time `t` and the state, shape (n,).
 
-    `tolerances`, shape (n,), are the components' largest errors; `relative`, a relative tolerance,
-    determines the order. `trial` is a guess of the step, with the sign of `longest`. With
-    `is_beyond`, a step ends a few rounding errors beyond a switch.
+    `tolerances`, shape (n,), are the components' largest allowed errors; `relative`, a relative
+    tolerance, determines the order. `trial` is a guess of the step, with the sign of `longest`.
+    With `is_beyond`, a step ends a few rounding errors beyond a switch.
     """
     h, terms, end, order, expansions, is_switched, status = extension().tape_step(
         tape, t, state, tolerances, relative, trial, longest, is_beyond, Storage.PERTURBATION_LENGTH

@@ -83,8 +83,8 @@ def solve(
         A name in `pyharness.engine.registry.METHODS`. `auto` uses a closed form if there is one,
         else the Taylor series; for a torque made by ``opaque``, `dop853`.
     tolerance : float
-        Largest allowed error of a component of omega at `times`, relative to the largest |omega|
-        since time 0, and of the attitude, an angle (rad). The default depends on the method; for
+        Largest allowed error at `times`: for a component of omega, relative to the largest |omega|
+        since time 0; for the attitude, an angle (rad). The default depends on the method; for
         `auto` it is 1e-9. Methods with a fixed step take no tolerance.
     effort : float
         Factor on the work limit; 1 means some ten seconds.

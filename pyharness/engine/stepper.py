@@ -39,9 +39,9 @@ class Stepper:
     scene : Scene
         The body, its torque and its state at time 0. The torque must not be opaque.
     tolerance : float, optional
-        The largest error of a step. It is relative to the largest |omega| so far for omega, and to
-        the largest absolute value so far for an own state; for the attitude, it is an angle (rad).
-        Default is 1e-9.
+        The largest allowed error of a step. It is relative to the largest |omega| so far for omega,
+        and to the largest absolute value so far for an own state; for the attitude, it is an angle
+        (rad). Default is 1e-9.
     attitude : bool, optional
         Whether the attitude is computed, as in `pyharness.solve`.
 

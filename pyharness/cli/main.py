@@ -26,7 +26,7 @@ _GROUPS = {
         "deck": "write a program of the thesis as a deck of FORTRAN cards",
         "limits": "show what the original programs converge to as the step size goes to 0",
         "family": "derive and measure convergence orders of weighted residual methods",
-        "words": "run the programs in CDC arithmetic and in other word lengths",
+        "words": "run the programs in the arithmetic of CDC computers and in other precisions",
     },
     "rigid bodies": {
         "rotations": "find steady rotations, their stability, and the time between flips",
@@ -34,7 +34,7 @@ _GROUPS = {
         "sweep": "solve a grid of scenes, locally or on a cluster; store the results",
     },
     "checks and publication": {
-        "verify": "check our programs and methods, your port of the programs, or your integrator",
+        "verify": "check the thesis programs, your port of them, our methods, or your integrator",
         "stress": "test every method in extreme scenes against bounds from theory",
         "bench": "measure run times and errors of our solvers and of third-party solvers",
         "edition": "write the annotated programs as a web site or as plain data",

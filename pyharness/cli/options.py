@@ -43,12 +43,12 @@ LISTING = {
     "author's faults, called defects).",
     "--fix NAME,...": "Correct only these defects of the original program (names: `pyharness "
     "defects`).",
-    "--keep NAME,...": "Correct all defects of the original program except these.",
-    "--reading NAME,...": "For these doubtful lines of the original program, use the reading that "
-    "we did not adopt (names: `pyharness defects --kind reading`).",
-    "--conjecture NAME,...": "Make these assumptions about missing statements of the original "
-    "program (names: `pyharness defects --kind conjecture`; none: no assumption). Default: "
-    "torque-held, which evaluates a varying torque once in each step.",
+    "--keep NAME,...": "Correct all defects except these.",
+    "--reading NAME,...": "For these doubtful lines, use the reading that we did not adopt (names: "
+    "`pyharness defects --kind reading`).",
+    "--conjecture NAME,...": "Make these assumptions about missing statements (names: `pyharness "
+    "defects --kind conjecture`; none: no assumption). Default: torque-held, which evaluates a "
+    "varying torque once in each step.",
     "--lipschitz L": "Stop the Runge-Kutta program when, within a step, a derivative changes by "
     "more than L times the change of its variable; L in 1/s, above 0 (default 500, as in the "
     "thesis).",

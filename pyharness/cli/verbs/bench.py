@@ -24,16 +24,16 @@ _BODIES, _MOST_BODIES, _MOST_GROWN = 100_000, 1_000_000, 10_000_000
 _TERM_BODIES = 1000
 _OPTION_OF = {"method": "--method", "peer": "--peers"}
 OPTIONS = {
-    "--case N": "Measure only this case of Table 1 of the thesis, 1 to 7 (default: Cases 2 to 7, "
-    "with --attitude also Case 1).",
-    "--horizon T": "End time of each integration, in s, above 0, up to 1000 (default: 3, in Cases "
-    "3 and 4 also 100; with --attitude also 100 in all Cases but 6).",
-    "--draws N": "Instead of the cases, measure N random scenes, 1 to 10000, with all kinds of "
+    "--case N": "Measure only this case of Table 1 of the thesis, 1 to 7 (default: 2 to 7, or "
+    "all with --attitude).",
+    "--horizon T": "End time of each integration, in s, above 0, up to 1000 (default: 3; also "
+    "100 in Cases 3 and 4, or with --attitude in all cases but 6).",
+    "--draws N": "Instead of the cases, measure N random scenes, 1 to 10000, of several kinds of "
     "torque and body.",
     "--ensemble": "Instead of single trajectories, measure calls that solve many bodies at once: "
     "bodies per second, time per body as a function of the number of bodies, and memory.",
     "--terms": "Instead of the cases, measure scenes whose torques depend on omega (angular "
-    "velocity), time and attitude, for one body and many. The torques are ready-made "
+    "velocity), time and attitude, for one body and for many at once. The torques are ready-made "
     "(pyharness.torques) or Python functions.",
     "--bodies N": f"Number of bodies of --ensemble or --terms, 1 to {_MOST_BODIES} (default "
     f"{_BODIES} with --ensemble, {_TERM_BODIES} with --terms).",

@@ -28,7 +28,7 @@ OPTIONS = {
     "two-term, 1660, 1040-1090 or two-term:1660 (default: a table of contents; in JSON, CSV and "
     "Markdown, all cards).",
     "--classes": "For each kind of note (defect, doubtful reading, ...), count the notes, the "
-    "cards that they name, and the differences between cards and scan that they explain.",
+    "cards that they name, and the differences between our text and the scan that they explain.",
     "--collate": "Compare the operations of the three programs with each other and with sections "
     "II to V of the thesis.",
     "--origins": "Show where the programs and the thesis disagree, and what each disagreement "

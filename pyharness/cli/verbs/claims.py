@@ -26,7 +26,7 @@ OPTIONS = {
     "--evidence": "For each combination of initial angular velocity, interpretation of doubtful "
     "program lines, assumptions about missing lines, and number of steps, count the claims that "
     "hold.",
-    "--atlas STORE": "Show from which initial angular velocities the claims hold. STORE is the "
+    "--atlas STORE": "Show for which initial angular velocities the claims hold. STORE is the "
     "folder in which `pyharness sweep` stored the results; needs --sweep.",
     "--sweep FILE.toml": "Sweep file from which STORE was computed; needs --atlas.",
     **shared.outputs(plot="the counts of --evidence or the map of --atlas"),

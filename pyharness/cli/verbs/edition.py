@@ -12,8 +12,8 @@ OPTIONS = {
     "--data DIR": "Write the data to this folder, as CSV, JSON, TEI (XML) "
     "and text: cards (program lines), notes on them, verdicts on the thesis, figures, runs, and "
     "the pages that the programs print.",
-    "--docs DIR": "With --out, make pages of the documents in this folder too (default: docs of "
-    "the source checkout, or of the current folder).",
+    "--docs DIR": "With --out, folder of the documents that also become pages (default: docs in "
+    "the source checkout or the current folder).",
     "--format F": "Output format of the list of written files: table (default) or json.",
 }
 USAGE = "(--out DIR | --data DIR)"

@@ -22,8 +22,8 @@ OPTIONS = {
     "--corrections K": "Number of times that each step corrects its first estimate, 0 to 100 "
     "(default 1).",
     "--lost": "Instead of measuring orders, look for programming mistakes that explain why three "
-    "unprinted programs of the thesis failed (section IV.2). Those that explain most failures come "
-    "first.",
+    "unprinted programs of the thesis failed (section IV.2). The mistakes that explain the most "
+    "failures come first.",
     "--word W": "Floating-point arithmetic of the programs of --lost: "
     f"{', '.join(WORD_NAMES)} (default {WORD_NAMES[0]}). cdc48 is the arithmetic of CDC computers, "
     "which truncates results; cdc48-rounded rounds them.",

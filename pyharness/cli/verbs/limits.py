@@ -9,7 +9,7 @@ from pyharness.model.listing import PROGRAMS
 OPTIONS = {
     **shared.SCENE,
     "--step-size H": "First step size in s, above 0 (default: the scene's).",
-    "--steps N": "Number of steps of this size, at least 1 (default: the scene's).",
+    "--steps N": "Number of steps of the first size, at least 1 (default: the scene's).",
     "--program P": f"Run only this program: {', '.join(PROGRAMS)} (default: all three).",
     "--halvings K": "Number of times that the step size is halved, 1 to 12 (default 6).",
     **shared.EFFORT_OF_PROGRAMS,

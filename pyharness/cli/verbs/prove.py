@@ -20,8 +20,8 @@ OPTIONS = {
     "--times T1,T2,...": "Times of the results, in s, all positive or all negative (the first may "
     "be 0), in order of increasing distance from 0 (default: the end of the scene's last step).",
     "--digits D": f"Number of digits, 1 to {MOST_DIGITS} (default {_DIGITS}). The half-width of "
-    "each interval is at most 10**-D rad/s, times the largest component of omega if that exceeds "
-    "1 rad/s.",
+    "each interval of omega is at most 10**-D times 1 rad/s or, if larger, the largest component "
+    "of omega.",
     "--velocity": "Enclose the translational velocity too; needs the package python-flint.",
     "--transition": "Enclose the derivatives of the solution with respect to the initial omega "
     "too; needs the package python-flint.",

@@ -9,9 +9,9 @@ from pyharness.model.errors import InputError
 
 OPTIONS = {
     **shared.BODY,
-    "--disturbance D": "Perturbation of each steady rotation, divided by its constant omega; above "
-    "0 and below 1 (default 0.001). It affects the time between flips (reversals of the rotation "
-    "about the middle axis).",
+    "--disturbance D": "Initial perturbation of each steady rotation, divided by the rotation's "
+    "omega; above 0 and below 1 (default 0.001). It affects the time between flips (reversals of "
+    "the rotation about the middle axis).",
     **shared.outputs(
         plot="the polhodes (curves of omega without torque) and of the growth rates of "
         "perturbations"

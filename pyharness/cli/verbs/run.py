@@ -48,9 +48,9 @@ OPTIONS = {
     "needs --attitude or a scene with an attitude; not with --program.",
     "--tolerance E": "Largest allowed error of omega, relative to its largest component (default: "
     "the method's own, 1e-9 for auto); not with --program.",
-    "--strict": "Exit with status 1 if results are missing, if amplified errors may "
-    "exceed the tolerance, or if a SciPy method may have missed a short change of the torque; not "
-    "with --program.",
+    "--strict": "Exit with status 1 if results are missing, if amplified rounding errors "
+    "may exceed the tolerance, or if a SciPy method may have missed a short change of the torque; "
+    "not with --program.",
     **shared.EFFORT,
     **shared.outputs(FORMATS),
     "--format F": f"Output format: {FORMATS[0]} (default), {', '.join(shared.FORMATS[1:])}. With "

@@ -19,7 +19,7 @@ OPTIONS = {
     "or attitude.",
     "--save DIR": "Save, for each method in each trial, the scene with the worst result as a TOML "
     "file in this folder (default: save only scenes of failed checks, in the folder worst).",
-    **shared.outputs(FORMATS, plot="the one trial that --only names"),
+    **shared.outputs(FORMATS, plot="one trial, chosen by --only,"),
 }
 EXAMPLE = "stress --only separatrix --plot separatrix.png"
 

@@ -18,8 +18,8 @@ _MOST_WORKERS = 1024
 OPTIONS = {
     "file FILE.toml": "Sweep file (TOML): a scene, the axes of a parameter grid, a solver, and "
     "the quantities to store for each scene (format: docs/how-to/sweeps.md).",
-    "--out STORE": "Store the results in this folder, in the Zarr format. After an "
-    "interruption, the same command computes only the missing results.",
+    "--out STORE": "Store the results in this folder, in the Zarr format, and print a summary. "
+    "After an interruption, the same command computes only the missing results.",
     "--repair": "Recompute damaged chunks (parts of the grid that are stored together), and "
     "rewrite damaged metadata.",
     "--executor E": "Where to compute: here (in this process, the default), processes (in "

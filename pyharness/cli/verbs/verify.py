@@ -49,10 +49,10 @@ OPTIONS = {
     "--external FILE": "Only compare our methods with the published results in this file (format: "
     "docs/how-to/external.md).",
     "--listing-output FILE": "Find the floating-point arithmetic of an unknown computer. FILE is a "
-    "page that one of the three programs printed on it; we compare the page with our runs in each "
-    "arithmetic (only with --format table or json).",
-    "--port COMMAND": "Compare your port of the programs (their version in another language) bit "
-    "for bit with our Python programs. COMMAND starts it (protocol: docs/how-to/ports.md).",
+    "page printed by one of the three programs on that computer; we compare it with our runs in "
+    "each arithmetic (only with --format table or json).",
+    "--port COMMAND": "Compare your port of the programs to another language bit for bit with our "
+    "Python programs. COMMAND starts it (protocol: docs/how-to/ports.md).",
     "--integrator COMMAND": "Compare your integrator of rigid-body motion with the true solutions "
     "of random scenes, and name its faults. COMMAND starts it (protocol: "
     "docs/how-to/integrators.md).",

@@ -15,8 +15,8 @@ OPTIONS = {
     "--case N": "Run only this case of Table 1 of the thesis, 1 to 7 (default: all).",
     "--program P": f"Run only this program: {', '.join(PROGRAMS)} (default: all three).",
     "--lengths": f"Show each run in selected precisions from {LENGTHS[0]} to {LENGTHS[-1]} bits; "
-    "takes about two minutes. By default, show only whether CDC arithmetic changes the result. "
-    "Formats other than table, and --plot, imply --lengths.",
+    "takes about two minutes. Without --lengths or --all, show only whether CDC arithmetic changes "
+    "results. Formats other than table, and --plot, imply --lengths.",
     "--all": f"Show each run in every precision from {LENGTHS[0]} to {LENGTHS[-1]} bits; takes "
     "about twelve minutes.",
     "--vectors FILE": "Instead of running programs, check our emulation of CDC arithmetic against "

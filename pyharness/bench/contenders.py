@@ -35,7 +35,7 @@ class Contender:
 
 @dataclass(frozen=True)
 class SceneContender(Contender):
-    """A contender that integrates omega and, where it can, attitude of one scene."""
+    """A contender that integrates omega and, if it can, the attitude of one scene."""
 
     # Prepares what does not depend on the end time and the setting.
     prepare: Callable[[Scene], Maker]

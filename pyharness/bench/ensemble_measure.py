@@ -1,7 +1,7 @@
 """Measurements of many bodies: speed at a target error, time by number of bodies, memory.
 
-Each contender uses the coarsest setting that meets the target on a sample. Calls are interleaved in
-rounds; the shortest time counts. Calls on one core are timed in processor time.
+Each contender uses the coarsest setting that reaches the target error on a sample of bodies. Calls
+are interleaved in rounds; the shortest time counts. Calls on one core are timed in processor time.
 """
 
 import subprocess
@@ -66,7 +66,7 @@ class Rate:
 
     @property
     def rate(self) -> float:
-        """Return bodies or, without a target error, steps of all bodies per second."""
+        """Return bodies per second or, without a target error, steps of all bodies per second."""
         return self.bodies_a_second * (1 if self.target is not None else STEPS)
 
 
@@ -99,7 +99,7 @@ class _Task:
         return self.target is not None or each.setting == "steps"
 
     def error(self, omega: Array) -> float:
-        """Return the largest error of all bodies: omega's, relative, or the attitude's (rad)."""
+        """Return the largest error of all bodies: of omega (relative) or of the attitude (rad)."""
         n = min(len(omega), len(self.ends))
         ends, starts = self.ends[:n], self.sample.omega0[:n]
         if self.load.attitude0 is not None:
@@ -133,7 +133,7 @@ def measure_ensembles(
     """Return each contender's speed on each load, at each target error.
 
     On the last load, RK4 contenders also run `STEPS` steps. `seed` is only recorded. A call solves
-    at least `least` bodies, or all if fewer.
+    at least `least` bodies, or all if there are fewer.
     """
     found = Rates(seed, loads[0].n)
     tasks: list[_Task] = []
@@ -228,7 +228,7 @@ class Memory:
 def sizes(seed: str, most: int, progress: Progress = no_progress) -> list[Size]:
     """Return the run times per body (s) for 1, 10, ... up to `most` bodies.
 
-    The closed form runs without torque, also as "prepared", by a prepared solver.
+    The closed form solves bodies without torque; "prepared" is its time in a prepared solver.
     """
     free, pushed = draw(seed, most)
     found: list[Size] = []
@@ -286,7 +286,7 @@ def needed(method: str, bodies: int) -> None:
 
 
 def _resident(name: str) -> int:
-    """Return this process's ``VmRSS`` (memory now) or ``VmHWM`` (peak), bytes; 0 without Linux."""
+    """Return this process's ``VmRSS`` (memory now) or ``VmHWM`` (peak), bytes; on Linux, else 0."""
     with suppress(OSError), open("/proc/self/status", encoding="ascii") as file:
         for line in file:
             if line.startswith(name + ":"):

@@ -1,6 +1,7 @@
 """Third-party solvers for `bench --ensemble`.
 
-Each returns a function that computes omega (rad/s) at the end time, shape (n, 3).
+Each returns a function that computes omega (rad/s) at the end time, shape (n, 3), or the attitudes,
+shape (n, 4), if the load requests them.
 """
 
 from collections.abc import Callable

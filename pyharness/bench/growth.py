@@ -1,7 +1,6 @@
 """Growth of errors with time: the Taylor method against the closed form, up to 1e5 s.
 
-Errors are compared with 2**-53 t |omega'|, the change of the solution when the time t (s) is
-rounded.
+Errors are compared with 2**-53 t |omega'|, the change of omega if the time t (s) is rounded.
 """
 
 from collections.abc import Sequence
@@ -25,8 +24,8 @@ class Growth:
 
     time: float  # s
     # Relative to the largest omega: `error` is the largest difference from the closed form, for
-    # `_STARTS` initial states on one trajectory; `conditioning` is the change of omega in a
-    # rounding error of the time.
+    # `_STARTS` initial states on one trajectory; `conditioning` is the change of omega by
+    # a rounding error of the time.
     error: float
     conditioning: float
     steps: int  # number of steps of one integration

@@ -42,7 +42,7 @@ def timed(
 ) -> Iterator[_Row]:
     """Yield a row for each call that `calls` prepares for each task.
 
-    `length` to `slow` are as in `checks.compare.timing.seconds`.
+    The arguments from `length` on are as in `checks.compare.timing.seconds`.
     """
     for number, task in enumerate(tasks):
 

@@ -1,8 +1,8 @@
 """Run time against error, for our and third-party solvers, in one process.
 
-A call with each setting of a contender, from coarse to fine, is compared with the reference.
-Batches of all calls are then timed in interleaved rounds, so that other work of the machine affects
-all alike; the median time counts.
+The result of a call with each setting of a contender, from coarse to fine, is compared with the
+reference. Batches of all calls are then timed in interleaved rounds, so that other work of the
+machine affects all alike; the median time counts.
 """
 
 import math
@@ -125,7 +125,7 @@ class Finding:
 def workloads(
     case: int | None = None, horizon: float | None = None, attitude: bool = False
 ) -> list[Workload]:
-    """Return cases of Table 1, each to 3 s and some also to 100 s.
+    """Return workloads of Table 1: each case to 3 s, some also to 100 s.
 
     With `attitude`, the bodies are initially aligned with the axes of space. `case` and `horizon`
     (s) select one case and one end time.
@@ -208,7 +208,7 @@ def error_of(end: End, truth: Reference, scale: float = 0.0) -> float | None:
 
 
 def relative_error(omega: Array, truth: Reference, scale: float = 0.0) -> float | None:
-    """Return omega's error over `scale` (rad/s) or, if larger, the largest true component.
+    """Return the error of omega, divided by the larger of `scale` (rad/s) and the true omega.
 
     Return None if the error is not finite, or the reference ends before the end time.
     """

@@ -64,7 +64,8 @@ def heyoka_maker(
 ) -> Maker:
     """Return a function that prepares heyoka's integrations, compiled once for each tolerance.
 
-    `formula` is as in `heyoka_equations`; `variational` adds derivatives by the initial state.
+    `formula` is as in `heyoka_equations`; `variational` adds derivatives with respect to the
+    initial state.
     """
     import heyoka
 
@@ -215,7 +216,7 @@ def heyoka_functions() -> Functions[Any]:
 
 
 def numba_fixed(method: str, scene: Scene) -> Maker:
-    """Return a function that prepares numba's integrations by "rk4" or "dop8", DOP853's order 8."""
+    """Return a function that prepares integrations by "rk4" or "dop8" (DOP853's), with numba."""
     import numba
 
     formula: Tableau = RK4

@@ -1,4 +1,4 @@
-"""Scores: times to reach target errors, and a baseline's times divided by them."""
+"""Contenders' times to reach target errors, and a baseline's times divided by these."""
 
 import math
 from collections.abc import Sequence
@@ -77,7 +77,7 @@ def groups(finding: Finding) -> dict[str, list[Workload]]:
 def means(finding: Finding, loads: Sequence[Workload]) -> dict[str, list[float | None]]:
     """Return each contender's geometric mean ratio over `loads`, for each target error.
 
-    It is None if contender or baseline misses the error on a workload.
+    A mean is None if contender or baseline misses the error on a workload.
     """
     tables = [_ratios(finding, load) for load in loads]
     names = dict.fromkeys(name for table in tables for name in table)
@@ -90,7 +90,7 @@ def means(finding: Finding, loads: Sequence[Workload]) -> dict[str, list[float |
 
 
 def spreads(finding: Finding, kinds: Sequence[str]) -> list[Spread]:
-    """Return the distributions of ratios by contender, error and kind, without the baseline."""
+    """Return distributions of ratios by contender (except the baseline), error and kind."""
     tables = {load.label: _ratios(finding, load) for load in finding.workloads}
     names = dict.fromkeys(name for table in tables.values() for name in table)
     first, found = yardstick(finding), []

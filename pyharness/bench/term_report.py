@@ -55,7 +55,7 @@ class Terms:
 
 @dataclass(frozen=True)
 class Summary:
-    """The ratios over the scenes of a kind, at one target error."""
+    """The mean and smallest ratio over the scenes of a kind, at one target error."""
 
     kind: str
     bodies: int  # number of bodies in a call

@@ -30,7 +30,7 @@ def say(text: str) -> None:
 
 
 class _Terminal:
-    """Standard error that ignores errors in writing."""
+    """A stream to standard error that ignores errors in writing."""
 
     def __getattr__(self, name: str) -> Any:
         return getattr(sys.stderr, name)
@@ -45,7 +45,7 @@ class _Terminal:
 
 
 def progress(done: int, total: int, what: str) -> None:
-    """Show a progress bar on a terminal; `what` names the current part."""
+    """Show on a terminal that `done` of `total` parts are complete; `what` names the next."""
     global _bar
     if not sys.stderr.isatty():
         return

@@ -1,7 +1,7 @@
 """Interruption: Ctrl-C ends a command with a one-line message and exit status 130.
 
-Python may lose a KeyboardInterrupt: an import may replace it, and a finalizer or callback drop it.
-This module therefore records the signal, and raises it again.
+Python may lose a KeyboardInterrupt: an import may replace it by another exception, and a finalizer
+or callback may drop it. This module therefore records the signal, and raises the exception again.
 """
 
 import atexit
@@ -110,8 +110,8 @@ def report() -> int:
 def leave(code: int) -> None:
     """Remove temporary files and end the process with exit status `code`.
 
-    Python's own exit would wait for threads, and might ignore Ctrl-C or end by its signal. If
-    `code` is 130, child processes are killed, and cleanup takes at most two seconds.
+    Python's own exit would wait for threads, and Ctrl-C might be ignored or kill it. If `code` is
+    130, child processes are killed, and cleanup takes at most two seconds.
     """
     if code == CODE:
         # Messages of ending threads and finalizers would follow the report of the interrupt.

@@ -9,13 +9,13 @@ from pyharness.model.facts import facts_folder
 
 
 def schema() -> dict[str, Any]:
-    """Return the JSON Schema of all verbs' output, with a part `verb-NAME` in `$defs` for each."""
+    """Return the JSON Schema of all verbs' output; `$defs` has `verb-NAME` for each verb."""
     found: dict[str, Any] = json.loads((facts_folder() / "output.schema.json").read_text())
     return found
 
 
 def fields(whole: dict[str, Any], part: dict[str, Any], path: str) -> Iterator[tuple[str, str]]:
-    """Yield path and meaning of each field of `part` of the schema `whole`."""
+    """Yield path, after the prefix `path`, and meaning of each field of a schema's `part`."""
     for name, each in part.get("properties", {}).items():
         own = each
         if "description" not in each:

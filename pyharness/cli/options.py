@@ -80,7 +80,7 @@ _WORTH_SAYING = 60.0  # run time (s) above which a forecast is printed
 
 
 class Cost(NamedTuple):
-    """Time and memory of a random draw on a processor core of 2026, and a limit."""
+    """The time and memory of a random draw on a core of 2026, and the largest number of draws."""
 
     what: str  # plural noun for the draws, as in "random scenes"
     seconds: float  # run time (s) of a draw
@@ -203,7 +203,7 @@ def chosen_listing(options: argparse.Namespace) -> Listing:
 def changes_of(options: argparse.Namespace) -> dict[str, Any]:
     """Return the names in --fix, --keep, --reading and --conjecture, as arguments of `subset`.
 
-    A corrected program has nothing to fix, an original one nothing to keep.
+    Raise InputError for --fix in a corrected program, or --keep in an original one.
     """
     if options.listing == "corrected":
         refuse(options, "--listing corrected", ("fix",))
@@ -221,7 +221,7 @@ def changes_of(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def tell_inactive(options: argparse.Namespace, listings: Iterable[Listing]) -> None:
-    """Warn of requested readings and conjectures that no listing uses, and of vain corrections."""
+    """Warn of requested readings and conjectures that no listing uses, and useless corrections."""
     asked = {*names(options.reading), *names(options.conjecture)} - {"none"}
     active = {name for listing in listings for name in listing.active}
     for name in sorted(asked - active - set(names(options.fix))):
@@ -353,7 +353,7 @@ def also_files(options: argparse.Namespace) -> dict[str, str]:
 
 
 def check_outputs(options: argparse.Namespace) -> None:
-    """Raise InputError if an output can't be written, or is an input or another output."""
+    """Raise InputError if an output file can't be written, or is an input or another output."""
     also = also_files(options)
     for path in also:
         check_writable(path, "--also")
@@ -409,8 +409,8 @@ def show(
 ) -> int:
     """Write a report in the format of --format, the picture of --plot, and the files of --also.
 
-    `own` maps formats of this report alone, such as "tape5", to content functions. Return 1 if
-    `failed`, else 0.
+    `own` maps formats of this report alone, such as "tape5", to functions that return the content.
+    Return 1 if `failed`, else 0.
     """
     from pyharness.views.render import render
 

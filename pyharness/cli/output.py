@@ -1,7 +1,6 @@
 """Writing of output folders, completely or not at all.
 
-Messages name `option`, by which the user gave the path. Verbs call the checks before any
-computation.
+Messages name `option`, by which the user gave the path.
 """
 
 import json
@@ -19,7 +18,7 @@ _LARGEST_MARK = 1 << 24  # bytes of the file that lists the files written by a v
 
 
 def check_folder(path: str, names: Iterable[str], option: str) -> None:
-    """Raise InputError if files `names` can't be written in `path`, which may be new."""
+    """Raise InputError if files `names` can't be written in folder `path`, which may be new."""
     folder = Path(path)
     if not path or "\0" in path or os.path.lexists(folder):
         if not path or "\0" in path or not folder.is_dir():
@@ -67,7 +66,7 @@ def write_folder(path: str, contents: dict[str, bytes], option: str) -> None:
 def check_tree(path: str, mark: str, option: str, kind: str = "edition") -> None:
     """Raise InputError if `write_tree` may not replace the folder.
 
-    The folder may contain only the JSON file `mark`, of schema `kind`, and the files listed there.
+    The folder may contain only the JSON file `mark`, of schema `kind`, and the files listed in it.
     """
     check_replaceable(path, lambda folder: {mark, *_listed(folder / mark, kind)}, option)
 
@@ -75,7 +74,7 @@ def check_tree(path: str, mark: str, option: str, kind: str = "edition") -> None
 def check_replaceable(path: str, made: Callable[[Path], set[str]], option: str) -> None:
     """Raise InputError if `write_tree` may not replace the folder.
 
-    The folder may be missing, or contain only files that the verb wrote, ``made(folder)``.
+    The folder may be missing, or contain only the files ``made(folder)`` of the verb.
     """
     check_folder(path, (), option)
     folder = Path(os.path.realpath(path))

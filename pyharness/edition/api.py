@@ -24,7 +24,7 @@ class Entry(NamedTuple):
     """A public name on the API page.
 
     `kind` is "function", "class" or "property". `summary`, `text` and `groups` are the docstring's
-    first line, paragraphs and sections by title.
+    first line, other paragraphs, and sections by title.
     """
 
     name: str

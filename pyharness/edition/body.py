@@ -30,9 +30,9 @@ print(found.attitude.round(6))
 """The program shown on the page, which solves Case 4 of the thesis."""
 
 AGREEMENT = 2e-15
-"""The largest difference between the closed forms of the page's script and in Fortran.
+"""The largest difference between closed-form solutions by the page's script and by Fortran.
 
-It bounds the difference of each attitude component, and of omega relative to its largest component.
+It applies to each attitude component, and to omega relative to its largest component.
 """
 
 SPEEDS = (0.1, 0.25, 0.5, 1, 2, 10, 100, 1000)
@@ -129,7 +129,7 @@ def _draw_polhode(axes: Any, moments: Array, found: Trajectory) -> None:
 
 
 def _in_plane(found: Trajectory) -> Array:
-    """Return omega's components (rad/s) in the plane normal to the momentum, (n, 2)."""
+    """Return omega's components (rad/s) in the plane normal to its momentum, shape (n, 2)."""
     assert found.attitude is not None
     momentum = found.angular_momentum("space")[0]
     up = momentum / np.linalg.norm(momentum)

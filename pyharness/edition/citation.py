@@ -96,7 +96,7 @@ def csl(place: str = "", path: str = "") -> list[dict[str, Any]]:
 
 
 def cite_data() -> dict[str, Any]:
-    """Return what the script of the pages needs to cite a part, with placeholders for the part."""
+    """Return the data with which the pages' script cites a part, with placeholders for it."""
     place = "@PLACE@", "@PATH@"
     return {
         "address": address(), "publish": PUBLISH, "digest": text_digest(),
@@ -162,7 +162,7 @@ class Part(NamedTuple):
 
 
 def described(name: str, content: bytes = b"", /, **values: Any) -> Part:
-    """Return the file that table `name` of `package.toml` describes, filled with `values`."""
+    """Return the file described by table `name` of `package.toml`, with `values` filled in."""
     texts = (text.format(**values) for text in _descriptions()[name].values())
     path, title, description, media_type = texts
     return Part(path, title, description, media_type, content)

@@ -1,6 +1,6 @@
 """The edition as plain data: cards, apparatus, verdicts, runs and printed pages.
 
-The RO-Crate has no times and paths of the machine, and is the same in every run.
+The RO-Crate contains neither times nor paths of the machine, and is the same in every run.
 """
 
 from collections.abc import Iterator, Mapping
@@ -57,10 +57,7 @@ _COLUMNS = "card kind text scan entries port twin swhid"
 
 
 def data_package(progress: Progress = no_progress) -> dict[str, bytes]:
-    """Return all files of the data package, content by path.
-
-    `progress` receives numbers of completed and all parts, and a part's name.
-    """
+    """Return all files of the data package, content by path."""
     parts = [*_list_files(progress)]
     parts.append(_readme(parts))
     content = {each.path: each.content for each in parts}

@@ -74,7 +74,7 @@ class CardView(NamedTuple):
 
     `card` is our text, in brackets if the scan lacks it. `witness` is our text with the scan's
     names: None if equal to `card`, empty if the scan lacks it. `scan` is the scan's line, or None;
-    `after` has the following lines that belong to no card. `port` has each line of the Fortran
+    `after` has the scan's next lines, which belong to no card. `port` has each line of the Fortran
     port, the defect or reading that switches it, and whether it is executed if this is active.
     `notes` begin with the most important kind; `begins` has the notes on a range of cards that
     begins here, each with only this range.
@@ -104,7 +104,7 @@ class Sheet(NamedTuple):
 
 
 def sheets(program: str) -> list[Sheet]:
-    """Return a program's pages, in the order of their lowest cards."""
+    """Return a program's pages, in the order of their lowest card numbers."""
     pages = [page for page in facts("cards/scan")["page"] if page["program"] == program]
     found = sorted((first_card(page["lines"]), page.get("moved")) for page in pages)
     ends = [*(first for first, _ in found[1:]), max(deck(program).cards) + 1]
@@ -116,7 +116,7 @@ def sheets(program: str) -> list[Sheet]:
 
 
 def notes(program: str) -> list[Note]:
-    """Return a program's notes by kind, then size of effect, then card."""
+    """Return a program's notes, sorted by kind, then size of effect, then card."""
     having = [each for each in entries() if each["cards"].get(program)]
 
     def place(entry: dict[str, Any]) -> tuple[float, ...]:
@@ -129,7 +129,7 @@ def notes(program: str) -> list[Note]:
 
 @cache
 def _changes(name: str, program: str) -> tuple[float, float]:
-    """Return the largest changes (rad/s, m/s) of omega and velocity errors by fixing a defect."""
+    """Return a correction's largest effects on the errors of omega (rad/s) and V (m/s)."""
     if name not in names_of("defect", program):
         return 0.0, 0.0
     found = [each for each in effects_of(name) if each.program == program]

@@ -136,7 +136,7 @@ def _display(form: str, content: bytes) -> dict[str, Any]:
 
 
 def _link(folder: Path, name: str, target: str) -> str | None:
-    """Return a document's link in the site; None if the site lacks the target."""
+    """Return a document's link as in the site; None if the site lacks the target."""
     path, hash_, anchor = target.partition("#")
     if "://" in target or not path:
         return target

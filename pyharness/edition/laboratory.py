@@ -25,10 +25,7 @@ from pyharness.truth.reference import reference
 DEFAULTS: dict[str, Any] = {"case": 2, "program": "runge-kutta", "listing": "original"}
 """The run that the page shows if its address specifies none."""
 MOST_STEPS = 3000
-"""The largest number of steps of a run on the page, drawn without noticeable delay.
-
-It suffices for 3 s with steps of 0.001 s, a tenth of the programs' step size.
-"""
+"""The largest number of steps of a run that the page draws without noticeable delay."""
 _KINDS = {
     "defect": "Faults left in",
     "reading": "Other readings of doubtful cards",

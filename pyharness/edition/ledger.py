@@ -65,7 +65,7 @@ def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
 
 
 def verdicts(judgement: Judgement) -> list[tuple[str, str]]:
-    """Return one or two pairs of a text on the programs and the verdict for them."""
+    """Return one or two pairs: the programs, as printed or corrected, and their verdict."""
     original, corrected = judgement.original.verdict, judgement.corrected.verdict
     if judgement.claim["kind"] == "result":
         return [("as printed", original), ("corrected", corrected)]
@@ -160,7 +160,7 @@ def formulas() -> dict[str, list[Formula]]:
 
 
 def draw_figures(figures: Mapping[str, FigureFinding]) -> dict[str, bytes]:
-    """Return figures as SVG and CSV, and both versions of Figure 7 in one picture, also as PNG."""
+    """Return the files of the figures, and of a picture of Figure 7 in both versions."""
     together = together_picture(figures["figure-07"], figures["figure-07-corrected"])
     files = saved(together, "figure-07-together.svg", "preview.png")
     for stem, each in figures.items():
@@ -173,8 +173,8 @@ def printed_figures(
 ) -> list[dict[str, Any]]:
     """Return the thesis's figures in order, with number, caption and place.
 
-    `drawn` has our drawings; `says` the thesis's sentences on the figure, with anchors, "" in
-    sections I to IV; `ours` is our text on a figure that we do not draw.
+    `drawn` has our drawings. `says` has the thesis's sentences on the figure, with their anchors,
+    "" in sections I to IV. `ours` is our text on a figure that we do not draw.
     """
     found = []
     for each in facts("figures")["printed"]:

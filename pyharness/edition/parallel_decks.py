@@ -55,7 +55,7 @@ def operations() -> list[Operation]:
 
 
 def thesis_on(disagreement: Disagreement) -> str:
-    """Return a text on a disagreement's equations and place in the thesis."""
+    """Return a text that names a disagreement's equations and place in the thesis."""
     given = ", ".join(disagreement.equations)
     noun = "equations" if "," in given or "-" in given else "equation"
     return "; ".join(filter(None, (given and f"{noun} {given}", disagreement.where)))
@@ -70,7 +70,7 @@ def _aligned(ranges: dict[str, str]) -> list[AlignedRow]:
 
 
 def _merged(rows: Sequence[dict[str, Card]], cards: Sequence[Card]) -> list[dict[str, Card]]:
-    """Return rows with a deck's cards inserted in order, for the largest sum of similarities."""
+    """Return rows joined with a deck's most similar cards, in order; others become new rows."""
     # best[i][j] is the largest sum for the rows from i on and the cards from j on.
     best = [[0.0] * (len(cards) + 1) for _ in range(len(rows) + 1)]
     pairs = [[max(_likeness(x, card) for x in row.values()) for card in cards] for row in rows]

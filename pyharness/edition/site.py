@@ -230,7 +230,7 @@ def _assets(places: Sequence[Found]) -> dict[str, bytes]:
 
 
 def script(name: str, value: Any) -> bytes:
-    """Return JavaScript that assigns `value`; pages opened from files can't load JSON."""
+    """Return JavaScript that sets `name` to `value`; pages opened from files can't load JSON."""
     text = json.dumps(value, ensure_ascii=False, separators=(",", ":"))
     return f"window.{name}={text};\n".encode()
 

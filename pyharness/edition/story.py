@@ -1,6 +1,6 @@
 """Charts and numbers of the home page, a story, from runs of the Python ports.
 
-A script runs the programs with a visitor's values.
+The page's script runs the programs with a visitor's values.
 """
 
 import math
@@ -48,7 +48,8 @@ class Curve(NamedTuple):
 class Chart(NamedTuple):
     """A chart with fixed axes.
 
-    `x` and `y` are ranges; for a logarithmic `y`, exponents of ten. Ticks have position and label.
+    `x` and `y` are ranges; on a logarithmic axis, `y` has exponents of ten. Ticks have position and
+    label.
     If `is_marked`, curves are points without lines; `marks` distinguish coincident curves.
     """
 
@@ -134,7 +135,7 @@ def context() -> dict[str, Any]:
 def _run(
     case: int, program: str, listing: str = "original", without: Names = (), may_stop: bool = True
 ) -> Trajectory:
-    """Return a Python port's run, corrected, or original without the defects in `without`."""
+    """Return a run in Python: corrected, or original without the defects in `without`."""
     active = set(switches(program)) - set(without) if listing == "original" else set()
     return run_program(case_scene(case), Listing(program, active), "python", may_stop=may_stop)
 

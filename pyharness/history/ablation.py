@@ -100,7 +100,7 @@ def case_truth(case: int) -> Reference:
 
 
 def effects_of(name: str) -> Iterator[CaseEffects]:
-    """Yield an apparatus entry's effects by program and case; `original` always has the entry."""
+    """Yield an apparatus entry's effects by program and case; their `original` has the entry."""
     known = entry(name)
     for program in known["programs"]:
         printed = Listing.original(program).active

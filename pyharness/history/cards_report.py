@@ -86,7 +86,7 @@ def scan_report(
     """Return the report on whether our text explains every line of a scan.
 
     `faults` are unexplained lines, `undeclared` are disagreements between cards and apparatus,
-    `lines` counts the lines, and `digest` is the SHA-256 of the scan.
+    `lines` counts the lines of the scan, and `digest` is its SHA-256.
     """
     cards = [card for program in PROGRAMS for card in deck(program).cards.values()]
     deviating = sum(bool(each.differences or each.lost) for each in cards)

@@ -1,4 +1,4 @@
-"""The thesis's weighted residual methods (sections III.1 and IV.2), and their orders.
+"""The thesis's weighted residual methods (III.1 and IV.2), and their orders of convergence.
 
 One step of length h solves omega' = f(t, omega) (eq. 16-18) with a polynomial trial function
 omega(0) + c1 t + ... + cn t**n. The first estimate assumes constant f. Each correction (the thesis
@@ -133,8 +133,8 @@ def predicted_order(member: Member) -> int:
 def run(scene: Scene, member: Member) -> Trajectory:
     """Integrate a scene by a weighted residual method (Jacobs 1982, eq. 20-27, and IV.2).
 
-    The first estimate uses the torque at the beginning of the step, corrections at their nodes. A
-    step's rounding error is about one unit in the last place of omega.
+    The first estimate uses the torque at the beginning of the step; corrections use it at their
+    nodes. A step's rounding error is about one unit in the last place of omega.
     """
     omega = integrate(scene, [member])[0]
     rows = int(np.logical_and.accumulate(np.isfinite(omega).all(axis=1)).sum())
@@ -229,11 +229,11 @@ def _torque(scene: Scene, times: Array) -> Array:
 
 @dataclass(frozen=True)
 class OrderFinding:
-    """A method's derived and measured order of convergence in a scene, and its error.
+    """A method's predicted and measured order of convergence in a scene, and its error.
 
     `measured` is None if too many errors are too large or only rounding. `settled` means that the
-    last two measurements differ by at most 0.1. `error` (rad/s) is omega's with the scene's step
-    size.
+    last two measurements differ by at most 0.1. `error` is the largest error of omega (rad/s) with
+    the scene's step size.
     """
 
     member: Member
@@ -259,7 +259,7 @@ def family_members() -> list[Member]:
 def order_table(
     scene: Scene, members: Sequence[Member] | None = None, progress: Progress = no_progress
 ) -> list[OrderFinding]:
-    """Return order of convergence and error of each method, by default of `family_members`.
+    """Return order of convergence and error of each method in `members`, or `family_members`.
 
     The solution must be bounded, and the scene have at most `MOST_STEPS` steps.
     """

@@ -17,10 +17,7 @@ from pyharness.thesis.cards import PORT, Card, port_file
 DATA = "pyharness/data"
 """The path of the edition's data in the source repository."""
 TABLES = (*(f"cards/{program}" for program in PROGRAMS), "apparatus")
-"""The tables in `data` that make up the edition's text, without the suffix `.toml`.
-
-They are the cards of each program with the scan's variants, and the apparatus.
-"""
+"""The tables in `data` that make up the edition's text, without the suffix `.toml`."""
 
 
 def content_identifier(content: bytes) -> str:
@@ -60,7 +57,7 @@ def card_identifier(card: Card) -> str:
 
 @cache
 def card_lines(content: bytes) -> dict[int, int]:
-    """Return by card number each card's line, from 1, in the file of a deck."""
+    """Return by card number each card's line number, from 1, in the file of a deck."""
     lines = enumerate(content.decode().splitlines(), 1)
     keys = ((line.partition(" = ")[0], number) for number, line in lines)
     return {int(key): number for key, number in keys if key.isdigit()}

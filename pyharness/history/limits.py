@@ -52,7 +52,7 @@ Rate = Callable[[float, Sequence[float]], list[float]]
 
 @dataclass(frozen=True)
 class Halving:
-    """A run's largest distances (rad/s) from limit and reference; infinite after an overflow."""
+    """The largest distances (rad/s) of a run from limit and reference, or infinity."""
 
     step_size: float
     from_limit: float
@@ -63,8 +63,8 @@ class Halving:
 class Limit:
     """The convergence of an original program to its limit as the step size goes to zero.
 
-    `order`, from the last two step sizes, is None after an overflow, with mere rounding errors,
-    without a limit, or if the limit is unbounded at the time `blow_up` (s).
+    `order`, from the last two step sizes, is None after an overflow, if only rounding errors are
+    left, without a limit, or if the limit is unbounded at the time `blow_up` (s).
     """
 
     program: str

@@ -1,4 +1,4 @@
-"""Comparison of any machine's printed page with ours, to find its arithmetic."""
+"""Comparison of any machine's printed page with ours, to find the machine's arithmetic."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
@@ -20,7 +20,7 @@ _LARGEST = 1 << 24  # bytes of a page's file
 
 
 def read_page(path: str) -> list[list[str]]:
-    """Return a page's lines of numbers, of which one must have at least six."""
+    """Return a page's lines of numbers, of which one must have at least six numbers."""
     where = f"--listing-output '{path}'"
     content = read_input(path, where, _LARGEST, "what a program printed to TAPE6")
     found = printed_numbers(content.decode("ascii", "replace"))

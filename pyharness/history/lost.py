@@ -4,9 +4,9 @@ According to IV.2, the programs for the subdomain, Galerkin and least-squares me
 thesis does not print, gave no meaningful results in Cases 1 and 2, where the solution is known.
 `data/lost.toml` has our conjectures on their mistakes.
 
-As in IV.2, the trial function has two terms, and products are polynomials. One correction follows a
-first estimate with a constant right-hand side. A method fails if its error exceeds a tenth of the
-largest omega.
+As in IV.2, the trial function has two terms, and products of omegas are polynomials of time. One
+correction follows a first estimate with a constant right-hand side. A method fails if its error
+exceeds a tenth of the largest omega.
 """
 
 from collections.abc import Sequence

@@ -86,7 +86,7 @@ def rows_of_form(
 
 
 def compared_steps(rows: int, steps: int, card_steps: int) -> int:
-    """Return `steps` (of the thesis's text) or, if the page has more rows, `card_steps`."""
+    """Return `steps` (in the thesis's text) or, if the page has more rows, `card_steps`."""
     return card_steps if rows > steps else steps
 
 

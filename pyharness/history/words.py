@@ -59,9 +59,9 @@ class WordRun(NamedTuple):
     """A run in one arithmetic, compared with binary64.
 
     `rule` is ``nearest-even``, ``chop`` (towards zero), or the CDC 6600's ``FX`` (truncating) or
-    ``RX`` (rounding). `stop` has reason and step of an early end, as in ``V2 at 25``. Of the longer
-    page's `fields` numbers, `different` differ. `error` is omega's largest error (rad/s).
-    `singular` counts the steps with a singular matrix (IER = 129).
+    ``RX`` (rounding). `stop` has reason and step of an early end, as in ``V2 at 25``. `different`
+    of the `fields` numbers on the longer page differ. `error` is the largest error of omega
+    (rad/s). `singular` counts the steps with a singular matrix (IER = 129).
     """
 
     case: int

@@ -281,7 +281,7 @@ def switch_at(place: Place) -> tuple[str, bool] | None:
     """Return the switch on which a Fortran line depends, and whether the line needs it active.
 
     A switch is the flag of a defect or reading. The innermost ``if`` around the line that tests
-    only a switch decides.
+    a switch alone decides.
     """
     lines = _lines(shipped(PORT) / place.file)
     depth = _indentation(lines[place.line - 1])

@@ -2,7 +2,7 @@
 
 In a step, each unknown is a polynomial x(0) + c1 t + c2 t**2 + ... (eq. 34). With n terms after
 x(0), its derivative equals the right-hand side at n collocation points (eq. 36). A first estimate
-assumes a constant right-hand side; one correction uses the estimate's.
+assumes a constant right-hand side; one correction evaluates it along the estimate.
 """
 
 from collections.abc import Callable, Sequence

@@ -36,7 +36,8 @@ def read_rows(
 ) -> Trajectory:  # fmt: skip
     """Return the output of a compiled program as a trajectory.
 
-    `rows` has shape (n, 8): true time and TIME (s), omega (rad/s) and velocity (m/s).
+    `rows` has shape (n, 8): true time (s), the program's variable TIME (s), omega (rad/s) and
+    velocity (m/s).
     `stop_variable` is the number in `STOP_VARIABLES`, from 1, of the variable that failed the stop
     test, or 0; `stop_quotient` (1/s) is its quotient.
     """

@@ -57,7 +57,11 @@ def all_finite(values: Vector) -> bool:
 
 
 def trajectory_of(rows: NDArray[np.float64], **others: Any) -> Trajectory:
-    """Return a trajectory from rows of true time, TIME (s), omega (rad/s) and velocity (m/s)."""
+    """Return a trajectory from its rows.
+
+    Their columns are the true time (s), the program's variable TIME (s), omega (rad/s) and velocity
+    (m/s).
+    """
     return Trajectory(rows[:, 0], rows[:, 1], rows[:, 2:5], rows[:, 5:], len(rows), **others)
 
 

@@ -1,7 +1,7 @@
 """Runs of the programs in a floating-point format of `word.py`, such as the CDC's.
 
-Python ports run in every format, compiled programs only in those of IEEE 754. The extension takes
-numbers as bytes in native order.
+Python ports run in every format, compiled programs only in those of IEEE 754. The Fortran
+extension takes numbers as bytes in the machine's order.
 """
 
 import copy

@@ -38,7 +38,7 @@ _NOT_REACHED = -1
 class ProgramEnsemble(BatchResult):
     """The results of a program of the thesis for n bodies at m requested steps.
 
-    After the end of a body's run, its values are NaN, in `ier` -1.
+    After the end of a body's run, its values are NaN, and -1 in `ier`.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class ProgramEnsemble(BatchResult):
         Number of steps with a result in each run, requested or not.
     stop_variable : ndarray of int8, shape (n,)
         The variable that failed the stop test, or 0: 1-3 for U1-U3 (omega), 4-6 for V1-V3
-        (velocity), 7 for the norm of U, 8 for that of U and V.
+        (velocity), 7 for the norm of U, 8 for the norm of U and V.
     stop_quotient : ndarray, shape (n,)
         Change of the right-hand side over change of the variable (1/s); infinite if the variable
         did not change, NaN without a stop.

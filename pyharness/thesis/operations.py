@@ -30,7 +30,7 @@ ALIKE = dict.fromkeys(_OPERATIONS, 1)
 class Count(NamedTuple):
     """The number, or total time, of arithmetic operations in a step.
 
-    `written` counts every operation on the cards; `once` omits repetitions.
+    `written` counts every operation on the cards; `once` counts repeated ones once.
     """
 
     written: int

@@ -1,8 +1,8 @@
 """A program's printed page and file TAPE5, from its trajectory.
 
 The page omits each record's carriage control, a blank. `data/printer.toml` has the FORMATs, with
-conjectural parts marked. `fortranformat` writes all values except negative zeros and those not
-finite.
+conjectural parts marked. The package `fortranformat` writes all values except negative zeros
+and those not finite.
 """
 
 import math
@@ -48,7 +48,7 @@ def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
 
 
 def _printed_rows(trajectory: Trajectory, form: str) -> list[list[float]]:
-    """Return omega (rad/s) and velocity (m/s) as floats that print like exact numbers."""
+    """Return omega (rad/s) and velocity (m/s) as floats that print like the exact values."""
     if trajectory.exact is None:
         assert trajectory.velocity is not None
         return np.hstack([trajectory.omega, trajectory.velocity]).tolist()  # type: ignore[no-any-return]

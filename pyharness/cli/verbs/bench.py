@@ -122,7 +122,7 @@ def _absent() -> str:
 
 
 def _count(options: argparse.Namespace) -> int:
-    """Return --draws, or 0; set the seed, by default the present year and week."""
+    """Return the number of draws, or 0; set the seed, by default the present year and week."""
     if options.draws is None:
         if options.seed is not None:
             raise InputError("--seed has no meaning without --draws, --ensemble or --terms")
@@ -242,7 +242,7 @@ def _choose_bodies(options: argparse.Namespace, default: int) -> int:
 
 
 def named(contenders: Sequence[_Named], text: str | None, what: str) -> list[_Named]:
-    """Return the solvers whose names or packages are in `text`, of option `what`.
+    """Return the solvers whose names or packages are in `text`, the value of option `what`.
 
     None selects all, "none" no solver.
     """

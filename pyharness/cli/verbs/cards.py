@@ -48,7 +48,8 @@ EXAMPLE = "cards runge-kutta:860"
 def run(options: argparse.Namespace) -> int:
     """Print cards with their scan, our Fortran and Python, and notes, or a requested comparison.
 
-    Return 1 if --scan or --collate finds a difference without a note, or --origins a mistake.
+    Return 1 if --scan or --collate finds a difference without a note, or --origins a mistake
+    in its data.
     """
     given = [options.format == "tei", options.classes, options.collate, options.origins]
     given += [options.second_reading, options.scan is not None]

@@ -68,7 +68,7 @@ EXAMPLE = "run --case 5 --method auto --times 1,2,3"
 def run(options: argparse.Namespace) -> int:
     """Print one trajectory by a program of the thesis or another method.
 
-    With --strict, return 1 unless its ending is "complete".
+    With --strict, return 1 unless the trajectory's ending is "complete".
     """
     if options.scene is not None and options.program is None and options.method is None:
         options.method = "auto"

@@ -43,10 +43,10 @@ class Laboratory:
 
     `parts` divides the step size of a run; `runs` and `error` have results only at the undivided
     steps. `may_stop` switches the Runge-Kutta program's stop test. Original programs lack the
-    defects in `fixed`. Errors are against the reference solution.
+    defects in `fixed`. Errors are differences from the reference solution.
 
-    The collocation model has n points at k DT/(n+1) in the step, k = 1 ... n. In the original
-    programs DT grows by the step size in every step; the torque must then be constant.
+    The collocation model (`models`) has n points at k DT/(n+1) in the step, k = 1 ... n. In the
+    original programs DT grows by the step size in every step; the torque must then be constant.
     """
 
     is_original: bool
@@ -102,7 +102,7 @@ class Laboratory:
         return _model(self.scene(case), terms, accumulates, self.assumptions.word)
 
     def required_constant(self, case: int) -> float:
-        """Return the least Lipschitz constant (1/s) that stops no run of a case, or infinity."""
+        """Return the least Lipschitz constant (1/s) with which a case does not stop, or infinity."""
         scene, listing = self.scene(case), self.listing("runge-kutta")
         constant = 0.0
         for _ in range(6 * scene.steps):
@@ -126,7 +126,7 @@ def start_text(start: Triple) -> str:
 
 
 def distance(first: Array, second: Array) -> float:
-    """Return the largest difference (rad/s) of any omega component over the steps in both."""
+    """Return the largest difference (rad/s) of any omega component over the common steps."""
     n = min(len(first), len(second))
     with np.errstate(all="ignore"):
         return float(np.abs(first[:n] - second[:n]).max(initial=0.0))

@@ -29,7 +29,7 @@ _OTHERS = WEIGHTINGS[1:]
 def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Judged:
     """Judge whether collocation is superior to Runge-Kutta.
 
-    Errors are compared over the steps that all programs ran. Cases in `shown` do not count as wins.
+    Errors are compared over the steps that all programs ran. Cases in `shown` are only reported.
     """
     numbers, wins = {}, 0
     for case in (*cases, *shown):
@@ -47,9 +47,9 @@ def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Jud
 def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
     """Judge whether eq. 19 of the thesis, the Lipschitz condition, ends unbounded runs.
 
-    A quotient is the change of a derivative between two stages over the change of its variable. For
-    the differential equations it is at most the Jacobian's largest norm. The stop test applies eq.
-    19 only if its quotients do not exceed this norm along reference solution and run.
+    The quotient in eq. 19 is the change of a derivative over the change of its variable. For the
+    differential equations, it is at most the largest norm of the Jacobian matrix. The stop test
+    applies eq. 19 only if its quotients do not exceed this norm along reference solution and run.
     """
     numbers: dict[str, float] = {}
     for case in cases:
@@ -177,8 +177,8 @@ def execution_time(
 ) -> Judged:
     """Judge whether collocation takes about twice the time of Runge-Kutta.
 
-    Operations per step, on the cards and in our LEQT1F, are weighted by `unit_times`, and counted
-    as written and with repeated terms once.
+    The operations in a step, on the cards and in our LEQT1F, are weighted by `unit_times`. They are
+    counted as written, and with each repeated term once.
     """
     listings = {program: lab.listing(program) for program in PROGRAMS}
     counts = {name: operations_per_step(each) for name, each in listings.items()}
@@ -249,9 +249,9 @@ def computer_error(
 ) -> Judged:
     """Judge whether rounding error makes the weightings other than collocation fail.
 
-    Rounding error (rad/s) is measured in Case 1, which every method solves exactly except for
-    rounding, with decreasing steps. It is also the difference between the methods of section IV.2
-    in binary64 and in the arithmetics `words`.
+    Rounding error (rad/s) is measured with decreasing steps in Case 1, where it is the only error.
+    Another measure is the difference of the methods of section IV.2 between binary64 and the
+    arithmetics `words`.
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})

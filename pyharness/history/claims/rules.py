@@ -53,7 +53,7 @@ def omega3_varies(bench: Bench, case: int, limit: float) -> Grade:
 
 
 def no_deviation(bench: Bench, case: int, limit: float) -> Grade:
-    """Test whether errors are below `limit` (rad/s), half a unit of the last decimal."""
+    """Test whether errors are below `limit` (rad/s), half a unit of the last printed place."""
     numbers = {f"{name}: largest error (rad/s)": bench.error(name, case) for name in PROGRAMS}
     return Grade(numbers, _most(numbers) < limit)
 
@@ -61,8 +61,8 @@ def no_deviation(bench: Bench, case: int, limit: float) -> Grade:
 def concur(bench: Bench, case: int, share: float) -> Grade:
     """Test whether the two-term and the four-term program agree in a case.
 
-    Omegas may differ by `share` times the largest omega and, by component, a tenth of the range;
-    the claim holds in part with the first condition alone.
+    Omegas may differ by `share` times the largest omega and, in each component, by a tenth of its
+    range. The first condition alone gives a grade in part.
     """
     truth = bench.solution(case)
     two, four = (bench.runs(program, case) for program in COLLOCATION)
@@ -84,8 +84,8 @@ def concur(bench: Bench, case: int, share: float) -> Grade:
 def fails(bench: Bench, case: int, share: float) -> Grade:
     """Test whether the Runge-Kutta program ends early and is wrong in a case.
 
-    Omega must deviate by over `share` of a component's range. One of the two conditions gives a
-    grade in part.
+    Omega must deviate by over `share` of a component's range. Either condition alone gives a grade
+    in part.
     """
     runs = bench.runs("runge-kutta", case)
     error = share_of_range(runs.omega, bench.solution(case))
@@ -131,7 +131,7 @@ def small_step(bench: Bench, cases: Sequence[int], exception: int) -> Grade:
     """Test whether a tenth of the step size improves collocation, except for one run.
 
     The exception is the two-term program in case `exception`. In four fifths of the other runs,
-    errors must be finite and at least halve; for a grade in part, in half.
+    errors must be finite and at least halve; half of them suffice for a grade in part.
     """
     numbers, improved, excepted = {}, [], np.False_
     for program in COLLOCATION:
@@ -172,7 +172,7 @@ def largest_error(
 
 
 def share_of_range(omega: Array, truth: Array) -> Array:
-    """Return omega's largest ratio of error to range among varying components."""
+    """Return the largest ratio of error to range among the varying components of omega."""
     spread = spread_of(truth)
     moving = spread > 1e-12 * largest_of(truth)[..., None]
     with np.errstate(all="ignore"):

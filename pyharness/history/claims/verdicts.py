@@ -1,8 +1,8 @@
 """Tests of the thesis's claims about one case.
 
 Each function is the `test` of claims in `data/claims.toml`, where a claim's `rule` describes the
-decision, and `parameters` are the keyword arguments; further tests are in `methods`, `theory` and
-`rules`. `lab` runs the programs, original or corrected; `case` is a number of Table 1.
+decision, and `parameters` are the keyword arguments. `lab` runs the programs, original or
+corrected; `case` is a number of Table 1.
 
 Errors are defined in `rules`. The amplitude is half the largest range of a component of the
 reference omega. A claim that fails is "not reproduced" or, if the test passes `otherwise`, "false".
@@ -67,7 +67,7 @@ def omega3_varies(lab: Laboratory, case: int, limit: float) -> Judged:
 def no_deviation(lab: Laboratory, case: int, limit: float) -> Judged:
     """Judge whether all three programs coincide with the known solution of a case.
 
-    The numbers include the Runge-Kutta steps from each of `starts`.
+    The numbers include the count of Runge-Kutta steps from each of `starts`.
     """
     found = judged(rules.no_deviation(lab, case, limit))
     for start in starts():
@@ -150,7 +150,7 @@ def growing(lab: Laboratory, case: int) -> Judged:
 def search(lab: Laboratory, case: int) -> Judged:
     """Return "not testable" for the claim that the author searched Runge-Kutta for a fault.
 
-    The number is the Runge-Kutta error over the corrected program's.
+    The number is the Runge-Kutta error divided by that of the corrected program.
     """
     run = lab.run("runge-kutta", case)
     best = Laboratory(False, lab.assumptions).run("runge-kutta", case)

@@ -286,7 +286,7 @@ def needed(method: str, bodies: int) -> None:
 
 
 def _resident(name: str) -> int:
-    """Return this process's ``VmRSS`` (memory now) or ``VmHWM`` (peak), bytes; on Linux, else 0."""
+    """Return this process's ``VmRSS`` (memory now) or ``VmHWM`` (peak), bytes; 0 if unknown."""
     with suppress(OSError), open("/proc/self/status", encoding="ascii") as file:
         for line in file:
             if line.startswith(name + ":"):

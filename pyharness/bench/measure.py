@@ -227,7 +227,7 @@ def relative_error(omega: Array, truth: Reference, scale: float = 0.0) -> float 
 def ladder(contender: SceneContender, scene: Scene, horizon: float) -> Iterator[float]:
     """Yield a contender's settings, from coarse to fine.
 
-    Numbers of steps grow by the factors 3/2 and 4/3 in turn; for orders up to 2, by the factor 2.
+    Numbers of steps are multiplied by 3/2 and 4/3 in turn or, for orders up to 2, by 2.
     """
     if contender.settings:
         yield from contender.settings

@@ -216,7 +216,7 @@ def heyoka_functions() -> Functions[Any]:
 
 
 def numba_fixed(method: str, scene: Scene) -> Maker:
-    """Return a function that prepares integrations by "rk4" or "dop8" (DOP853's), with numba."""
+    """Return a maker of numba's integrations by "rk4" or "dop8", DOP853's formula of order 8."""
     import numba
 
     formula: Tableau = RK4

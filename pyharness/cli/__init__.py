@@ -45,7 +45,7 @@ class _Terminal:
 
 
 def progress(done: int, total: int, what: str) -> None:
-    """Show on a terminal that `done` of `total` parts are complete; `what` names the next."""
+    """Show a progress bar on a terminal: `done` of `total` parts; `what` names the current."""
     global _bar
     if not sys.stderr.isatty():
         return

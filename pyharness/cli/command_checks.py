@@ -149,8 +149,8 @@ def show_self_test(
 ) -> int:
     """Write the report of a self-test; return 1 if an outcome fails, else 0.
 
-    `outcomes` has that of the checked software (the control), then those with `count` planted
-    faults. `refuse` is called if the control fails.
+    `outcomes` begins with a control, a run without fault; runs with `count` planted faults follow.
+    `refuse` is called if the control fails.
     """
     found = []
     for each in outcomes:

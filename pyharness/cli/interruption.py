@@ -110,8 +110,8 @@ def report() -> int:
 def leave(code: int) -> None:
     """Remove temporary files and end the process with exit status `code`.
 
-    Python's own exit would wait for threads, and Ctrl-C might be ignored or kill it. If `code` is
-    130, child processes are killed, and cleanup takes at most two seconds.
+    Python's own exit would wait for threads; Ctrl-C might be ignored or kill the process. If `code`
+    is 130, child processes are killed, and cleanup takes at most two seconds.
     """
     if code == CODE:
         # Messages of ending threads and finalizers would follow the report of the interrupt.

@@ -15,7 +15,7 @@ def schema() -> dict[str, Any]:
 
 
 def fields(whole: dict[str, Any], part: dict[str, Any], path: str) -> Iterator[tuple[str, str]]:
-    """Yield path, after the prefix `path`, and meaning of each field of a schema's `part`."""
+    """Yield path (beginning with `path`) and meaning of each field in `part` of a schema."""
     for name, each in part.get("properties", {}).items():
         own = each
         if "description" not in each:

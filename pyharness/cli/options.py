@@ -221,7 +221,7 @@ def changes_of(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def tell_inactive(options: argparse.Namespace, listings: Iterable[Listing]) -> None:
-    """Warn of requested readings and conjectures that no listing uses, and useless corrections."""
+    """Warn of readings, conjectures and corrections that are requested but have no effect."""
     asked = {*names(options.reading), *names(options.conjecture)} - {"none"}
     active = {name for listing in listings for name in listing.active}
     for name in sorted(asked - active - set(names(options.fix))):

@@ -74,7 +74,8 @@ def check_tree(path: str, mark: str, option: str, kind: str = "edition") -> None
 def check_replaceable(path: str, made: Callable[[Path], set[str]], option: str) -> None:
     """Raise InputError if `write_tree` may not replace the folder.
 
-    The folder may be missing, or contain only the files ``made(folder)`` of the verb.
+    The folder may be missing, or contain only files that the verb wrote, named by
+    ``made(folder)``.
     """
     check_folder(path, (), option)
     folder = Path(os.path.realpath(path))

@@ -129,7 +129,7 @@ def _draw_polhode(axes: Any, moments: Array, found: Trajectory) -> None:
 
 
 def _in_plane(found: Trajectory) -> Array:
-    """Return omega's components (rad/s) in the plane normal to its momentum, shape (n, 2)."""
+    """Return omega's components (rad/s) in the plane normal to the momentum, shape (n, 2)."""
     assert found.attitude is not None
     momentum = found.angular_momentum("space")[0]
     up = momentum / np.linalg.norm(momentum)

@@ -33,7 +33,7 @@ def bundle(entry: Path) -> str:
 def _add(
     path: Path, importing: tuple[Path, ...], exports: dict[Path, list[str]], parts: list[str]
 ) -> None:
-    """Append a module to `parts` after its imports; the modules `importing` led to it."""
+    """Append a module, imported through `importing`, to `parts` after its own imports."""
     text = path.read_text(encoding="utf-8")
 
     def declare(found: re.Match[str]) -> str:

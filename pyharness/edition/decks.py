@@ -129,7 +129,7 @@ def notes(program: str) -> list[Note]:
 
 @cache
 def _changes(name: str, program: str) -> tuple[float, float]:
-    """Return a correction's largest effects on the errors of omega (rad/s) and V (m/s)."""
+    """Return a correction's largest effects on the errors of omega (rad/s) and velocity (m/s)."""
     if name not in names_of("defect", program):
         return 0.0, 0.0
     found = [each for each in effects_of(name) if each.program == program]

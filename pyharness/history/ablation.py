@@ -40,7 +40,7 @@ class Effect:
     """The outcome of one program version (`listing`) on one scene.
 
     `omega` (rad/s) and `velocity` (m/s) are the largest errors over the completed `steps`, `common`
-    those over the steps that all compared listings completed.
+    the largest over the steps that all compared listings completed.
     """
 
     listing: Listing
@@ -100,7 +100,7 @@ def case_truth(case: int) -> Reference:
 
 
 def effects_of(name: str) -> Iterator[CaseEffects]:
-    """Yield an apparatus entry's effects by program and case; their `original` has the entry."""
+    """Yield an apparatus entry's effects by program and case; in each, `original` has the entry."""
     known = entry(name)
     for program in known["programs"]:
         printed = Listing.original(program).active

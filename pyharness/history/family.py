@@ -259,7 +259,7 @@ def family_members() -> list[Member]:
 def order_table(
     scene: Scene, members: Sequence[Member] | None = None, progress: Progress = no_progress
 ) -> list[OrderFinding]:
-    """Return order of convergence and error of each method in `members`, or `family_members`.
+    """Return order of convergence and error of each method, by default of `family_members`.
 
     The solution must be bounded, and the scene have at most `MOST_STEPS` steps.
     """

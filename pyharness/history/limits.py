@@ -52,7 +52,7 @@ Rate = Callable[[float, Sequence[float]], list[float]]
 
 @dataclass(frozen=True)
 class Halving:
-    """The largest distances (rad/s) of a run from limit and reference, or infinity."""
+    """A run's largest distances (rad/s) from limit and reference; infinite after an overflow."""
 
     step_size: float
     from_limit: float

@@ -39,8 +39,8 @@ def fits(
 ) -> list[Fit]:
     """Return the comparisons of a page with our pages of the same form, nearest first.
 
-    Pages of the same form agree in moments, torques and number of columns. Our runs have the steps
-    of the thesis's text or, if the page is longer, of the cards.
+    Pages of the same form agree in moments, torques and number of columns. Our runs have the number
+    of steps in the thesis's text or, if the page is longer, on the cards.
     """
     found: list[Fit] = []
     listings = {program: listings_of(program) for program in programs}

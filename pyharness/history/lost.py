@@ -89,7 +89,7 @@ def _share(scene: Scene, weighting: str, mistake: str, word: str = BINARY64) -> 
 def integrate(scene: Scene, weighting: str, mistake: str = "none") -> Array:
     """Return omega (rad/s) by a method with one mistake, under constant torque, shape (steps, 3).
 
-    Rows are NaN after an overflow. The arithmetic is that of the scene's numbers.
+    Rows are NaN after an overflow. The scene's numbers determine the arithmetic.
     """
     h = scene.step_size
     coefficients = scene.euler_coefficients

@@ -81,7 +81,7 @@ def read_cards() -> Iterator[ReadCard]:
 def misread_places(scan: str, reading: str) -> dict[int, str]:
     """Return by index in `scan` the text of `reading` where the two differ.
 
-    Inserted characters belong to the previous index, at the beginning to -1.
+    Inserted characters belong to the previous index, or to -1 at the beginning.
     """
     found: dict[int, str] = {}
     matcher = SequenceMatcher(None, scan, reading, autojunk=False)

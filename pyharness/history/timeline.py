@@ -14,8 +14,8 @@ class Event(NamedTuple):
     """An event in the history of the thesis, with its date and source.
 
     `first` and `last` are months, as in ``1979-01``, or empty; `why` explains an uncertain date.
-    `certainty` is ``certain`` if the source names the date, ``probable`` if it follows from another
-    entry, and ``unknown`` without a source.
+    `certainty` is ``certain`` if the source names the date, ``probable`` if the date follows from
+    another entry, and ``unknown`` without a source.
     """
 
     id: str

@@ -1,6 +1,6 @@
 """The effect of word length: runs with p significand bits, compared with binary64.
 
-Printed pages are compared with those in binary64, omega with the reference solution.
+Printed pages are compared with the page in binary64, omega with the reference solution.
 """
 
 from collections.abc import Iterator, Sequence

@@ -1,6 +1,6 @@
 """Runs of the programs in a floating-point format of `word.py`, such as the CDC's.
 
-Python ports run in every format, compiled programs only in those of IEEE 754. The Fortran
+Python ports run in every format, compiled programs only in formats of IEEE 754. The Fortran
 extension takes numbers as bytes in the machine's order.
 """
 

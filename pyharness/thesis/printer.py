@@ -1,8 +1,8 @@
 """A program's printed page and file TAPE5, from its trajectory.
 
 The page omits each record's carriage control, a blank. `data/printer.toml` has the FORMATs, with
-conjectural parts marked. The package `fortranformat` writes all values except negative zeros
-and those not finite.
+conjectural parts marked. The package `fortranformat` writes all values except negative zeros and
+those not finite.
 """
 
 import math
@@ -31,8 +31,8 @@ _PLACES = re.compile(r"F\d+\.(\d+)")
 def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
     """Return the text that `program` prints for its run.
 
-    The moments and torques of `scene`, which must have moments, precede a line for each step, the
-    last of which may have failed the stop test. Lines have no trailing blanks.
+    The moments and torques of `scene`, which must have moments, precede a line for each step. The
+    last step may have failed the stop test. Lines have no trailing blanks.
     """
     formats = formats_of(program)
     assert scene.moments is not None

@@ -244,7 +244,7 @@ def _by_choice(atlas: Atlas) -> Table:
 
 
 def _percentage_turned(atlas: Atlas) -> Table:
-    """Return by claim the percentage of verdicts changed by each other reading or step count."""
+    """Return by claim the percentage of verdicts that another reading or step count changes."""
     places = [(k, 0) for k in range(1, len(atlas.readings))]
     places += [(0, m) for m in range(1, len(atlas.steps))]
     rows = []

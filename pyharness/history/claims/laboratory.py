@@ -102,7 +102,7 @@ class Laboratory:
         return _model(self.scene(case), terms, accumulates, self.assumptions.word)
 
     def required_constant(self, case: int) -> float:
-        """Return the least Lipschitz constant (1/s) with which a case does not stop, or infinity."""
+        """Return the least Lipschitz constant (1/s) that does not stop a case, or infinity."""
         scene, listing = self.scene(case), self.listing("runge-kutta")
         constant = 0.0
         for _ in range(6 * scene.steps):

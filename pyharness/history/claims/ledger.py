@@ -34,7 +34,7 @@ class Survival:
 class Judgement:
     """The verdicts on a claim, from runs of the original and of the corrected program.
 
-    `survivals` has the verdicts with each assumption changed alone.
+    `survivals` has the verdicts with one assumption changed at a time.
     """
 
     claim: dict[str, Any]
@@ -122,11 +122,7 @@ def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:
 
 
 def assignments() -> list[Assignment]:
-    """Return the verdicts from each initial omega in each case for which the thesis gives none.
-
-    As claims about a case do not depend on omega(0) in another, all can hold at once if each case
-    has an omega(0) with which its claims hold.
-    """
+    """Return the verdicts from each initial omega in each case for which the thesis gives none."""
     found = []
     for case in open_starts():
         about = [each for each in claims() if each.get("parameters", {}).get("case") == case]
@@ -278,7 +274,7 @@ def _hangs_on(judgement: Judgement) -> list[str]:
 
 
 def written(x: float) -> str:
-    """Return a number as text: whole ones below a million exactly, others to three digits."""
+    """Return a number as text: whole numbers below a million in full, others to three digits."""
     if not math.isfinite(x):
         return short(x)
     return f"{x:.0f}" if x == int(x) and abs(x) < 1e6 else f"{x:.3g}"

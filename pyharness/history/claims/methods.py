@@ -156,7 +156,7 @@ def suffices(
 ) -> Judged:
     """Judge whether three- or four-term collocation is "probably sufficient for most problems".
 
-    In `enough` cases, both errors must be at most `share` of the largest omega. For original
+    In `enough` cases, the errors of both must be at most `share` of the largest omega. For original
     programs, the three-term model is omitted if the torque varies.
     """
     numbers, good = {}, 0

@@ -2,8 +2,8 @@
 
 A bench supplies runs and solutions: a `Laboratory` for one start, `Starts` for n starts. `parts`
 divides the step size; rows are at the undivided steps. Arrays of omega have the shape (steps, 3) or
-(n, steps, 3), values of a `Grade` () or (n,). A claim's `rule` in `data/claims.toml` says when it
-holds, and when in part.
+(n, steps, 3); values of a `Grade` have the shape () or (n,). A claim's `rule` in `data/claims.toml`
+says when it holds, and when in part.
 
 An error is the largest deviation of any omega component from the reference solution, over the
 completed steps.

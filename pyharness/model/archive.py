@@ -36,7 +36,7 @@ def checked_path(where: str, path: object) -> str:
 
 
 def checked_file(where: str, path: object) -> str:
-    """Return `checked_path`; raise InputError if not writable, or named like a text file."""
+    """Return `checked_path`; raise InputError for a text file's ending or an unwritable file."""
     name = checked_path(where, path)
     ending = os.path.splitext(name)[1].lower()
     if ending in _OTHERS:
@@ -72,8 +72,8 @@ def read_archive(
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return the arrays and the header of an archive; raise InputError if it is damaged.
 
-    `kinds` are names of the kind of content, in the header and in messages; `known` are the allowed
-    arrays; `written` describes a valid file in messages.
+    `kinds` names the kind of content, first as in the header, then as in messages; `known` has the
+    allowed arrays; `written` describes a valid file in messages.
     """
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     content = read_input(name, where, memory // 4, written)

@@ -1,4 +1,4 @@
-"""Checks of arrays for many bodies, with one row per body or one for all."""
+"""Checks of arrays for many bodies, with a row for each body or one row for all."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -94,7 +94,7 @@ def row_of(array: Array, i: int) -> Any:
 
 
 def only_one(given: Mapping[str, object]) -> str:
-    """Return the name of the only argument other than None, or ""."""
+    """Return the name of the argument that is not None, or ""; raise InputError for two."""
     names = [name for name, value in given.items() if value is not None]
     if len(names) > 1:
         raise InputError(f"{' and '.join(names)} are both given; give one of them")
@@ -109,7 +109,7 @@ def threads_of(threads: object) -> int:
 
 
 def buffer_of(where: str, array: Any, shape: tuple[int, ...], kind: str) -> Any:
-    """Return a user's output array if a kernel can write to it; `kind` is its type, such as "d"."""
+    """Return a user's output array; raise InputError unless a kernel can write to it."""
     right = isinstance(array, np.ndarray) and array.shape == shape and array.dtype == kind
     if not (right and array.flags.c_contiguous and array.flags.writeable and array.flags.aligned):
         raise InputError(

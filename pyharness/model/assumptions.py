@@ -8,10 +8,10 @@ from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 
 MARK = "*"
-"""The sign on a number that is assumed, in commands and pages; every terminal can show it."""
+"""The sign of an assumed number in outputs and pages; every terminal can show it."""
 
 ASSUMED = f"{MARK} assumed"
-"""The sign with its word."""
+"""The sign and its meaning."""
 
 Runs = Iterable[tuple[Scene, Iterable[Listing]]]
 """Scenes, each with the listings that ran in it."""
@@ -22,7 +22,7 @@ def assumptions() -> list[dict[str, Any]]:
 
 
 def open_starts() -> dict[int, str]:
-    """Return, by number of a case without omega(0) in the thesis, the source of our value."""
+    """Return the source of our omega(0) by case number, for cases where the thesis has none."""
     cases = facts("cases")["case"]
     return {each["number"]: each["assumed_omega"] for each in cases if "assumed_omega" in each}
 
@@ -79,7 +79,7 @@ def assumption_records(runs: Runs) -> list[dict[str, Any]]:
 
 
 def claim_records() -> list[dict[str, Any]]:
-    """Return the assumptions that affect verdicts on claims alone."""
+    """Return the assumptions that affect only the verdicts on claims."""
     return [_record(each, each["what"]) for each in assumptions() if each["on"] == "claim"]
 
 
@@ -88,7 +88,7 @@ def _record(each: dict[str, Any], what: str) -> dict[str, Any]:
 
 
 def legend(runs: Sequence[tuple[Scene, Iterable[Listing]]]) -> list[str]:
-    """Return a list of the line that explains the marks of runs; empty without marks."""
+    """Return a list with the line that explains the marks of `runs`; empty without marks."""
     every = {scene.case for scene, _ in runs}
     told = []
     for each in assumption_records(runs):

@@ -28,7 +28,7 @@ SEQUENCES = ("3-1-3", "3-2-1")
 FORMS = ("quaternion", *SEQUENCES, "matrix")
 NEAR_ONE = 1e-12  # largest deviation of a norm from 1 that counts as rounding
 _ROUNDED = 2.0**-51  # deviation of a norm from 1 that normalisation cannot reduce
-_PARALLEL = 2.0**-51  # sine of half an angle that is a rounding error
+_PARALLEL = 2.0**-51  # largest sine of half an angle that counts as rounding
 
 
 def scalar_first(values: object) -> Any:
@@ -95,7 +95,7 @@ def angles(attitude: Array, sequence: str) -> Array:
     """Return n attitudes, (n, 4), as angles (degrees) of three successive rotations, (n, 3).
 
     If the first and last axes are parallel, only the sum or difference of their angles is
-    determined, and the last is 0.
+    determined, and the last angle is set to 0.
     """
     q0, q1, q2, q3 = attitude.T
     if sequence == "3-1-3":
@@ -161,7 +161,7 @@ def quaternions_of_axes(axes: Array) -> Array:
 
 def rotated(vectors: Array, matrix: Array) -> Array:
     """Return one or n matrices, (3, 3), times one or n vectors, (3,)."""
-    # In this order, the sums have the same bits for any n, and in C.
+    # In this order, the sums have the same bits for any n, and the same as in C.
     x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
     return np.stack(
         [(x * matrix[..., i, 0] + y * matrix[..., i, 1]) + z * matrix[..., i, 2] for i in range(3)],

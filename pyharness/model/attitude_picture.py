@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 ANIMATIONS = ("gif", "html")
 _COLORS = ("#c1272d", "#0a7d3c", "#1f4e9e")  # of body axes 1, 2, 3
 _PAUSE = 0.05  # s between frames; a GIF stores it in hundredths of a second
-# Shortest and longest animation (s); between them it runs in true time.
+# Shortest and longest animation (s); a motion of a length between them is shown in true time.
 _SHORTEST, _LONGEST = 2.0, 10.0
 _EDGES = [
     (a, b) for a in range(8) for b in range(a) if bin(a ^ b).count("1") == 1
@@ -33,7 +33,7 @@ _EDGES = [
 
 
 def draw_sphere(axes: Any, found: "Trajectory") -> None:
-    """Draw paths of the body axes and omega in space, with a dot or cross at the end."""
+    """Draw the directions of body axes and omega in space; dots and a cross mark the end."""
     assert found.attitude is not None
     _frame(axes)
     turned = matrices(found.attitude)
@@ -70,7 +70,7 @@ class _Motion(NamedTuple):
 
 
 def check_animation(path: object, moments: Triple | Changing | None) -> str:
-    """Return `path` as text; raise InputError for another format, or if no brick has `moments`."""
+    """Return `path` as text; raise InputError for unknown formats, or if no brick has `moments`."""
     if not isinstance(path, (str, os.PathLike)):
         raise InputError(f"animate: {kind_of(path)}; allowed: a path, as text or a Path")
     name = os.fsdecode(path)

@@ -14,8 +14,8 @@ MARKS = {
 class Basis:
     """The reason for a check's limit: proof, derivation or measurement.
 
-    `mark`, a key of `MARKS`, classifies its weakest part; `source`, in Markdown, names a theorem,
-    derivation or command.
+    `mark`, a key of `MARKS`, classifies the weakest part of the reason; `source`, in Markdown,
+    names a theorem, derivation or command.
     """
 
     mark: str

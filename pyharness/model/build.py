@@ -31,7 +31,7 @@ INFLUENCES = (
 """Environment variables that may change results, output, imports or builds."""
 
 AS_WRITTEN = "as written"
-"""The value of "arithmetic" of `installation` unless an option or a library changes it."""
+"""The value of "arithmetic" in `installation` if nothing changes the kernels' arithmetic."""
 
 _LEVELS = ("plain", "avx2", "avx512")
 
@@ -71,7 +71,7 @@ def build() -> Build:
 
 
 def installation() -> dict[str, Any]:
-    """Return data on installation and machine for a bug report; None if unknown.
+    """Return data on installation and machine for a bug report; unknown values are None.
 
     "arithmetic" names the option or library that changes the kernels' arithmetic.
     """

@@ -22,7 +22,7 @@ _MATRICES = f"allowed: a list of 1 to {_MOST} matrices, each of three rows of th
 
 
 class Changing:
-    """The base class of changing inertias; its methods are for polynomials."""
+    """The base class of changing inertias; the methods here are for polynomials."""
 
     if TYPE_CHECKING:
 
@@ -83,7 +83,7 @@ class Changing:
 
     @cached_property
     def span(self) -> tuple[float, float]:
-        """The interval (s) around time 0 with a positive definite inertia; it may be infinite."""
+        """The interval (s) around time 0 where the inertia is positive definite; maybe infinite."""
         # Imported only here, because the programs need no exact numbers.
         from pyharness.model.exact_zeros import determinant, first_zeros
 
@@ -112,8 +112,8 @@ class ChangingMoments(Changing):
 
     Mass moves relative to the body, as with booms or propellant, but the principal axes are fixed
     in the body. With the moments I and the torque N, I omega' = N - I' omega - omega x (I omega).
-    Moving mass is assumed to have no angular momentum relative to the body axes, and mass that
-    leaves, no angular momentum about the centre of mass.
+    We assume that moving mass has no angular momentum relative to the body axes, and that leaving
+    mass has none about the centre of mass.
 
     Parameters
     ----------

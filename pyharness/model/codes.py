@@ -10,12 +10,12 @@ class Statuses:
     COMPLETE = 0  # all requested rows are present
     STOPPED = 1  # the Lipschitz test ended the run
     OVERFLOW = 2  # an angular velocity overflowed
-    REFUSED = 3  # the method does not apply to the input, for example to these coefficients
+    REFUSED = 3  # the method does not apply to the input
     GAVE_UP = 4  # work limit exceeded, or no correct digit of the phase is left
     INTERRUPTED = 5  # the user interrupted it; a Python exception is set
     SENSITIVE = 6  # all rows are present, but the amplified rounding error exceeds the tolerance
     UNCHECKED = 7  # all rows are present; SciPy may have stepped over a short change of the torque
-    SINGULAR = 8  # the torque is undefined at the last time; neither it nor omega is infinite
+    SINGULAR = 8  # the torque is undefined at the last time, but torque and omega are not infinite
     SLIDING = 9  # a switch of the torque would change back and forth without end
 
 
@@ -61,8 +61,8 @@ class Series:
     MOST_ORDER = 24
     LEAST_LOCAL_TOLERANCE = 1e-19  # relative to omega: size of the last Taylor terms of a step
     SLACK = 16.0  # a step is shortened if its last Taylor terms exceed this many local tolerances
-    # Phase (rad) of the fastest perturbation. In a longer motion, inaccurate perturbations lose
-    # their phase, and their computed growth, the error amplification, is too small.
+    # Phase (rad) of the fastest perturbation. Over a longer time, inaccurate perturbations lose
+    # their phase, and the error amplification computed from them is too small.
     LONG = 5000.0
 
 
@@ -89,7 +89,10 @@ class Storage:
 
 
 class Operations:
-    """The codes of recorded operations."""
+    """The codes of recorded operations.
+
+    A weighted term is a term of a Taylor series times its number.
+    """
 
     LINEAR = 1  # a constant plus a linear combination of operands
     PRODUCT = 2

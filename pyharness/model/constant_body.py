@@ -17,9 +17,9 @@ from pyharness.model.values import Matrix
 
 
 def integrated(scene: Scene) -> Scene:
-    """Return the scene about the axes about which it is integrated.
+    """Return the scene about the axes for its integration.
 
-    These are principal axes. Under a torque with switches they are the body axes, because rounding
+    These are the principal axes or, under a torque with switches, the body axes, because rounding
     in a rotation might move the initial state off a switch's threshold.
     """
     torque = scene.torque

@@ -52,7 +52,7 @@ class _Quantity(NamedTuple):
 class Conversions:
     """The base class of trajectories.
 
-    Quantities use the value of a changing inertia at each time.
+    If the inertia changes, quantities use its value at each time.
     """
 
     time: Array
@@ -362,7 +362,7 @@ class Conversions:
         return ax
 
     def animate(self, path: str | os.PathLike[str]) -> None:
-        """Write an animation of a brick that has the moments of the body and moves like it.
+        """Write an animation of a brick that has the moments of the body and moves like the body.
 
         The frames are 0.05 s apart. A motion shorter than 2 s is stretched to 2 s, and one longer
         than 10 s compressed to 10 s. Without dense output, a frame shows the result at the nearest
@@ -395,9 +395,8 @@ class Conversions:
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the trajectory with its scene to a file, from which `pyharness.load` restores it.
 
-        Numbers are restored bit for bit. The format is as of `numpy.savez`, with an array for each
-        array attribute. The array `scene` is the text of a scene file; `header`, in JSON, has the
-        other attributes and the operations of a recorded torque.
+        Numbers are restored bit for bit. As in files of `numpy.savez`, there is an array for each
+        array attribute.
 
         Parameters
         ----------
@@ -408,7 +407,7 @@ class Conversions:
         ------
         InputError
             If the file can't be written or has a text file's ending, the torque is not recorded, or
-            a program in another arithmetic than binary64 computed the trajectory.
+            a program in an arithmetic other than binary64 computed the trajectory.
 
         Examples
         --------

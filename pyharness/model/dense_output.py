@@ -25,7 +25,7 @@ def points(count: int) -> Array:
 
 
 def to_coefficients(count: int) -> Array:
-    """Return the matrix from values at the `points` to Chebyshev coefficients."""
+    """Return the matrix that maps values at the `points` to Chebyshev coefficients."""
     # Angles up to pi have the smallest rounding errors.
     turns = np.outer(np.arange(count), np.arange(count)[::-1]) % (2 * count - 2)
     angles = np.pi * np.minimum(turns, 2 * count - 2 - turns) / (count - 1)
@@ -44,7 +44,7 @@ def nodes(low: Array, high: Array, at: Array) -> Array:
     return found
 
 
-NODES = Storage.AT_ONCE + 1  # of a polynomial
+NODES = Storage.AT_ONCE + 1  # number of nodes of a polynomial
 POINTS = points(NODES)
 TO_COEFFICIENTS = to_coefficients(NODES)
 _ROUNDED = 4.0  # units in the last place by which a time such as n*dt may exceed an end
@@ -77,10 +77,10 @@ class Pieces:
 
 
 def sizes_of(largest: Array, n_own: int) -> Array:
-    """Return the sizes, (..., m), to which errors of m unknowns are relative.
+    """Return the sizes, (..., m), by which errors of m unknowns are divided.
 
-    From the `largest` values, the size is the largest component for omega, 1 for the quaternion,
-    and the value itself for the last `n_own` unknowns.
+    `largest` has the largest value of each unknown. The size is the largest of three values for
+    omega, 1 for the quaternion, and the value itself for each of the `n_own` own states.
     """
     sizes = np.ones_like(largest)
     sizes[..., :3] = largest[..., :3].max(axis=-1, keepdims=True)

@@ -1,4 +1,4 @@
-"""Forward differentiation by dual numbers, and recorded derivatives of recorded operations."""
+"""Dual numbers (forward differentiation), which record the derivatives of a recorded function."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -65,7 +65,7 @@ def dual(value: Any, count: int) -> Dual:
 
 
 def with_derivatives(tape: Tape, slots: Sequence[int]) -> Tape:
-    """Return a tape with the outputs, then their derivatives with respect to inputs `slots`."""
+    """Return a tape of the outputs, then of their derivatives with respect to inputs `slots`."""
     recorder = Recorder(_MORE * MOST_OPERATIONS)
     inputs = [
         Dual(symbol, [float(slot == each) for each in slots])
@@ -76,7 +76,7 @@ def with_derivatives(tape: Tape, slots: Sequence[int]) -> Tape:
 
 
 def with_parameters(tape: Tape, values: Sequence[float]) -> Tape:
-    """Return a tape with the derivatives of the outputs by parameters, then the outputs.
+    """Return a tape of the outputs' derivatives with respect to parameters, then of the outputs.
 
     The parameters, the last inputs of `tape`, become the constants `values`.
     """
@@ -98,7 +98,7 @@ def of_duals(
 ) -> Callable[[Any], Any]:
     """Return `function` for numbers and dual numbers; its derivative is ``slope(argument, value)``.
 
-    `symbolic`, if any, computes values of dual numbers.
+    `symbolic`, if given, replaces `function` for the values of dual numbers.
     """
 
     def called(x: Any) -> Any:

@@ -38,7 +38,7 @@ class Integrator(Protocol):
 
 
 def advice(instead: str, effort: float, needed: float | None = None) -> str:
-    """Return the end of a message on the work limit: `instead`, or a larger effort."""
+    """Return the advice of a message on the work limit: `instead`, or a larger effort."""
     factor = suggested(effort, needed)
     return f"{instead}, or allow more work: --effort {factor} (effort={factor} in Python)"
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Ensemble(BatchResult):
-    """The final states of many scenes, from `solve_many`.
+    """The states of many bodies, from `solve_many`.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class Ensemble(BatchResult):
         m.
     leaves : str or None
         Whether compiled code (``compiled``) or an ``interpreter`` computed the Taylor series of a
-        recorded torque, with the reason if `compiled` was requested in vain.
+        recorded torque, with the reason if `compiled` was requested but impossible.
 
     Examples
     --------
@@ -117,7 +117,7 @@ class Ensemble(BatchResult):
         Raises
         ------
         InputError
-            If not exactly one of `moments` and `inertia` is given, or it has not one row or n rows;
+            If not exactly one of `moments` and `inertia` is given, or it has neither 1 nor n rows;
             if a matrix is not symmetric, the frame is unknown, or "space" is requested without
             attitudes.
         """
@@ -237,8 +237,8 @@ class Ensemble(BatchResult):
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Draw the three components of omega of all bodies with matplotlib.
 
-        With `times`, it draws the median and the middle 90 % of the bodies, else the cumulative
-        distribution of the final values.
+        With `times`, it draws the median and the middle 90 % of the bodies; otherwise the
+        cumulative distribution of the final values.
 
         Parameters
         ----------
@@ -279,7 +279,7 @@ class Ensemble(BatchResult):
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the ensemble to a file, from which `Ensemble.load` restores it bit for bit.
 
-        The format is as of `numpy.savez`, with an array for each attribute.
+        As in files of `numpy.savez`, there is an array for each attribute.
 
         Parameters
         ----------
@@ -320,7 +320,7 @@ _NO_ESTIMATES = np.empty((2, 0), order="F")
 def place_for(
     out: "Ensemble | Array | None", n: int, with_attitude: bool, with_estimates: bool = False
 ) -> Ensemble:
-    """Return an Ensemble for n bodies: `out`, one around the array `out`, or a new one."""
+    """Return an Ensemble for n bodies: `out`, one whose omega is the array `out`, or a new one."""
     shape = (n, 3)
     if out is None or isinstance(out, np.ndarray):
         omega = np.empty(shape) if out is None else buffer_of("out", out, shape, "d")

@@ -31,7 +31,7 @@ class InputError(ValueError):
         super().__init__(line)
 
 
-# The reason of an integration's end at a switch.
+# The reason for the end of an integration at a switch.
 SLIDING = (
     "a switch (where, sign, a comparison) would change back and forth without end from t = {time} "
     "s on; write a smooth function, such as tanh(x/width), or hold the torque between steps of a "
@@ -91,7 +91,7 @@ def kind_of(value: object) -> str:
     for name, types in kinds.items():
         if isinstance(value, types):
             return name
-    # Attributes are read so that NumPy need not be imported. An array is a list.
+    # Attributes are read so that NumPy need not be imported. An array counts as a list.
     dtype_kind = getattr(getattr(value, "dtype", None), "kind", None)
     if isinstance(dtype_kind, str):
         if getattr(value, "shape", ()) != ():

@@ -45,12 +45,12 @@ def _first_zero(polynomial: Sequence[Fraction]) -> float:
     while not whole[-1]:
         whole.pop()
     exponent = _bound(whole)
-    # No positive zero exceeds 2**exponent s; the unknown is time over this bound.
+    # No positive zero exceeds 2**exponent s; the unknown is time divided by this bound.
     least = min(0, exponent * (len(whole) - 1))
     row = _bernstein([c << (exponent * n - least) for n, c in enumerate(whole)])
     unit = Fraction(2) ** exponent
-    # A polynomial is above 0 in an interval if its coefficients in Bernstein's basis are (Farouki
-    # 2012, Computer Aided Geometric Design 29). Other intervals are halved.
+    # A polynomial is positive in an interval if its coefficients in Bernstein's basis are positive
+    # (Farouki 2012, Computer Aided Geometric Design 29). Other intervals are halved.
     pieces = [(Fraction(0), Fraction(1), row)]
     while pieces:
         begin, end, row = pieces.pop()

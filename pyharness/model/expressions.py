@@ -28,7 +28,7 @@ _OF_ONE = (
     "sqrt", "cbrt", "sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh",
     "tanh", "abs", "sign", "floor", "heaviside",
 )  # fmt: skip
-# The numbers of arguments.
+# The number of arguments by name.
 _COUNTS = dict.fromkeys(_OF_ONE, 1) | {"atan2": 2, "min": 2, "max": 2, "clip": 3, "where": 3}
 FUNCTIONS = tuple(_COUNTS)
 _LONGEST = 10_000
@@ -59,7 +59,7 @@ _COMPARISONS: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
 def parsed(
     expressions: object, constants: object, rates: Mapping[str, object] = MappingProxyType({})
 ) -> StateTorque | TorqueLaw:
-    """Return the torque of three expressions about the body axes, as a torque law if possible.
+    """Return the torque of three expressions about the body axes, as a TorqueLaw if possible.
 
     They may contain t (s), w1 to w3 (rad/s), the quaternion q0 to q3, pi, names in `constants`, and
     own states (`Scene.states`) with the time derivatives `rates`. Units are N m, or rad/s2 for a
@@ -157,7 +157,7 @@ def _component(text: str, names: Mapping[str, Any], place: str) -> Any:
         except ZeroDivisionError:
             raise InputError(f"{place}: division by the constant 0") from None
         except InputError as error:
-            # Messages of symbols lack the expression.
+            # Messages of symbols do not name the expression.
             message = str(error)
             if message.startswith("[torque]: "):
                 raise InputError(f"{place}: {message.removeprefix('[torque]: ')}") from None

@@ -1,8 +1,8 @@
 """Principal moments and axes of inertia matrices, diagonalised in integers.
 
 In binary64, a small eigenvalue would have few correct digits. Elements are integer multiples of a
-power of 2, u, and a regular matrix has an absolute determinant of at least u**3. This bounds the
-smallest eigenvalue, and determines how many bits are enough.
+power of 2, u, and a regular matrix has an absolute determinant of at least u**3. This is a
+lower bound for the smallest eigenvalue, and determines how many bits are enough.
 """
 
 import math
@@ -19,7 +19,7 @@ from pyharness.model.values import Triple, converted, number_list, three, triple
 
 Exact = tuple[Fraction, Fraction, Fraction]
 
-SYMMETRIC = 1e-12  # allowed asymmetry of elements, over the largest element
+SYMMETRIC = 1e-12  # allowed asymmetry of elements, relative to the largest
 _KEPT = 256  # number of cached principal frames
 # Least number of bits of an eigenvalue that is not 0; more than the 106 bits of double-double
 # numbers.
@@ -126,8 +126,8 @@ def diagonalised(
 ) -> tuple[Exact, tuple[Exact, Exact, Exact]]:
     """Return the eigenvalues and orthonormal eigenvectors by Jacobi's method in integers.
 
-    Relative errors are at most 2**-100; zero eigenvalues are exact. For a diagonal matrix, the
-    eigenvalues are in the order of its elements.
+    Relative errors of eigenvalues are at most 2**-100; zero eigenvalues are exact. For a diagonal
+    matrix, the eigenvalues are in the order of its elements.
     """
     exponent = min((_last_bit(x) for row in matrix for x in row if x), default=0)
     whole = [[int(Fraction(x) / Fraction(2) ** exponent) for x in row] for row in matrix]

@@ -116,7 +116,7 @@ def _outputs(tape: Tape, time: Any) -> list[Any]:
 def inertia_function(place: str, function: Callable[[Any], Any]) -> InertiaFunction:
     """Return the moments or inertia matrix of a user's function of time.
 
-    It must be recordable, continuous, and depend on time alone.
+    The function must be recordable, continuous, and depend on time alone.
     """
     where, allowed = f"[body] {place}", f"a function of t that returns {_RETURNS[place]}, in kg m2"
 
@@ -158,7 +158,10 @@ def inertia_of_tables(
 
 
 def checked_function(found: InertiaFunction) -> InertiaFunction:
-    """Raise InputError if an inertia jumps, is asymmetric, or not positive definite at time 0."""
+    """Return `found` if it is a valid inertia.
+
+    Raise InputError if it may jump, is asymmetric, or not positive definite at time 0.
+    """
     # Imported only here, because most scenes need no exact numbers.
     from pyharness.model.inertia import checked_inertia
 
@@ -231,6 +234,6 @@ def _has_jumps(table: Table) -> bool:
     lengths = np.diff(table.breaks)
     c0, c1, c2, c3 = table.pieces[:-1].T
     ends = c0 + lengths * (c1 + lengths * (c2 + lengths * c3))
-    # An end may be 0, but for rounding of the terms.
+    # If the terms of an end cancel, their sizes limit the rounding error of the sum.
     sizes = abs(c0) + lengths * (abs(c1) + lengths * (abs(c2) + lengths * abs(c3)))
     return bool((np.abs(ends - table.pieces[1:, 0]) > _CONTINUOUS * sizes).any())

@@ -33,7 +33,7 @@ class Listing:
     Raises
     ------
     InputError
-        For an unknown program, or a name that it does not have.
+        For an unknown program, or a name that the program does not have.
 
     Examples
     --------

@@ -1,7 +1,8 @@
 """Replacements of NumPy's functions while a user's function is recorded with symbols.
 
-Symbols do not support choices (such as where), array comparisons, linear algebra, and assignment to
-elements of numpy.zeros. Calls from other threads or without symbols reach the originals.
+NumPy's own functions do not support choices (such as where), comparisons of arrays, linear algebra
+or assignment to elements of numpy.zeros for symbols. Calls from other threads or without symbols
+reach the originals.
 """
 
 import math
@@ -19,7 +20,7 @@ from pyharness.model.errors import InputError, printable
 from pyharness.model.symbols import Recorder, Symbol, negated, select
 from pyharness.model.tape import Table
 
-_MOST_PIECES = 200  # of a table of the state
+_MOST_PIECES = 200  # most pieces of an interpolation in the state
 
 _lock = threading.Lock()
 _installed = 0
@@ -29,7 +30,7 @@ _originals: list[tuple[Any, str, Any]] = []
 
 @contextmanager
 def replaced_functions(with_targets: bool) -> Iterator[None]:
-    """Replace functions in this thread; `with_targets`, also numpy.zeros, empty and ones."""
+    """Replace functions in this thread; if `with_targets`, also numpy.zeros, empty and ones."""
     global _installed
     before = getattr(_here, "targets", None)
     with _lock:
@@ -58,7 +59,7 @@ def _install() -> None:
 class _Replaced:
     def __init__(self, original: Callable[..., Any], function: Callable[..., Any]) -> None:
         self._original, self._function = original, function
-        # Modules that are imported meanwhile read its name and signature.
+        # Modules that are imported meanwhile read the function's name and signature.
         update_wrapper(self, original)
 
     def __call__(self, *given: Any, **named: Any) -> Any:
@@ -108,7 +109,7 @@ def _has_symbol(value: Any) -> bool:
 def _comparison(compare: Callable[[Any, Any], Any]) -> Any:
     def compared(x: Any, y: Any) -> Any:
         found = compare(x, y)
-        # ~True is a number in Python.
+        # ~True is -2 in Python, not False.
         return np.bool_(found) if isinstance(found, bool) else found
 
     return lambda array, other: np.frompyfunc(compared, 2, 1)(array, other)
@@ -216,7 +217,7 @@ def _interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None) -> An
                 f"interp of {len(places)} points",
                 f"at most {_MOST_PIECES} points, torques.table for a function of time",
             )
-        # A sum over all pieces would have the rounding errors of the largest.
+        # A sum over all pieces would have the rounding errors of the largest piece.
         found, before = values[0], 0.0
         slopes = [*(np.diff(values) / np.diff(places)), 0.0]
         for place, value, slope in zip(places, values, slopes, strict=True):
@@ -374,7 +375,7 @@ _OF_MATH = (
     | {name: _CHOICES[name] for name in ("copysign", "fabs", "fmod", "hypot")}
     | {"atan2": _CHOICES["arctan2"], "pow": _by_element(operator.pow, 2)}
 )
-# The functions of scene files, of numbers and symbols.
+# The functions of scene files, for numbers and symbols.
 ELEMENTARY: dict[str, Callable[..., Any]] = {
     name: _OF_MATH[name]
     for name in (

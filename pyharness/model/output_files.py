@@ -109,8 +109,8 @@ class DeferredInterrupt:
 class _File:
     def __init__(self, path: str) -> None:
         self.path = path
-        # A link is followed to its target, as in an ordinary write. Temporary files are in the
-        # target's folder, because a rename works only within a file system.
+        # Temporary files are in the target's folder, because a rename works only within a file
+        # system.
         self.target = os.path.realpath(path)
         beside = os.path.join(os.path.dirname(self.target), f".pyharness-{os.urandom(8).hex()}")
         self.new, self.old = f"{beside}-new", f"{beside}-old"

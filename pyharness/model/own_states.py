@@ -7,7 +7,7 @@ from pyharness.model.errors import InputError, kind_of
 from pyharness.model.values import finite
 
 _LARGE = 1e120  # products of smaller states, and of their errors, are finite
-MOST_STATES = 8  # for which the kernel has places
+MOST_STATES = 8  # the kernel has no place for more
 # Names of other columns of results, and of other values in expressions.
 _TAKEN = (
     *("t", "time", "recorded_time", "omega", "omega1", "omega2", "omega3", "velocity", "velocity1"),

@@ -1,4 +1,4 @@
-"""Files that may be pipes or devices, with limited waiting."""
+"""Reading and writing of pipes, devices and files, with limited waiting."""
 
 import errno
 import os

@@ -14,10 +14,10 @@ from pyharness.model.values import boolean
 Progress = Callable[[int, int, str], None]
 """The type of a function that is called whenever a part of a computation is completed.
 
-Its arguments are the number of completed parts, the number of all, and the name of the next part.
+Its arguments are the numbers of completed parts and of all parts, and the name of the next part.
 """
 
-_PIECE = 1 << 18  # most bodies in a piece: some milliseconds, until Python checks for a signal
+_PIECE = 1 << 18  # most bodies in a piece; Python checks for signals after each, some milliseconds
 _SMALL = 256  # fewest bodies for which a further thread saves time
 _REPORTS = 100  # fewest pieces with a progress bar
 _bar: ContextVar[Any] = ContextVar("bar", default=None)  # None if no bar was requested
@@ -56,7 +56,7 @@ def count_done(n: int) -> None:
 
 @contextmanager
 def progress_of(choice: bool | Progress, what: str) -> Iterator[Progress]:
-    """Yield a function `choice`, else one that updates a bar (True) or does nothing."""
+    """Yield `choice` if it is a function, else one that updates a bar (True) or does nothing."""
     if callable(choice):
         yield choice
     elif not boolean("progress", choice):

@@ -87,7 +87,7 @@ class ImpossibleBodyWarning(UserWarning):
 
 @dataclass(frozen=True)
 class Scene:
-    """A problem to solve: a body, its torque and its initial conditions.
+    """A problem to solve: a body, the torque on it, and initial conditions.
 
     Exactly one of `moments`, `coefficients`, `inertia` and `changing` is required. Three numbers
     may be a list, a tuple or an array; the fields are tuples of floats.
@@ -350,7 +350,7 @@ class Scene:
 
     @property
     def body_torque(self) -> TorqueLaw:
-        """The `law`; raise InputError also if it is about the axes of space."""
+        """The `law`; raise InputError also for a law about the axes of space."""
         if self.torque.in_space:
             raise InputError(SPACE_TORQUE)
         return self.law
@@ -379,7 +379,7 @@ class Scene:
         return rates
 
 
-# A wrapper, because the decorator of a data class writes the method.
+# Wrapped here, because the decorator of a data class writes the method.
 Scene.__init__ = with_hints(Scene.__init__)  # type: ignore[method-assign]
 
 
@@ -427,7 +427,7 @@ def checked_scene(
     """Return `scene`; raise InputError unless it is a Scene that the flags allow.
 
     The flags allow a full inertia matrix (`any_axes`), a torque about space axes (`any_torque`) or
-    of the state (`any_state`), a `changing` inertia, and own `states`.
+    dependent on the state (`any_state`), a `changing` inertia, and own `states`.
     """
     if isinstance(scene, Scene):
         if scene.states and not states:

@@ -150,7 +150,7 @@ def _torque_lines(scene: Scene) -> list[str]:
         raise InputError(f"[[torque.terms]]: {count} terms; allowed: at most {MOST_TERMS}")
     lines = ["[torque]"]
     if torque.expression:
-        # The texts need no escapes: they have neither quotes, backslashes nor control characters.
+        # The texts need no escapes: they have no quotes, backslashes or control characters.
         texts = ", ".join(f'"{text}"' for text in torque.expression[:3])
         lines += [f"expression = [{texts}]", "[torque.constants]"]
         lines += [f"{name} = {value!r}" for name, value in torque.constants]

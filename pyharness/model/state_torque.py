@@ -48,7 +48,7 @@ class StateTorque:
         own state, and pairs of name and value of their constants; else empty.
     terms : tuple
         The other summands in a scene file: at most one `TorqueLaw`, and torques of
-        `pyharness.torques`, each as pairs of key and value.
+        `pyharness.torques`, each of these as pairs of key and value.
     parameters : tuple of pairs
         Name and value of each keyword argument of the function whose default is a number.
     varied : Tape or None
@@ -103,7 +103,7 @@ class StateTorque:
     ) -> Triple:
         """Return the torque at `time` (s), omega (rad/s), attitude and own states; NaN if singular.
 
-        Raise InputError for another number of components, or if an opaque function does not return
+        Raise InputError for a wrong number of components, or if an opaque function does not return
         three numbers.
         """
         if len(omega) != 3 or len(attitude) != 4:
@@ -121,7 +121,7 @@ class StateTorque:
             return math.nan, math.nan, math.nan
 
     def __add__(self, other: "StateTorque | TorqueLaw | Function | int") -> "StateTorque":
-        """Return the sum with a torque, law, function or 0 (for ``sum``); none may be `opaque`."""
+        """Return the sum with a torque, law or function (not `opaque`), or with 0 (for ``sum``)."""
         if type(other) is int and other == 0:
             return self
         if isinstance(other, (StateTorque, TorqueLaw)):
@@ -182,8 +182,8 @@ def of_law(law: TorqueLaw) -> StateTorque:
 def turned_law(law: TorqueLaw, time: Symbol, attitude: Any) -> Array:
     """Return the body components of a law about the axes of space.
 
-    Each component has the terms of all waves, some times 0, so that laws with equally many waves
-    share compiled code.
+    Each component has the terms of all waves, some with factor 0, so that laws with equally many
+    waves share compiled code.
     """
     angles = [frequency * time for _, frequency in (*law.sines, *law.cosines)]
     terms = [time, *(wave(each) for each in angles for wave in (np.sin, np.cos))]
@@ -194,7 +194,7 @@ def turned_law(law: TorqueLaw, time: Symbol, attitude: Any) -> Array:
 def recorded(function: Function, states: Sequence[str] = ()) -> StateTorque:
     """Return the torque that a user's function computes, recorded with symbols.
 
-    Use it for one of several summands; a scene's only torque can be passed to `Scene` directly.
+    Use it for one of several summands; pass a scene's only torque function to `Scene` directly.
 
     Parameters
     ----------

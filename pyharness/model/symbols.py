@@ -1,8 +1,8 @@
 """Symbols: function arguments that record arithmetic on a tape (a list of operations).
 
 A symbol is a linear combination of slots, the inputs and results on the tape. Sums, and products
-with numbers, only change coefficients; any other operation has a slot for its result, the same if
-repeated.
+with numbers, only change coefficients; any other operation has a slot for its result, and a
+repeated operation has the same slot.
 """
 
 import math
@@ -37,7 +37,7 @@ _ALLOWED = (
     "+ - * / ** and NumPy's elementary functions, where, clip, minimum, maximum, sign, abs, floor, "
     "heaviside, interp"
 )
-# Frames that are not the user's.
+# Folders of code that is not the user's.
 _LIBRARIES = tuple(str(Path(each).parents[1]) for each in (np.__file__, __file__))
 
 
@@ -328,9 +328,9 @@ class Symbol:
 
     def arctan2(self, x: Any) -> "Symbol":
         """Return the angle (rad) of the point (x, self), -pi to pi; undefined at the origin."""
-        # Integrations begin with conditions that do not hold.
+        # At first, an integration takes every condition as false.
         is_left = x < 0.0
-        # Half the angle to the x axis, because a quotient by x would not be defined where x is 0.
+        # The tangent of half the angle to the x axis; y/x would not be defined where x is 0.
         half = self / ((self * self + x * x).sqrt() + select(is_left, -x, x))
         angle = 2.0 * half.arctan()
         found: Symbol = select(is_left, select(self < 0.0, -math.pi, math.pi) - angle, angle)

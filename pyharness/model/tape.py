@@ -105,7 +105,7 @@ class Tape:
 
     @cached_property
     def has_branches(self) -> bool:
-        """Whether there is a "select", of which an unused operand may be singular."""
+        """Whether there is a "select", whose unused operand may be singular."""
         return any(each.kind == "select" for each in self.operations)
 
     @property
@@ -116,7 +116,6 @@ class Tape:
     def breaks(self) -> list[float]:
         """The times (s) between pieces of tables, ascending."""
         tables = [each.table for each in self.operations if each.table is not None]
-        # The first piece also holds before its break.
         times = [table.breaks[1:] for table in tables]
         return np.unique(np.concatenate(times)).tolist() if times else []
 
@@ -272,7 +271,7 @@ FLOATS: Functions[float] = Functions(
 )  # fmt: skip
 # Exponentials of larger arguments are replaced by powers of 2, as in tape_series.f90.
 _LARGE_ARGUMENT = 210.0
-# Replacements for small arguments, by kind.
+# Replacements of exponentials of very negative arguments, by kind.
 _SMALL = {"large": 2.0**-303, "moderate": 2.0**-140}
 _UNSEEN = 2.0**-150
 
@@ -280,8 +279,8 @@ _UNSEEN = 2.0**-150
 def float_outputs(tape: Tape, inputs: Sequence[float]) -> list[float]:
     """Return the outputs of a tape in floats; division by 0 raises ZeroDivisionError.
 
-    An exponential that overflows, as in sinh(x)/cosh(x), becomes a large number, unless the outputs
-    depend on it.
+    If an exponential overflows, as in sinh(x)/cosh(x), a large number replaces it, unless the
+    outputs depend on the choice of this number.
     """
     found: list[float] = []
     try:
@@ -331,6 +330,6 @@ def _saturated(kind: str, x: float) -> float:
         return exponential(x)
     if kind == "large":
         return 2.0**1000
-    # Replacements depend on the argument; else a quotient of two would be 1 for each kind.
+    # Replacements depend on the argument; otherwise a quotient of two would be 1 for each kind.
     part = math.fmod(math.frexp(min(x, 1e308))[0] * (1e7 if kind == "other" else 1e4), 1.0)
     return 1.01 + part if kind == "moderate" else math.ldexp(1.0, 167 + int(600.0 * part))

@@ -28,7 +28,7 @@ _SHOWN_ROWS = 3  # number of first, and of last, rows in HTML
 
 
 def short_repr(result: Any) -> str:
-    """Return at most ten lines on a result, with arrays by type and shape."""
+    """Return at most ten lines on a result, with the types and shapes of arrays."""
     shown = [
         f"{each.name}={_short(value)}"
         for each in fields(result)
@@ -109,11 +109,11 @@ class Trajectory(Conversions):
         The number of steps, and of evaluations of the right-hand side. For SciPy's methods and the
         method `reference`, `steps` is the number of rows.
     ended : str
-        All rows are present after "complete"; "sensitive", if amplified errors may exceed the
-        tolerance; and "unchecked", if SciPy may have stepped over a short change of the torque.
-        Early endings are "overflow"; "stopped", by the Lipschitz test of the Runge-Kutta program;
-        "singular", where the torque is undefined; "sliding", where the torque would jump back and
-        forth without end; and "event", at a terminal event.
+        With all rows: "complete", "sensitive" (amplified errors may exceed the tolerance), or
+        "unchecked" (SciPy may have stepped over a short change of the torque). With fewer rows:
+        "overflow", "stopped" (by the Lipschitz test of the Runge-Kutta program), "singular" (the
+        torque is undefined), "sliding" (the torque would jump back and forth without end), or
+        "event" (at a terminal event).
     stop : Stop or None
         Where the Lipschitz test ended the run.
     ier : ndarray of int, shape (n,), or None
@@ -126,7 +126,7 @@ class Trajectory(Conversions):
         time to the end.
     reason : str or None
         The time and the operation at which a recorded torque ended the integration early; or why
-        the ending is "sensitive", under such a torque or by a method of SciPy.
+        a result for such a torque, or of a method of SciPy, is "sensitive".
     attitude : ndarray, shape (n, 4), or None
         Quaternions from body to space, scalar first, with continuous signs.
     own : ndarray, shape (n, k), or None
@@ -136,7 +136,7 @@ class Trajectory(Conversions):
     axes : ndarray, shape (3, 3), or None
         The principal axes in columns; None if they are the body axes.
     exact : ndarray of object, shape (n, 8), or None
-        Time, recorded time, omega and velocity of a program in another arithmetic than binary64;
+        Time, recorded time, omega and velocity of a program in an arithmetic other than binary64;
         the other attributes have the nearest floats.
     tolerance : float or None
         The tolerance; None for methods with a fixed step.

@@ -1,9 +1,9 @@
 """Writing of trajectory files, which `pyharness.engine.trajectory_reader` reads.
 
 The archive has an array for each attribute, the text `scene` of a scene file, and the JSON text
-`header` with the rest, such as recorded operations. A linear combination is a list of its constant
-and of pairs of slot and coefficient. An operation is a list of its kind and its operands, linear
-combination, or breaks and pieces of its table.
+`header` with the rest, such as recorded operations. A linear combination is its constant and a list
+of pairs of slot and coefficient. An operation is its kind, followed by a list of operands, a linear
+combination, or the breaks and pieces of a table.
 """
 
 import json
@@ -83,7 +83,7 @@ def file_content(found: "Trajectory") -> bytes:
     if found.scene is not None:
         header["scene"], arrays["scene"] = _scene_record(found.scene)
     for name, (kind, _) in ROWS.items():
-        # For a method, the recorded time is the same array.
+        # In results of a method, `recorded_time` is the array `time`.
         if name != "recorded_time" or found.recorded_time is not found.time:
             value = getattr(found, name)
             arrays |= {} if value is None else {name: np.asarray(value, kind)}
@@ -162,7 +162,7 @@ def _tape_record(tape: Tape) -> dict[str, Any]:
 def tape_of(record: Any, n_own: int = 0, n_outputs: int = 3) -> Tape:
     """Return the tape that a dictionary from JSON describes, with `n_own` own states.
 
-    Raise ValueError, TypeError, KeyError or OverflowError for other data.
+    Raise ValueError, TypeError, KeyError or OverflowError for invalid data.
     """
     operations = record["operations"]
     if len(operations) > MOST_OPERATIONS:

@@ -1,7 +1,7 @@
 """Checks of user input, and conversions to plain Python numbers.
 
-Functions with an argument `where` raise InputError for other values; its message begins with
-`where`.
+Functions with an argument `where` raise InputError for values that are not allowed; the message
+begins with `where`.
 """
 
 import itertools
@@ -50,7 +50,7 @@ def unit_of(value: object) -> str:
 
 
 def converted(value: object) -> float | str:
-    """Return a real number as a float; else, or beyond binary64, a description."""
+    """Return a real number as a float; for other values, or beyond binary64, a description."""
     if type(value) is float:
         return value
     if is_no_number(value):
@@ -147,7 +147,7 @@ def boolean(where: str, value: object) -> bool:
 
 
 def tolerance_of(value: object, finest: float) -> float:
-    """Return a tolerance as a float of any range; `finest` is for the message alone."""
+    """Return a tolerance as a float, with no check of its range; `finest` is for the message."""
     found = converted(value)
     if isinstance(found, float):
         return found

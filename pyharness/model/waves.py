@@ -109,7 +109,7 @@ def with_merged_rows(constant: Array, sines: Array, cosines: Array) -> tuple[Arr
         try:
             law = merged(law)
         except InputError:
-            # The sum overflows, which an infinite constant shows in the status of this body.
+            # The sum overflows; with an infinite constant, the status of this body shows it.
             constant[n] = np.inf
             continue
         constant[n] = law.constant

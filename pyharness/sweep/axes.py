@@ -1,4 +1,4 @@
-"""Axes of a sweep's grid, each of which varies a field of scene or solver."""
+"""Axes of a sweep's grid, each of which varies a field of the scene or solver."""
 
 import math
 import zlib
@@ -209,7 +209,7 @@ def _between(first: float, last: float, made: Callable[[float, float], Floats]) 
     """Return ``made(first, last)``, even if ``last - first`` overflows."""
     if math.isfinite(last - first):
         return made(first, last)
-    # Numbers as large as these are halved and doubled exactly.
+    # Numbers as large as these are halved and doubled without rounding.
     with np.errstate(over="ignore"):
         doubled = 2.0 * made(0.5 * first, 0.5 * last)
     return np.clip(doubled, min(first, last), max(first, last))

@@ -32,7 +32,7 @@ Columns = dict[str, Array]
 def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
     """Return an array for each reduction (stored quantity) of a chunk.
 
-    It has the shape of the chunk, with one more dimension for several components.
+    An array has the shape of the chunk, with one more dimension for several components.
     """
     box = sweep.box(chunk)
     shape = tuple(part.stop - part.start for part in box)
@@ -79,7 +79,7 @@ def listing_of(program: str, listing: str, reading: str) -> Listing:
 
 
 def looped_fields(sweep: Sweep) -> list[str]:
-    """Return the varied fields that all scenes of a batch (one call) share."""
+    """Return the varied fields whose values all scenes of a batch (one call) share."""
     of_arrays = () if sweep.solver.program is None else OF_PROGRAMS
     own = ("body.",) if follows_body(sweep) else ()
     names = [axis.field for axis in sweep.axes if axis.field not in of_arrays]
@@ -123,12 +123,12 @@ def _batch(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Batch:
     t_end = whole if solver.t_end is None else np.full(n, solver.t_end)
     t_end = own.get("t_end", t_end)
     omega = _omega(scene, own, values if body == "moments" else None, n)
-    # The axes replace numbers of the file, which are normalised afterwards.
+    # Axes replace components of the file's quaternion, before it is normalised.
     length = min(sweep.scene.attitude_length, sys.float_info.max)
     given = tuple(length * each for each in sweep.scene.attitude or IDENTITY)
     attitude = _components("attitude", given, own, n, first=0)
     if attitude is not None:
-        # A quaternion 0 fails as above.
+        # A scene with the quaternion 0 fails, as above.
         t_end = np.where(attitude.any(axis=1), t_end, np.nan)
     found = {"omega": omega, "attitude": attitude}
     found |= {name: own.get(name) for name in OF_PROGRAMS} | {body: values}
@@ -151,7 +151,7 @@ def _components(
 
 
 def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
-    """Return "moments", "inertia" or "coefficients", and n values (kg m2 or 1); None if equal."""
+    """Return "moments", "inertia" or "coefficients", and n values (kg m2 or 1; None if equal)."""
     if scene.coefficients is not None:
         return "coefficients", _components("body.coefficients", scene.coefficients, own, n)
     if scene.inertia is not None:
@@ -165,8 +165,8 @@ def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
     if "body.square.1" in own or "body.square.2" in own:
         middle = own.get("body.square.1", np.ones(n))
         least = own.get("body.square.2", np.ones(n))
-        # The moments of a real body are sums of the integrals of x^2, y^2 and z^2 over its mass,
-        # which are here in units of the largest.
+        # The moments of a real body are sums of two of the integrals of x^2, y^2 and z^2 over
+        # its mass, here in units of the largest integral.
         x2, y2, z2 = np.ones(n), middle, middle * least
         size = max(scene.moments) / (x2 + y2)
         return "moments", np.stack([(y2 + z2) * size, (x2 + z2) * size, (x2 + y2) * size], axis=1)
@@ -254,7 +254,7 @@ def check_state_solver(scene: Scene, methods: Sequence[str], has_program: bool) 
 
 
 def follows_body(sweep: Sweep) -> bool:
-    """Return whether a term of the torque has the inertia of the scene's body by default."""
+    """Return whether a term of the torque uses the inertia of the scene's body by default."""
     return any(
         term["kind"] == "gravity_gradient" and "inertia" not in term
         for term in sweep.tables.get("torque", {}).get("terms", ())
@@ -264,9 +264,9 @@ def follows_body(sweep: Sweep) -> bool:
 def with_numbers(
     sweep: Sweep, constants: Mapping[str, float], values: Sequence[Any] | None
 ) -> Scene:
-    """Return the scene with other `constants` of its torque's expressions, and another body.
+    """Return the scene with other `constants` in its torque's expressions, or with another body.
 
-    `values` are moments, inertia or coefficients.
+    `values` are the body's moments, inertia or coefficients; None keeps the body.
     """
     tables = dict(sweep.tables)
     if constants:

@@ -98,9 +98,9 @@ def _by_processes(workers: int, sweep: Sweep, chunks: list[int]) -> Results:
 
 
 def _by_pool(sweep: Sweep, chunks: list[int], workers: int) -> Results:
-    # A fork of a process with threads, as of NumPy and Zarr, may hang.
+    # A fork of a process with threads, such as those of NumPy and Zarr, may hang.
     context = multiprocessing.get_context("spawn")
-    # The pool creates semaphores, at which Python would otherwise start its resource tracker.
+    # The pool creates semaphores; Python would then start its resource tracker.
     with deaf_children():
         pool = ProcessPoolExecutor(workers, context, end_with_parent)
     waiting: dict[Future[Arrays], int] = {}
@@ -223,7 +223,7 @@ def _connected(dask: Any, address: str) -> Any:
 
 
 async def _has_workers(dask: Any, address: str, answered: list[bool]) -> None:
-    """Wait until the scheduler has workers; append True to `answered` for other answers."""
+    """Wait until the scheduler has workers; append True to `answered` for answers without one."""
     # A Dask client would wait half a minute for a server that accepts the connection but does not
     # answer; the scheduler is therefore called directly.
     async with dask.rpc(address) as scheduler:
@@ -233,7 +233,7 @@ async def _has_workers(dask: Any, address: str, answered: list[bool]) -> None:
 
 
 def _by_client(client: Any, sweep: Sweep, chunks: list[int]) -> Results:
-    """Yield results of chunks; Dask recomputes those of dead workers."""
+    """Yield results of chunks; Dask recomputes the chunks of dead workers."""
     dask: Any = import_module("distributed")
     n_threads = sum(client.nthreads().values())
     rest = iter(chunks)

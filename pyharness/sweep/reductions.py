@@ -30,8 +30,9 @@ class Reduction:
 
     `compute` takes a batch of n scenes and parameters (defaults: `parameters`). It returns n
     values, or n rows with the components `labels` along `dimension`. `only` is `program` or
-    `method` if the other lacks the quantity. `needs` lists requirements: `moments`, `no
-    torque`, `attitude`. `flags` explains outcome codes.
+    `method` if the other lacks the quantity. `needs` lists requirements: moments of
+    inertia (`moments`), `no torque`, a method with `attitude`. `flags` maps values that are codes
+    to their meanings.
     """
 
     title: str
@@ -47,7 +48,7 @@ class Reduction:
 
     @property
     def fill(self) -> Any:
-        """Return the value for scenes without result."""
+        """Return the value for scenes without a result."""
         return np.nan if self.dtype == "f8" else -1
 
 
@@ -73,7 +74,7 @@ def _overflow_time(batch: Batch, _: Mapping[str, Any]) -> Found:
 
 
 def _drift(batch: Batch, given: Mapping[str, Any]) -> Found:
-    # Powers of 2, by which no square is out of range.
+    # Scaled by powers of 2, so that no square is out of range.
     bodies = np.ldexp(batch.bodies, -_exponents(batch.bodies))[:, None, :]
     exponents = _exponents(batch.omega0)[:, None]
     start = np.ldexp(batch.omega0[:, None, :], -exponents)

@@ -145,7 +145,7 @@ Scale = tuple[float, float, bool]
 def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
     """Return the stored quantity `name`, by default the first whose values are numbers.
 
-    If all have outcome codes, the default is the first.
+    If all values are outcome codes, the default is the first quantity.
     """
     names = [asked.name for asked in sweep.reductions]
     if name is not None and name not in names:
@@ -157,8 +157,8 @@ def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
 def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
     """Return the picture of a stored quantity over dimensions with several numbers.
 
-    With two or more that are not random, it is a map over the last two; with one, a line, or dots
-    at listed values; with random ones only, dots.
+    It is a map over the last two dimensions that are not random. Over only one such dimension, it
+    is a line, or dots if the values are listed. If all are random, it is dots over the last one.
     """
     from matplotlib.figure import Figure
 

@@ -30,7 +30,8 @@ _PART = 0.01
 _LONGEST = 60.0  # longest expected time (s) of such a sample
 # Fewest values sampled along a dimension whose value all scenes of a batch share.
 _PLACES = 5
-# Chunks measured whole if they are a small part and not slow; growth of the parts of a chunk.
+# Chunks measured whole if they are a small part of the sweep and not slow; factor by which the
+# measured parts of a chunk grow.
 _CHUNKS = 3
 _GROWTH = 16
 _FILES = 20  # most chunks solved, or written and read, for a measurement
@@ -44,7 +45,7 @@ class Estimate(NamedTuple):
 
 
 def forecast(sweep: Sweep, path: str, n_missing: int, own: Engine) -> float:
-    """Return the time (s) to solve and write missing chunks, and to read all.
+    """Return the time (s) to solve and write missing chunks, and to read all chunks.
 
     If other processes solve, the longer of solving and writing counts.
     """
@@ -81,7 +82,7 @@ def seconds_of_files(sweep: Sweep, path: str) -> tuple[float, float]:
 
 
 def _pattern(sweep: Sweep, chunk: int) -> Arrays:
-    """Return random results of a chunk; equal ones would be written too fast."""
+    """Return random results of a chunk; equal results would be written too fast."""
     draw = np.random.default_rng(chunk)
     shape = tuple(part.stop - part.start for part in sweep.box(chunk))
     found = {}
@@ -97,8 +98,8 @@ def _pattern(sweep: Sweep, chunk: int) -> Arrays:
 def seconds_per_chunk(sweep: Sweep) -> float:
     """Return the time (s) to solve a chunk in this process.
 
-    It is measured on whole chunks below 0.2 s, or if three are less than 1 % of the sweep and take
-    at most a minute; else on samples and on parts of three chunks.
+    It is measured on whole chunks if one takes less than 0.2 s, or if three are less than 1 % of
+    the sweep and take at most a minute; otherwise on samples and on parts of three chunks.
     """
     scenes = math.prod(sweep.chunk_shape)
     seconds = scenes * seconds_per_scene(sweep)
@@ -122,7 +123,7 @@ def seconds_per_chunk(sweep: Sweep) -> float:
 
 
 def _seconds_by_parts(sweep: Sweep, chunk: int) -> float:
-    """Return the time (s) of a chunk, by times of one scene and of ever larger parts."""
+    """Return the time (s) of a chunk, extrapolated from parts of increasing size."""
     where = points(sweep.box(chunk))
     total = len(where[0])
 
@@ -195,9 +196,9 @@ class Outcome:
 
 
 def check_size(sweep: Sweep, path: str, workers: int, missing: int) -> tuple[int, int]:
-    """Return the bytes that missing chunks need on disk, and all workers in memory.
+    """Return the bytes of disk that missing chunks need, and of memory that all workers need.
 
-    Raise InputError if they exceed what is available.
+    Raise InputError if too little is available.
     """
     disk = os.statvfs(Path(path).absolute().parent)
     scenes = math.prod(sweep.chunk_shape)

@@ -1,7 +1,7 @@
 """The store of a sweep: a Zarr group with an array for each reduction.
 
-A chunk of the grid has a file for each array, and one of their checksums. Each is written under a
-temporary name and then renamed, the checksums last.
+A chunk of the grid has a file for each array, and a file of their checksums. Each file is written
+under a temporary name and then renamed, the checksums last.
 """
 
 import contextlib

@@ -1,7 +1,8 @@
 """Layout of a sweep's store: arrays, metadata, identity, and checksums of files.
 
 `sha256sum --check` can read a file of checksums. Its first line names version, sweep and part of
-the store, to detect a foreign file. `folder` is the store's folder, `name` a path in it.
+the store, so that a file of another store is detected. `folder` is the store's folder, `name` a
+path in it.
 """
 
 import atexit
@@ -48,7 +49,7 @@ class Label(NamedTuple):
 def checksum_text(label: Label, part: str, folder: Path, names: Sequence[str], limit: int) -> bytes:
     """Return the content of a checksum file for the files `names`.
 
-    `part` is their part of the store, as "chunk 0/1". Raise DamageError for a file that is
+    `part` is their part of the store, such as "chunk 0/1". Raise DamageError for a file that is
     unreadable or above `limit` bytes.
     """
     identity = f"schema {label.schema}, version {label.version}, sweep {label.fingerprint}"
@@ -174,10 +175,7 @@ def label(sweep: Sweep) -> Label:
 
 
 def labels(folder: Path) -> list[Label]:
-    """Return the identities that can be read in a store's metadata and in their checksums.
-
-    An undamaged store has two equal identities.
-    """
+    """Return the identities that can be read in a store's metadata and in their checksums."""
     found = []
     with contextlib.suppress(
         DamageError, OSError, ValueError, LookupError, TypeError, RecursionError
@@ -279,7 +277,7 @@ def _make_array(group: Any, sweep: Sweep, asked: ReductionSpec) -> None:
     if reduction.flags:
         names = (each.replace(" ", "_") for each in reduction.flags.values())
         attributes |= {"flag_values": list(reduction.flags), "flag_meanings": " ".join(names)}
-    # Fixed: a recomputed chunk must have the same bytes, whatever Zarr's default.
+    # Fixed, because a recomputed chunk must have the same bytes, whatever Zarr's default is.
     form: dict[str, Any] = {"compressors": ZstdCodec(level=0, checksum=False)}
     form |= {"dtype": reduction.dtype, "fill_value": reduction.fill}
     form |= {"dimension_names": dimensions, "attributes": attributes}

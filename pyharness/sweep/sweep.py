@@ -68,8 +68,9 @@ class Sweep:
     def chunk_shape(self) -> tuple[int, ...]:
         """Return the number of scenes of a chunk along each dimension.
 
-        A chunk covers as many of the last dimensions as fit, and part of the one before. It has
-        length 1 along programs, methods, listings and readings, so that its scenes share a solver.
+        A chunk covers as many of the last dimensions as fit, and part of the dimension before. It
+        has length 1 along programs, methods, listings and readings, so that its scenes share a
+        solver.
         """
         single = {axis.dimension for axis in self.axes if axis.is_choice}
         room = self.chunk
@@ -132,7 +133,7 @@ def value_columns(sweep: Sweep, where: list[Indices]) -> dict[str, NDArray[Any]]
 def groups(columns: list[NDArray[Any]], n: int) -> list[tuple[Indices, tuple[Any, ...]]]:
     """Return the groups of indices 0 to n - 1 with equal values in all columns.
 
-    A group is a pair of ascending indices and values.
+    A group is a pair of its indices, ascending, and its values.
     """
     if not columns:
         return [(np.arange(n), ())]

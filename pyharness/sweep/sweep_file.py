@@ -105,7 +105,6 @@ def _scene(table: object, path: Path) -> tuple[Scene, dict[str, Any], bytes]:
         beside = path.parent / table["file"]
         named = f"scene file '{beside}'"
         content = read_file(beside, named)
-        # The zero byte separates the files in the SHA-256.
         scene, more = scene_of_file(content, beside.stem, named), b"\0" + content
         table = toml_of(content, named)
     elif table:

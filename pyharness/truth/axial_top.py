@@ -1,7 +1,7 @@
-"""Exact solution of a symmetric body with a torque along its axis, in decimals.
+"""Exact solution for a symmetric body with a torque along its axis, in decimals.
 
-The spin is its initial value plus the integral of torque over moment. The other components rotate
-by an angle proportional to the integral of the spin.
+The spin (omega about this axis) is its initial value plus the integral of torque over moment. The
+other components rotate by an angle proportional to the integral of the spin.
 """
 
 import decimal
@@ -25,7 +25,7 @@ def axial_top(scene: Scene, times: Sequence[float]) -> list[Row]:
             "about axis 3 only"
         )
     waves = law.sines + law.cosines
-    # Digits for products of the largest time, omega and frequency.
+    # More digits for products of the largest time, omega and frequency.
     sizes = (*map(abs, times), 0.0), map(abs, scene.omega), (*(abs(f) for _, f in waves), 1.0)
     digits = DIGITS + sum(max(0, Decimal(max(each)).adjusted() + 1) for each in sizes)
     with decimal.localcontext(prec=digits, Emax=decimal.MAX_EMAX, Emin=decimal.MIN_EMIN):

@@ -1,6 +1,6 @@
 """Functions of balls, complex balls and their power series, for proved enclosures.
 
-A ball is an interval, stored as middle and radius. python-flint's operations return balls that
+A ball is an interval, stored as middle and radius. Operations of python-flint return balls that
 contain the exact results for all numbers in the operands.
 """
 
@@ -18,7 +18,7 @@ from pyharness.truth.enclosed import Balls
 
 
 def ball(x: Fraction) -> Any:
-    """Return a ball that contains a fraction, exact if the precision suffices."""
+    """Return a ball that contains a fraction, and is exact if the precision suffices."""
     return arb(fmpq(x.numerator, x.denominator))
 
 
@@ -61,7 +61,7 @@ def _refuse(*_: Any) -> Any:
 def functions_at(time: Fraction, forward: bool) -> Functions[Any]:
     """Return the functions that evaluate tapes (recorded operations) in a step from `time` (s).
 
-    A table is evaluated by its piece after `time` if `forward`, else before it.
+    A table is evaluated by its piece after `time` if `forward`, else by the piece before.
     """
 
     def table(each: Table, at: Any) -> Any:

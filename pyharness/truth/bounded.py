@@ -1,4 +1,4 @@
-"""The error of the reference solution, proved where a proof is cheap, else estimated.
+"""Error bounds of the reference solution, proved where a proof is cheap, else estimated.
 
 A proof encloses the solution in balls (intervals with middle and radius). The largest distance of
 the reference from any point of a ball bounds the error.
@@ -25,8 +25,8 @@ PROVED, ESTIMATED = "proved", "estimated"
 # Factors on the work limits of the two provers that take steps, for about half a second each.
 _INTEGER_WORK, _BALL_WORK = 0.01, 0.0075
 _MOST_TIMES = 30  # for the prover in ball arithmetic, which needs a step for each time
-_SPARE_DIGITS = 2  # by which a ball is smaller than the estimated error
-_DIGITS, _MOST_DIGITS = 20, 60  # decimal digits of a proof without an estimate, and at most
+_SPARE_DIGITS = 2  # decimal digits by which a ball is smaller than the estimated error
+_DIGITS, _MOST_DIGITS = 20, 60  # digits of a proof without an estimate, and the most
 _ROUNDED_UP = 1.0 + 2.0**-49  # exceeds the rounding errors of a few operations
 
 Row = Sequence[float | Fraction]
@@ -90,8 +90,8 @@ def bound_of(
 ) -> ErrorBound:
     """Return the error bound of a scene's reference, `known`.
 
-    With `before_rounding`, it bounds the error of omega plus `known.remainder`, if any. The other
-    options are those of `error_bound`.
+    With `before_rounding`, the bound is for the sum of omega and `known.remainder`, if any. The
+    other options are as in `error_bound`.
     """
     exact = before_rounding and known.remainder is not None
     largest = float(np.abs(known.omega).max(initial=0.0))
@@ -224,7 +224,7 @@ class _Statement(NamedTuple):
         return omega, attitude
 
     def _digits(self) -> int | None:
-        """Return the digits that make balls small against the estimate; None if above 60."""
+        """Return the digits that a proof needs to improve the estimate; None if above 60."""
         largest = max(1.0, *(abs(float(x)) for row in self.omega for x in row))
         if not (0.0 < self.claimed < math.inf):
             # Omega is 0 at all times, or there is no estimate.

@@ -31,15 +31,15 @@ from pyharness.truth.reference import check_order
 _TUBE_BITS = 30  # the radius of a tube is at least 2**-30 of the solution
 _GUARD_BITS = 16
 _LENGTH_BITS = 20
-_SHARE_BITS = 20  # the last terms are at most 2**-20 of the radius, or what the digits allow
+_SHARE_BITS = 20  # the last terms are at most 2**-20 of the radius, or as large as the digits allow
 _TOLERATED = 3  # bits by which the last terms may exceed this limit
 # Limit of work, some five to thirty seconds; a step needs 1, or more if its bits times the square
-# of the order exceed _BITS_OF_STEP. The time of a product grows faster than its bits, if they are
-# more than _BITS_OF_PRODUCT.
+# of the order exceed _BITS_OF_STEP. The time of a product grows faster than the number
+# of its bits, if this exceeds _BITS_OF_PRODUCT.
 _MOST_WORK, _BITS_OF_STEP, _BITS_OF_PRODUCT = 20_000, 1e6, 1200
 _MOST_ATTEMPTS = 6
 # After the fraction _EARLY of the time, the growth of the radius is extrapolated to the end. If
-# digits will be missing, the proof begins again with these and _MORE.
+# digits will be missing, the proof begins again with these and _MORE further digits.
 _EARLY, _MORE = 0.05, 1.5
 _WORDS = "Taylor steps in integer arithmetic"
 
@@ -55,7 +55,7 @@ class Proof:
 
 
 class _AmplifiedError(Exception):
-    """Signal that amplified errors require further digits, as many as the argument."""
+    """Signal that amplified errors require further digits; the argument is their number."""
 
 
 def has_certificate(scene: Scene) -> bool:
@@ -73,8 +73,8 @@ def prove(
     """Return balls that contain omega at `times` (s), and their certificate.
 
     A radius is at most 10**-digits times the larger of 1 rad/s and the largest component of omega.
-    `effort` is a factor on the work limit. Raise InputError for an unsuitable scene, if omega grows
-    without bound, or beyond the limit.
+    `effort` is a factor on the work limit. Raise InputError if the scene is unsuitable, omega
+    grows without bound, or the limit is exceeded.
     """
     if not has_certificate(scene):
         raise InputError(
@@ -150,7 +150,7 @@ class _Run:
         self.omega: list[Balls] = []
 
     def prove(self, limit: float, effort: float, progress: Progress, early: float) -> None:
-        """Compute all steps; raise _AmplifiedError if, after part `early`, radii grow too fast."""
+        """Compute all steps; raise _AmplifiedError if radii after part `early` grow too fast."""
         system, clock = self._system, self._clock
         middle = [int(Fraction(x) * (1 << self._bits)) for x in self._record["omega"]]
         waves = [0, 1 << self._bits] * len(system.frequencies)

@@ -1,7 +1,7 @@
 """Check a certificate: a proof that balls contain the solution of Euler's equations.
 
 The program needs only Python's standard library, and computes with integers. Its arguments are
-files of certificates; it prints what they prove. The exit status is 1 unless all hold.
+files of certificates; it prints what they prove. The exit status is 1 unless all certificates hold.
 
 The equations are y' = f(t, y) for the angular velocity omega, and for the sines and cosines of the
 torque. In a step h, a polynomial p(s), s from 0 to 1, approximates the solution: the Taylor series
@@ -10,8 +10,8 @@ h f(p).
 
 The error e = y - p obeys |e|' <= h mu |e| + |d| (Dahlquist 1958), where mu bounds the logarithmic
 norm of the Jacobian of f in a tube around p. The resulting bound on |e|, the radius of the step,
-holds while |e| is less than the tube's radius. If the bound is less too, it holds on the whole
-step, because |e| is continuous.
+holds while |e| is less than the tube's radius. If the bound itself is less than the tube's radius,
+it holds on the whole step, because |e| is continuous.
 
 A number y is stored as the integer y 2**bits, a time t (s) as t 2**clock. The norm of an error of
 omega is sqrt(sum (e_i / scale_i)**2), with scales in units of 2**-20.
@@ -95,7 +95,7 @@ class System:
             wave_residual += omitted + 2 * rounding
         pushes = []
         for _, (_, constant, rate, *amplitudes) in self.rows:
-            # The shifts are exact, because there are at least as many bits as those of the clock.
+            # The shifts are exact, because `bits` is at least `clock`.
             start = (constant << bits) + (rate * time << bits - clock)
             push = [start, rate * h << bits - clock] + [0] * (order - 1)
             for amplitude, wave in zip(amplitudes, series[3:], strict=True):
@@ -132,7 +132,7 @@ class System:
         """Return a bound on h times the logarithmic norm of d(omega')/d(omega), times UNIT."""
         growth = 0
         for factor, each, scale in zip(self.factors, series, self.scales, strict=False):
-            # The mean is a sharper bound, but for a small factor not worth its time.
+            # The mean is a sharper bound, which is not worth its time for a small factor.
             size = mean(each) if factor * 1000 > max(self.factors) else sum(map(abs, each))
             most = abs(h) * factor.numerator * (size + over(tube * scale, 1 << SCALE_BITS))
             growth += over(most * UNIT, factor.denominator << self.bits + self.clock)
@@ -146,7 +146,7 @@ class System:
         growth = self.growth(series, tube, h)
         if growth > 2 * UNIT:
             raise NotProvedError("errors grow too much in it")
-        # The linearised equations of the waves rotate their errors.
+        # The equations of the waves only rotate their errors.
         wave_radius += wave_residual
         source = radius + self.norm(residuals) + over(self.forced(h) * wave_radius, UNIT)
         radius = over(source * exponential(growth), UNIT)
@@ -185,8 +185,8 @@ def exponential(x: int) -> int:
     return total + term  # the rest of the series is less than its last term
 
 
-# The form of a certificate. A tuple means a list of its length, a list one of any length, and a set
-# the allowed types. Numbers that binary64 would round are texts.
+# The form of a certificate. A tuple stands for a list of the same length, a list for a list of any
+# length, a set for the allowed types. Numbers that binary64 would round are texts.
 NUMBER = re.compile("-?[0-9]+([./][0-9]+)?")
 WHOLE, REAL, TEXT, EXACT = {int}, {int, float}, {str, NUMBER}, {int, float, NUMBER}
 THREE, WAVES = (REAL,) * 3, [((REAL,) * 3, REAL)]

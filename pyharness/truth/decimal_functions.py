@@ -43,7 +43,7 @@ def arctan(x: Decimal) -> Decimal:
     with decimal.localcontext() as context:
         context.prec += 10
         angle = Decimal(math.atan(x))
-        # The number of correct digits doubles, from 16 on.
+        # Each step doubles the number of correct digits, at first 16.
         digits = 15
         while digits < context.prec:
             sine, cosine = sine_cosine(angle)

@@ -25,7 +25,7 @@ _ORDINARY_STEPS = 20_000
 # exceeded, even if the motion becomes slower by the factor _PACE_SLACK.
 _FIRST_STEPS = 100
 _PACE_SLACK = 3.0
-# Largest defect of a series that has converged, over the local tolerance. The defect is the step
+# Largest defect of a converged series, divided by the local tolerance. The defect is the step
 # times the difference between the series' derivative and the rates at the end of the step.
 _MOST_DEFECT = 64
 _NEARLY_1 = 1 - Decimal("1e-26")  # a relative change of thousands of rounding errors
@@ -62,7 +62,7 @@ def taylor_series(
     switches = Switches(tape) if tape is not None and tape.has_switches else None
     if is_recorded:
         # The last equations show the effect of rounding: their state and the terms of their sums
-        # are changed a little, because sums that cancel may be 0, as beside a saturated tanh.
+        # are changed a little, because sums may cancel to 0, such as 1 - tanh(x) for a large x.
         changes = Decimal(0), Decimal(10) ** (4 - getcontext().prec)
         results = {} if switches is None else switches.results
         at_end = [_Equations(scene, coefficients, velocity, each, results) for each in changes]
@@ -206,7 +206,7 @@ def _law_of(scene: Scene) -> TorqueLaw:
 def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal, leading: int = 3) -> Decimal:
     """Return a step (s), at most `rest`, whose last two Taylor terms are small."""
     # The terms are at most `tolerance` times the largest of the first `leading` unknowns or, if
-    # these are 0, times one of four Taylor terms, from their first that is not 0.
+    # these are 0, times one of four Taylor terms, of which the first is not 0.
     order = len(coefficients[0]) - 1
     begun = next((j for j in range(order - 1) if _size(coefficients, j, leading)), None)
     length = rest
@@ -353,7 +353,7 @@ class _Equations:
         for (amplitude, frequency), quarter in waves:
             rate = Decimal(frequency)
             sine, cosine = sine_cosine(rate * time)
-            # Derivatives 0 to 3 of sin are sin, cos, -sin, -cos; those of cos begin one later.
+            # Derivatives 0 to 3 of sin are sin, cos, -sin, -cos; of cos, the last three and sin.
             cycle = [sine, cosine, -sine, -cosine]
             factor = Decimal(1)
             for k in range(order):
@@ -400,7 +400,7 @@ def _rates_by_momentum(
         )
         right.append(push - len(backward[i]) * others)
     first, second, third = ([each[0] if each else Decimal(0) for each in row] for row in inertia)
-    # Cramer's rule loses digits only beyond those of binary64.
+    # Cramer's rule may lose digits, but more remain than binary64 has.
     determinant = _triple(first, second, third)
     return [
         _triple(right, second, third) / determinant,

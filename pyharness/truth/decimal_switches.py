@@ -15,7 +15,7 @@ from pyharness.truth.tape_series import TapeSeries
 # the sum of all.
 _SMALL = Decimal("1e-8")
 _ZERO = Decimal("1e-20")  # part of the terms that counts as rounding error
-_IMAGINARY = 1e-4  # largest imaginary part of a real root, over the step
+_IMAGINARY = 1e-4  # largest imaginary part of a root that counts as real, over the step
 _NEWTON = 8
 _TOGETHER = Decimal("1e-15")  # relative difference of roots that count as one
 
@@ -24,7 +24,7 @@ class Switches:
     """The switches of a tape, with their `results` by slot.
 
     The result of a switch jumps where its operand crosses a level: 0, or an integer for a floor. At
-    a level, `_levels` maps the slot to -1 if the result is as above the level, to 1 if as below.
+    a level, `_levels` maps the slot to -1 if the result is the one above the level, else to 1.
     """
 
     def __init__(self, tape: TapeSeries) -> None:
@@ -38,7 +38,7 @@ class Switches:
         for slot, is_floor, x in self._tape.operands_of_switches():
             level = x[0].to_integral_value() if is_floor else Decimal(0)
             if abs(x[0] - level) <= _ZERO * (1 + abs(x[0])):
-                # The operand's derivative decides; if the operand stays on the level, NumPy does.
+                # On the level, the result is NumPy's, until `turns` uses the operand's derivative.
                 known = self._levels.get(slot)
                 value = level if is_floor else Decimal(0)
                 if slot in self.results and known is not None:
@@ -57,7 +57,7 @@ class Switches:
     def turns(self, time: Decimal, length: Decimal) -> bool:
         """Change the first result whose operand moves to the other side of its level.
 
-        Return whether there was one. Raise TimedError if the operand does so with either result.
+        Return whether there was one. Raise TimedError if the operand moves so with both results.
         """
         for slot, is_floor, x in self._tape.operands_of_switches():
             level = self._levels.get(slot)
@@ -66,7 +66,6 @@ class Switches:
             terms = [each * length**k for k, each in enumerate(x)][1:]
             total = sum(map(abs, terms))
             first = next((each for each in terms if abs(each) > _ZERO * total), Decimal(0))
-            # An operand that remains on its level has the result of NumPy.
             if (is_floor if first == 0 else first > 0) == (level < 0):
                 continue
             if slot in self._turned:
@@ -78,7 +77,7 @@ class Switches:
         return False
 
     def end(self, length: Decimal) -> Decimal:
-        """Return `length` (s), shortened until operands' series converge and to the first jump."""
+        """Return `length` (s), shortened to the first jump and until operands' series converge."""
         while any(self._is_unresolved(x, length) for *_, x in self._tape.operands_of_switches()):
             length *= Decimal("0.75")
         roots = []

@@ -1,7 +1,7 @@
 """Torque-free motion by Jacobi's elliptic functions in decimals.
 
-Unlike Taylor series, they lose no digits with time, and flips (sign changes of omega near the
-separatrix) take no more work. No code is shared with the checked closed form.
+Unlike Taylor series, the functions lose no digits with time, and flips (sign changes of omega near
+the separatrix) take no more work. No code is shared with the checked closed form.
 """
 
 import decimal
@@ -14,7 +14,7 @@ from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.truth.decimal_functions import Row, sine_cosine, to_decimal
 
-# Digits of the arithmetic; squares of small components add to them.
+# Digits of the arithmetic; squares of small components need more.
 _DIGITS = 90
 
 
@@ -69,8 +69,8 @@ def _solution(coefficients: Sequence[Fraction], start: Sequence[Fraction], time:
 def _general(a: Sequence[Fraction], omega: Sequence[Fraction], time: Decimal) -> Row:
     """Return omega (rad/s) at `time` (s) if no coefficient is 0 and the second is negative."""
     # The scaled components x, y, z (1/s) obey x' = y z, y' = -z x, z' = x y. Their integrals p =
-    # x**2 + y**2 and q = z**2 + y**2 are compared as fractions: on the separatrix, p = q, a
-    # rounding error would cause flips.
+    # x**2 + y**2 and q = z**2 + y**2 are compared as fractions: on the separatrix, where p = q,
+    # a rounding error would cause flips.
     s1, s2, s3 = (abs(each) for each in a)
     squares = [s2 * s3, s1 * s3, s1 * s2]
     x2, y2, z2 = (f * w * w for f, w in zip(squares, omega, strict=True))

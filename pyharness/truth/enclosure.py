@@ -39,13 +39,13 @@ def enclose(
     """Return balls that contain the solution of a scene at requested times.
 
     `times` (s) lead away from 0 on one side. A radius of omega is at most 10**-digits times the
-    larger of 1 rad/s and the largest component of omega (initial omega, in closed form). `velocity`
-    adds the translational velocity (m/s), `transition` the state-transition matrix. The attitude,
-    and the energy of a body with moments, are included. `progress` receives the percentage, 100,
-    and the time as text. `effort` is a factor on the work limit.
+    larger of 1 rad/s and the largest component of omega (in closed form, of initial omega).
+    `velocity` adds the translational velocity (m/s), `transition` the state-transition matrix. The
+    attitude, and the energy of a body with moments, are included. `progress` receives the
+    percentage, 100, and the time as text. `effort` is a factor on the work limit.
 
     Raise InputError if `digits` is not from 1 to 1000, times are not in order, python-flint is
-    missing, the torque isn't recorded, or the limit is exceeded.
+    missing, the torque isn't recorded, or the work limit is exceeded.
     """
     checked_scene(scene, True, True, True, True)
     if not 1 <= integer("digits", digits) <= MOST_DIGITS:

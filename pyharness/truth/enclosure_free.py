@@ -29,9 +29,9 @@ def enclose_free(
     """Return balls that contain the torque-free omega (rad/s) at each of `times` (s).
 
     With `attitude`, four more balls contain the unit quaternion from body to space, scalar first
-    and continuous in time; the scene must then have moments of inertia. A quaternion's radii are at
-    most 10**-`digits`; omega's are at most that times the larger of 1 rad/s and the largest initial
-    component. The motion must be bounded.
+    and continuous in time; the scene must then have moments of inertia. The radii of the
+    quaternion are at most 10**-`digits`; the radii of omega are at most 10**-`digits` times the
+    larger of 1 rad/s and the largest initial component. The motion must be bounded.
     """
     scale = max(Fraction(1), *(abs(Fraction(w)) for w in scene.omega))
     bits = min(64 + math.ceil(digits * math.log2(10)), _MOST_BITS)
@@ -148,7 +148,7 @@ class Orbit:
 
 
 def integer_near(x: arb) -> int:
-    """Return an integer near the middle of `x`; subtracting any number of periods is exact."""
+    """Return an integer near `x`; any is right, because it counts subtracted periods."""
     mantissa, exponent = map(int, x.mid().man_exp())
     return round(mantissa * Fraction(2) ** exponent)
 

@@ -38,7 +38,8 @@ from pyharness.truth.integer_series import exact_body
 # The right-hand side f(t, y): derivatives of all unknowns at a time (s) and a state.
 Rates = Callable[[Any, Sequence[Any]], list[Any]]
 
-# Radii, in steps, of the circles on which Cauchy's estimate bounds the rest of a power series.
+# Radii, in units of the step, of the circles on which Cauchy's estimate bounds the rest of a
+# power series.
 _CIRCLES = (8, 4, 2)
 _SHORTEST = Fraction(1, 2**400)
 # Least ratio of the thickness of the tube around p, in which the Jacobian is bounded, to p.
@@ -61,7 +62,7 @@ def enclose_steps(
 ) -> Enclosure:
     """Return balls that contain the solution of a scene at `times` (s).
 
-    The arguments are those of `enclosure.enclose`. Raise InputError if the torque isn't recorded,
+    The arguments are as in `enclosure.enclose`. Raise InputError if the torque isn't recorded,
     or too many steps are needed.
     """
     limit = _MOST_STEPS * checked_effort(effort)

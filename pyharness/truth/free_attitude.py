@@ -1,9 +1,9 @@
 """Attitude of a torque-free body at any time in decimals.
 
 In each period of omega the body rotates about the angular momentum by the same angle, so that
-Taylor series integrate only one. Near the separatrix, errors of omega grow exponentially; each
-segment therefore starts from the omega of `elliptic.py`. No code is shared with the checked closed
-form.
+Taylor series integrate only one period. Near the separatrix, errors of omega grow exponentially;
+each segment therefore starts from the omega of `elliptic.py`. No code is shared with the checked
+closed form.
 """
 
 import decimal
@@ -72,7 +72,7 @@ def _rate_and_period(scene: Scene) -> tuple[Decimal, Decimal | None]:
     # 2 T I_high - L**2, and `turns` is L**2 - 2 T I_low.
     stays = energies[low] * both + energies[middle] * upper
     turns = energies[high] * both + energies[middle] * lower
-    # Perturbations grow by at most some exp(rate * time).
+    # Perturbations grow at most by a factor of some exp(rate * time).
     larger = lower * stays if gap > 0 else upper * turns
     if not larger:
         return Decimal(0), None

@@ -2,7 +2,7 @@
 
 It shares no code with `truth/reference.py`. Numbers are integers over 2**BITS, in units in which
 the last time is 1 and the largest omega about 1. The torque's sines and cosines are further
-unknowns, without library functions.
+unknowns, so that no library functions are needed.
 """
 
 from collections.abc import Sequence
@@ -70,7 +70,7 @@ def _guess(scene: Scene, span: Fraction) -> Fraction:
 
 
 def _integrate(scene: Scene, times: Sequence[float], power: int) -> Path:
-    """Return the solution; raise _OtherUnitError if 2**power rad/s is an unsuitable unit."""
+    """Return the solution; raise _OtherUnitError if 2**power rad/s is a bad unit of omega."""
     span = Fraction(times[-1])
     wanted = [Fraction(t) / span for t in times]
     equations = _Equations(scene, span, Fraction(2) ** power)
@@ -154,10 +154,10 @@ class _Equations:
         self._constant = [_fixed(Fraction(x) * p) for x, p in zip(law.constant, push, strict=True)]
         self._rate = [_fixed(Fraction(x) * p * span) for x, p in zip(law.rate, push, strict=True)]
         # The waves of one frequency have two unknowns, a sine and a cosine. If the angle at the
-        # last time is below 1 rad, the sine is divided by this angle, so that a sine of large
-        # amplitude has all its digits. An entry has four parts: the factors of the cosine in the
-        # sine's derivative and of the sine in the cosine's, and by axis the factors of sine and of
-        # cosine in torque over moment.
+        # last time is below 1 rad, the sine is divided by this angle: a small sine has few digits
+        # in fixed point, and a large amplitude would magnify its error. An entry has the cosine's
+        # factor in the sine's derivative, the sine's factor in the cosine's derivative, and by axis
+        # the factors of the sine and of the cosine in torque over moment.
         self._waves = []
         for frequency in {abs(f) for _, f in law.sines + law.cosines}:
             angle = Fraction(frequency) * span

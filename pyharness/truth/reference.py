@@ -75,9 +75,9 @@ def reference(
     rounding, unless errors are amplified too much. Attitudes always come from the series.
 
     `effort` is a factor on a work limit of some ten seconds; None means 100 000 steps. A torque
-    that depends on the state must be recorded; the rows end before it becomes singular. Raise
-    InputError if the times are not in order, a changing moment reaches 0, or the series is
-    impossible or too long.
+    that depends on the state must be recorded on a tape; the rows end before it becomes singular.
+    Raise InputError if the times are not in order, a changing moment of inertia reaches 0, or the
+    series is impossible or too long.
     """
     if scene.changing is not None:
         scene.changing.check(times)
@@ -151,7 +151,7 @@ def _check_torque(scene: Scene) -> None:
 def known_solution(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
     """Return omega (rad/s) of a sphere or torque-free symmetric body in closed form, else None.
 
-    It has all digits of the decimal context.
+    The result has all digits of the decimal context.
     """
     if isinstance(scene.torque, StateTorque) or scene.changing is not None:
         return None
@@ -161,7 +161,7 @@ def known_solution(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
 
 
 def _digits_before_the_point(scene: Scene, time: Decimal) -> int:
-    """Return a bound on the digits before the point of all numbers up to `time` (s)."""
+    """Return a bound on the digits before the decimal point of all numbers up to `time` (s)."""
     law = scene.body_torque
     omega = max(Decimal(abs(w)) for w in scene.omega)
     rate = max(map(abs, exact_coefficients(scene))) * omega

@@ -1,7 +1,8 @@
 """Taylor coefficients, in decimal arithmetic, of a recorded torque.
 
-A tape is a list of operations, with results in numbered slots. Coefficients are computed order by
-order with the solution's (Jorba and Zou 2005, Experimental Mathematics 14).
+A tape is a list of operations, with results in numbered slots. The coefficients of torque
+and solution are computed together, order by order (Jorba and Zou 2005, Experimental Mathematics
+14).
 """
 
 from bisect import bisect_left, bisect_right
@@ -16,7 +17,7 @@ from pyharness.truth.decimal_functions import Row, arcsin, arctan, product, sine
 _LARGEST_ANGLE = Decimal("1e308")
 # An exponential below exp(-_INVISIBLE) affects no digit of a result, whatever its factor.
 _INVISIBLE = 400
-# Largest ratio of a step to the distance of a divisor's zero.
+# Largest ratio of a step to the distance from a divisor's zero.
 _WITHIN_CIRCLE = Decimal("0.9")
 _MANY_FACTORS = 3  # products of so many factors are checked; products of two show in any series
 # The order is at least this multiple of the number of factors, up to _MOST_ORDER, so that a product
@@ -43,7 +44,7 @@ _Sum = tuple[Decimal, list[tuple[Decimal, int]]]
 
 
 def series_products(tape: Tape) -> int:
-    """Return the number of products of two series in each order of a tape (recorded torque).
+    """Return how many products of two series each order of a tape (recorded torque) needs.
 
     A sine with its cosine, or a tanh with its derivative, takes two; a table takes none.
     """
@@ -57,8 +58,8 @@ class TapeSeries:
     """The Taylor series of the operations on a tape (recorded torque) around a time.
 
     `begin` starts an expansion, and each `next` adds a coefficient to all series. Terms of sums are
-    multiplied by 1 plus or minus `change`, which shows the effect of rounding. `results`, set from
-    outside, has the results of switches by slot. `least_order` is the lowest order that loses no
+    multiplied by 1 plus or minus `change`, which shows the effect of rounding. The caller sets
+    `results`, the results of switches by slot. `least_order` is the lowest order that loses no
     product whose factors are 0 at that time.
     """
 
@@ -76,7 +77,6 @@ class TapeSeries:
             for slot, (_, _, _, table) in enumerate(tape.operations, N_INPUTS)
             if table is not None
         }
-        # The first piece of a table also applies before its first break.
         changes = {time for _, breaks in self._breaks.values() for time in breaks[1:]}
         self._changes = sorted(changes)
         self._powers, largest = _powers(tape)
@@ -89,8 +89,9 @@ class TapeSeries:
     ) -> None:
         """Begin an expansion around `time` (s).
 
-        `omega` and `attitude`, which may be empty, are lists of Taylor coefficients, extended from
-        outside. At a break of a table, the later piece is expanded if `forward`, else the earlier.
+        `omega` and `attitude`, which may be empty, are lists of Taylor coefficients, which the
+        caller extends. At a break of a table, the later piece is expanded if `forward`, else the
+        earlier.
         """
         self._order = 0
         self._tables = {
@@ -212,8 +213,8 @@ class TapeSeries:
         An exponential, or the derivative of a hyperbolic tangent, may be negligible at the
         beginning of a step and large a little later. Its argument may therefore change by at most
         half the order, unless the function remains negligible. The mean order of a product's terms,
-        weighted by magnitude, is limited likewise, and the step to the distance of any zero of a
-        divisor.
+        weighted by magnitude, has the same limit. The step is at most 0.9 times the distance from a
+        divisor's zero.
         """
         for _, operation in self._live_operations():
             most = self._largest_change(operation)
@@ -231,8 +232,8 @@ class TapeSeries:
 
     def _is_hidden(self, power: _Power, length: Decimal) -> bool:
         """Return whether a product may matter in a step although its terms do not."""
-        # The mean order of the product's terms, weighted by magnitude, is the sum of those of its
-        # factors.
+        # The mean order of the product's terms, weighted by magnitude, is the sum of the mean
+        # orders of its factors.
         (factors, size, slots), order = power, Decimal(0)
         for slot, count in factors.items():
             terms = [abs(x) * length**k for k, x in enumerate(self._slots[slot])]
@@ -240,13 +241,13 @@ class TapeSeries:
                 return False
             order += count * sum(k * x for k, x in enumerate(terms)) / total
             size += count * total.log10(_ROUGH)
-        # A divisor that is 0 has no series.
+        # A divisor in an unused branch has no series.
         divisors = [abs(self._slots[slot][0]).log10(_ROUGH) for slot in slots if self._slots[slot]]
         least = min([Decimal(0), *divisors]) - _INVISIBLE * Decimal("0.4343")
         return 2 * order > self._order and size > least
 
     def _largest_change(self, operation: Operation) -> Decimal | None:
-        """Return how much an operation's last operand may change; None without limit."""
+        """Return how much an operation's last operand may change; None if there is no limit."""
         if operation.kind not in ("exp", "tanh", "quotient"):
             return None
         x = self._slots[operation.operands[-1]][0]
@@ -289,7 +290,7 @@ def _powers(tape: Tape) -> tuple[list[_Power], int]:
         else:
             scales.update((each, max(1.0, scales.get(each, 0.0))) for each in operands)
             terms = linear.terms if linear else ()
-            # A sum counts as many factors as its longest term.
+            # A sum counts as many factors as the term with the most.
             numbers[slot] = max((numbers.get(each, 1) for each, _ in terms), default=1)
     sums = [each.linear for each in tape.operations if each.linear] + list(tape.outputs)
     for each, factor in (term for linear in sums for term in linear.terms):
@@ -320,7 +321,7 @@ def _divisors(tape: Tape) -> dict[int, set[int]]:
 
 
 def _sum(linear: Linear | None, change: Decimal) -> _Sum:
-    """Return a linear combination with rounded numbers, so that equal ones cancel."""
+    """Return a linear combination with rounded numbers, so that equal numbers cancel."""
     if linear is None:
         return Decimal(0), []
     constant, terms = +Decimal(linear.constant), []

@@ -39,7 +39,7 @@ def numbers_beside(path: str) -> str:
 
 
 def saved(picture: Picture, *paths: str) -> dict[str, bytes]:
-    """Return, by path, the images and a CSV file beside the first."""
+    """Return the contents of files by path: the images, and a CSV file beside the first."""
     _set_title(picture)
     content = {path: _image(picture.figure, _form(path)) for path in paths}
     return content | {numbers_beside(paths[0]): csv_text(picture.numbers).encode()}

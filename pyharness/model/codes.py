@@ -91,7 +91,7 @@ class Storage:
 class Operations:
     """The codes of recorded operations.
 
-    A weighted term is a term of a Taylor series times its number.
+    A weighted term is a term of a Taylor series times its order.
     """
 
     LINEAR = 1  # a constant plus a linear combination of operands

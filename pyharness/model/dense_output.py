@@ -77,7 +77,7 @@ class Pieces:
 
 
 def sizes_of(largest: Array, n_own: int) -> Array:
-    """Return the sizes, (..., m), by which errors of m unknowns are divided.
+    """Return the sizes, (..., m), relative to which errors of m unknowns are measured.
 
     `largest` has the largest value of each unknown. The size is the largest of three values for
     omega, 1 for the quaternion, and the value itself for each of the `n_own` own states.

@@ -279,7 +279,7 @@ class Ensemble(BatchResult):
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the ensemble to a file, from which `Ensemble.load` restores it bit for bit.
 
-        As in files of `numpy.savez`, there is an array for each attribute.
+        The file has the format of `numpy.savez`, with an array for each attribute.
 
         Parameters
         ----------

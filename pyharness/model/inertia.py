@@ -1,8 +1,8 @@
 """Principal moments and axes of inertia matrices, diagonalised in integers.
 
 In binary64, a small eigenvalue would have few correct digits. Elements are integer multiples of a
-power of 2, u, and a regular matrix has an absolute determinant of at least u**3. This is a
-lower bound for the smallest eigenvalue, and determines how many bits are enough.
+power of 2, u, and a regular matrix has an absolute determinant of at least u**3. This
+bounds the smallest eigenvalue from below, and determines how many bits are enough.
 """
 
 import math

@@ -114,7 +114,7 @@ def _outputs(tape: Tape, time: Any) -> list[Any]:
 
 
 def inertia_function(place: str, function: Callable[[Any], Any]) -> InertiaFunction:
-    """Return the moments or inertia matrix of a user's function of time.
+    """Return the inertia, as moments or a matrix, that a user's function of time computes.
 
     The function must be recordable, continuous, and depend on time alone.
     """

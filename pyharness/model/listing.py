@@ -106,7 +106,7 @@ class Listing:
 
 
 def flagged() -> list[dict[str, Any]]:
-    """Return the entries of `data/apparatus.toml` that have a switch; "flag" is its bit number."""
+    """Return the entries of `data/apparatus.toml` that have a switch; "flag" is the bit number."""
     return [entry for entry in facts("apparatus")["entry"] if "flag" in entry]
 
 

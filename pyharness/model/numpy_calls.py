@@ -20,7 +20,7 @@ from pyharness.model.errors import InputError, printable
 from pyharness.model.symbols import Recorder, Symbol, negated, select
 from pyharness.model.tape import Table
 
-_MOST_PIECES = 200  # most pieces of an interpolation in the state
+_MOST_PIECES = 200  # most points of an interpolation in the state
 
 _lock = threading.Lock()
 _installed = 0

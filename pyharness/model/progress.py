@@ -17,7 +17,7 @@ Progress = Callable[[int, int, str], None]
 Its arguments are the numbers of completed parts and of all parts, and the name of the next part.
 """
 
-_PIECE = 1 << 18  # most bodies in a piece; Python checks for signals after each, some milliseconds
+_PIECE = 1 << 18  # most bodies in a piece, some milliseconds; Python checks for signals after it
 _SMALL = 256  # fewest bodies for which a further thread saves time
 _REPORTS = 100  # fewest pieces with a progress bar
 _bar: ContextVar[Any] = ContextVar("bar", default=None)  # None if no bar was requested

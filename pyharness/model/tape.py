@@ -41,7 +41,8 @@ class Table:
     """A piecewise cubic function of time.
 
     Row k of `pieces`, shape (n, 4), has the coefficients of a cubic in the time (s) after
-    breaks[k], constant first. It applies until the next break; the first row also before its break.
+    breaks[k], constant first. The cubic applies until the next break; the first cubic also before
+    its break.
     """
 
     def __init__(self, breaks: Any, pieces: Any) -> None:

@@ -110,7 +110,7 @@ class Trajectory(Conversions):
         method `reference`, `steps` is the number of rows.
     ended : str
         With all rows: "complete", "sensitive" (amplified errors may exceed the tolerance), or
-        "unchecked" (SciPy may have stepped over a short change of the torque). With fewer rows:
+        "unchecked" (SciPy may have stepped over a short change of the torque). Early endings:
         "overflow", "stopped" (by the Lipschitz test of the Runge-Kutta program), "singular" (the
         torque is undefined), "sliding" (the torque would jump back and forth without end), or
         "event" (at a terminal event).

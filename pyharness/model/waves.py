@@ -40,7 +40,7 @@ def is_mergeable(law: TorqueLaw) -> bool:
 
 
 def exact_law(law: TorqueLaw, turn: Callable[[Exact], Exact] | None = None) -> TorqueLaw:
-    """Return a law with waves summed by frequency, vectors rotated by `turn`, then rounded."""
+    """Return a law with exact sums of waves by frequency, rotated by `turn`, then rounded."""
     constant, rate = (triple(map(Fraction, each)) for each in (law.constant, law.rate))
     sines, cosines = _summed(law.sines, even=False), _summed(law.cosines, even=True)
     # A cosine of frequency 0 is 1 at all times, whereas a sine is 0.

@@ -1,6 +1,6 @@
 """Batches: scenes of a sweep that are solved in one call with the same settings.
 
-In this module, `own` maps each field in which the n scenes of a batch differ to its n values.
+In this module, `own` has the n values of each field in which the n scenes of a batch differ.
 """
 
 import math

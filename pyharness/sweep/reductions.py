@@ -31,8 +31,8 @@ class Reduction:
     `compute` takes a batch of n scenes and parameters (defaults: `parameters`). It returns n
     values, or n rows with the components `labels` along `dimension`. `only` is `program` or
     `method` if the other lacks the quantity. `needs` lists requirements: moments of
-    inertia (`moments`), `no torque`, a method with `attitude`. `flags` maps values that are codes
-    to their meanings.
+    inertia (`moments`), `no torque`, a method that computes the `attitude`. If values are codes,
+    `flags` maps them to their meanings.
     """
 
     title: str
@@ -181,7 +181,7 @@ def _tilts(batch: Batch, given: Mapping[str, Any]) -> Array:
 
 
 def _tilt_squares(batch: Batch, given: Mapping[str, Any]) -> tuple[Array, Array]:
-    """Return squared cosine and sine of half the angle of a body axis to its initial direction."""
+    """Return squared cosine and sine of half a body axis's angle from its initial direction."""
     squares = batch.attitudes(given["samples"]) ** 2
     is_own = _is_own(batch, given, len(squares))[:, None, :]
     along = squares[:, :, 0] + np.where(is_own, squares[:, :, 1:], 0.0).sum(axis=2)

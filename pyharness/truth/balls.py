@@ -61,7 +61,7 @@ def _refuse(*_: Any) -> Any:
 def functions_at(time: Fraction, forward: bool) -> Functions[Any]:
     """Return the functions that evaluate tapes (recorded operations) in a step from `time` (s).
 
-    A table is evaluated by its piece after `time` if `forward`, else by the piece before.
+    A table is evaluated by its piece after `time` if `forward`, else by the piece before it.
     """
 
     def table(each: Table, at: Any) -> Any:

@@ -26,7 +26,7 @@ PROVED, ESTIMATED = "proved", "estimated"
 _INTEGER_WORK, _BALL_WORK = 0.01, 0.0075
 _MOST_TIMES = 30  # for the prover in ball arithmetic, which needs a step for each time
 _SPARE_DIGITS = 2  # decimal digits by which a ball is smaller than the estimated error
-_DIGITS, _MOST_DIGITS = 20, 60  # digits of a proof without an estimate, and the most
+_DIGITS, _MOST_DIGITS = 20, 60  # digits of a proof without an estimate; most digits of any proof
 _ROUNDED_UP = 1.0 + 2.0**-49  # exceeds the rounding errors of a few operations
 
 Row = Sequence[float | Fraction]

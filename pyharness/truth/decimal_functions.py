@@ -82,7 +82,7 @@ def _arctan_inverse(n: int) -> Decimal:
 
 
 def product(x: Row, reversed_y: Row) -> Decimal:
-    """Return coefficient k of a product of series from their coefficients 0 to k and k to 0."""
+    """Return coefficient k of a product of two series, given coefficients 0 to k and k to 0."""
     if x and not x[-1]:
         # Series of polynomials end in many zeros, which change no digit of the sum.
         n = len(x) - 1

@@ -78,7 +78,7 @@ def decimals(balls: Balls) -> tuple[list[str], float]:
 
 
 def rounded_up(x: Fraction) -> float:
-    """Return a binary64 number of four digits, at least `x`, which is not negative."""
+    """Return a binary64 number, of four digits if possible, that is at least `x` >= 0."""
     # A factor above 1 compensates for rounding to a decimal string.
     candidates = (float(f"{float(x) * factor:.3e}") for factor in (1.0, 1.001, 1.01))
     # Near the least binary64 number, the factors may change nothing.

@@ -17,7 +17,7 @@ from pyharness.truth.decimal_functions import Row, arcsin, arctan, product, sine
 _LARGEST_ANGLE = Decimal("1e308")
 # An exponential below exp(-_INVISIBLE) affects no digit of a result, whatever its factor.
 _INVISIBLE = 400
-# Largest ratio of a step to the distance from a divisor's zero.
+# Largest change of a divisor in a step, over its value at the beginning.
 _WITHIN_CIRCLE = Decimal("0.9")
 _MANY_FACTORS = 3  # products of so many factors are checked; products of two show in any series
 # The order is at least this multiple of the number of factors, up to _MOST_ORDER, so that a product
@@ -213,8 +213,7 @@ class TapeSeries:
         An exponential, or the derivative of a hyperbolic tangent, may be negligible at the
         beginning of a step and large a little later. Its argument may therefore change by at most
         half the order, unless the function remains negligible. The mean order of a product's terms,
-        weighted by magnitude, has the same limit. The step is at most 0.9 times the distance from a
-        divisor's zero.
+        weighted by magnitude, has the same limit. The step does not reach any zero of a divisor.
         """
         for _, operation in self._live_operations():
             most = self._largest_change(operation)

@@ -93,7 +93,13 @@ def test_no_fault_is_named_before_the_hints() -> None:
                 assert "--format" in command, command
 
 
-@pytest.mark.parametrize("command", [*_commands(LESSON), *_commands(NOTES)])
+def _marked(command: str) -> Any:
+    # The references of all cases take seconds.
+    slow = [pytest.mark.campaign] if command.startswith("claims --explain") else []
+    return pytest.param(command, marks=slow)
+
+
+@pytest.mark.parametrize("command", [_marked(x) for x in _commands(LESSON) + _commands(NOTES)])
 def test_commands_run(
     command: str, printed: Printed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

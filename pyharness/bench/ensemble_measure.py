@@ -132,14 +132,14 @@ def measure_ensembles(
 ) -> Rates:
     """Return each contender's speed on each load, at each target error.
 
-    On the last load, RK4 contenders also run `STEPS` steps. `seed` is only recorded. A call solves
-    at least `least` bodies, or all if there are fewer.
+    `seed` is only recorded; a call solves at least `least` bodies.
     """
     found = Rates(seed, loads[0].n)
     tasks: list[_Task] = []
     for load in loads:
         sample = load.part(slice(0, SAMPLE))
         ends = sample.ends()
+        # On the last load, RK4 contenders also run `STEPS` steps.
         targets = (*TARGETS, None) if load is loads[-1] else TARGETS
         tasks += [_Task(load, target, sample, ends) for target in targets]
 
@@ -226,10 +226,7 @@ class Memory:
 
 
 def sizes(seed: str, most: int, progress: Progress = no_progress) -> list[Size]:
-    """Return the run times per body (s) for 1, 10, ... up to `most` bodies.
-
-    The closed form solves bodies without torque; "prepared" is its time in a prepared solver.
-    """
+    """Return the run times per body (s) for 1, 10, ... up to `most` bodies."""
     free, pushed = draw(seed, most)
     found: list[Size] = []
     n = 1
@@ -254,11 +251,9 @@ def _prepared(load: EnsembleLoad) -> Callable[[], object]:
 
 
 def memory(bodies: int) -> list[Memory]:
-    """Return the memory that a call of each of our methods takes.
-
-    Each runs in a new process, because peak memory never decreases.
-    """
+    """Return the memory that a call of each of our methods takes."""
     found = []
+    # A process's peak memory never decreases, so each method needs a new process.
     for method in own_ensembles():
         command = f"from pyharness.bench.ensemble_measure import needed; needed({method.name!r}, "
         call = [sys.executable, "-c", f"{command}{bodies})"]

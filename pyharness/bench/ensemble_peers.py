@@ -209,8 +209,7 @@ def numba_rk4(
 ) -> Callable[[], Array]:
     """Return an integration by RK4, compiled by numba.
 
-    If `in_blocks`, each step is a loop over a block's bodies; else bodies are integrated one after
-    another.
+    If `in_blocks`, each step is a loop over a block of bodies.
     """
     blocks, bodies = _numba_kernels()
     kernel = blocks if in_blocks else bodies

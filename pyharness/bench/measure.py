@@ -125,11 +125,7 @@ class Finding:
 def workloads(
     case: int | None = None, horizon: float | None = None, attitude: bool = False
 ) -> list[Workload]:
-    """Return workloads of Table 1: each case to 3 s, some also to 100 s.
-
-    With `attitude`, the bodies are initially aligned with the axes of space. `case` and `horizon`
-    (s) select one case and one end time.
-    """
+    """Return workloads of Table 1, by default until 3 s, in some cases also until 100 s."""
     usual, long = (_TURNING_CASES, _LONG_TURNING_CASES) if attitude else (_CASES, _LONG_CASES)
     cases = usual if case is None else (case,)
     asked = [(n, HORIZON if horizon is None else horizon) for n in cases]
@@ -191,10 +187,7 @@ def measure(
 
 
 def error_of(end: End, truth: Reference, scale: float = 0.0) -> float | None:
-    """Return the larger of the errors of omega (relative) and of the attitude (rad).
-
-    Return None if the result is not finite, or lacks a required attitude.
-    """
+    """Return the larger error of omega (relative) and attitude (rad), or None without a result."""
     error = relative_error(end.omega, truth, scale)
     if error is None or truth.attitude is None:
         return error
@@ -208,10 +201,7 @@ def error_of(end: End, truth: Reference, scale: float = 0.0) -> float | None:
 
 
 def relative_error(omega: Array, truth: Reference, scale: float = 0.0) -> float | None:
-    """Return the error of omega, divided by the larger of `scale` (rad/s) and the true omega.
-
-    Return None if the error is not finite, or the reference ends before the end time.
-    """
+    """Return omega's error relative to the larger of `scale` (rad/s) and true omega, or None."""
     if len(truth.omega) == 0:
         return None
     # Near the true solution this subtraction is exact, so the `remainder`, the reference's digits
@@ -225,10 +215,7 @@ def relative_error(omega: Array, truth: Reference, scale: float = 0.0) -> float 
 
 
 def ladder(contender: SceneContender, scene: Scene, horizon: float) -> Iterator[float]:
-    """Yield a contender's settings, from coarse to fine.
-
-    Numbers of steps are multiplied by 3/2 and 4/3 in turn or, for orders up to 2, by 2.
-    """
+    """Yield a contender's settings, tolerances or numbers of steps, from coarse to fine."""
     if contender.settings:
         yield from contender.settings
         return

@@ -64,8 +64,7 @@ def heyoka_maker(
 ) -> Maker:
     """Return a function that prepares heyoka's integrations, compiled once for each tolerance.
 
-    `formula` is as in `heyoka_equations`; `variational` adds derivatives with respect to the
-    initial state.
+    `variational` adds derivatives with respect to the initial state.
     """
     import heyoka
 
@@ -165,8 +164,7 @@ def _odeint(scene: Scene) -> Maker:
 def heyoka_equations(scene: Scene, formula: Formula | None = None) -> list[tuple[Any, Any]]:
     """Return pairs (unknown, derivative) for omega and, if the scene has one, the attitude.
 
-    A torque that depends on the state is computed by `formula`, or else from its recorded
-    operations. Raise InputError for an unrecorded torque, or one with a table or floor function.
+    Raise InputError if heyoka can't evaluate the torque.
     """
     import heyoka
 
@@ -253,10 +251,9 @@ def compiled_function(source: str) -> Any:
 def rates(
     scene: Scene, time: str, state: Sequence[str], coefficients: Sequence[float] = ()
 ) -> list[str]:
-    """Return the right-hand sides of omega as Python source.
+    """Return omega's derivatives as Python source in `time` (an expression) and `state` (names).
 
-    The source contains `time` (an expression) and `state` (names). `coefficients` are A, B, C, by
-    default the scene's.
+    `coefficients` are A, B, C.
     """
     x, y, z = state
     moments = scene.moments or (1.0, 1.0, 1.0)
@@ -287,10 +284,7 @@ def end_of(state: Array, evaluations: int | None = None) -> End:
 
 
 def steps_source(scene: Scene, formula: Tableau) -> str:
-    """Return the Python source of a Runge-Kutta integration with unrolled stages.
-
-    Its function takes the end time (s), and writes omega into its last argument.
-    """
+    """Return the Python source of a Runge-Kutta integration with unrolled stages."""
     stages, weights, nodes = formula
     step = ["t = step * h"]
     for i, row in enumerate(stages):

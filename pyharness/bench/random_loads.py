@@ -39,9 +39,7 @@ KINDS = ("all", *LAWS, *SPEEDS, *BODIES, *_LENGTHS)
 def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
     """Return the workload that `seed` and `number`, from 1 on, determine.
 
-    The kind of torque changes with the number. A scene with too large an error amplification, or
-    too few or too many revolutions, is drawn again. With `attitude`, the body is initially aligned
-    with the axes of space, and there is no `truth`.
+    With `attitude`, the workload has no `truth`.
     """
     source = Random(f"bench/{seed}/{number}")
     place = number - 1
@@ -76,10 +74,7 @@ def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
 
 
 def by_torque(source: Random, name: str, law: str, speed: str, body: str) -> tuple[Scene, float]:
-    """Return a random scene, and the time (s) of roughly 1 to 300 revolutions.
-
-    `law`, `speed` and `body` are in `LAWS`, `SPEEDS` and `BODIES`.
-    """
+    """Return a random scene, and the time (s) of roughly 1 to 300 revolutions."""
     mass = _log(source, 1.0, 50.0)
     moments = [mass * each for each in BODIES[body](source)]
     source.shuffle(moments)

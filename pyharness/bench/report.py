@@ -42,8 +42,7 @@ def measured_report(
 ) -> Report:
     """Return a benchmark's report, with machine and build added, and a Markdown page.
 
-    The text of `found` has titled tables, then the notes. The page adds `worth` (how comparable the
-    numbers are), the versions of `packages`, and the `command` that repeats the benchmark.
+    `worth` says how comparable the numbers are.
     """
     here, built = machine(packages), build()
     *parts, notes = found.text
@@ -64,7 +63,7 @@ def measured_report(
 def grouped(reasons: Iterable[tuple[str, str, str]], most: int | None = None) -> list[str]:
     """Return lines on missing results from tuples of contender, reason and task.
 
-    Contenders with equal reason and tasks share a line of at most `most` tasks.
+    Contenders with equal reason and tasks share a line.
     """
     places: dict[tuple[str, str], list[str]] = {}
     for who, why, where in reasons:

@@ -77,7 +77,7 @@ def groups(finding: Finding) -> dict[str, list[Workload]]:
 def means(finding: Finding, loads: Sequence[Workload]) -> dict[str, list[float | None]]:
     """Return each contender's geometric mean ratio over `loads`, for each target error.
 
-    A mean is None if contender or baseline misses the error on a workload.
+    A mean is None if any ratio is missing.
     """
     tables = [_ratios(finding, load) for load in loads]
     names = dict.fromkeys(name for table in tables for name in table)

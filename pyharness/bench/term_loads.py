@@ -226,10 +226,7 @@ def term_leaves(scenes: Sequence[TermScene], compiled: bool) -> Counter[str]:
 
 
 def term_peers(scenes: Sequence[TermScene]) -> list[SceneContender]:
-    """Return heyoka, heyoka with variational equations, and DOP853, installed or not.
-
-    heyoka computes a torque by the scene's formula, or else from its recorded operations.
-    """
+    """Return heyoka, heyoka with variational equations, and DOP853, installed or not."""
     formulas = {each.scene.name: each.formula for each in scenes}
 
     def prepare(scene: Scene, variational: bool = False) -> Maker:

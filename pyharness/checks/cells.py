@@ -96,11 +96,7 @@ _VECTORS = Basis(
 
 
 def words(chosen: Selection) -> Iterator[Attempt]:
-    """Yield bit-for-bit checks of our simulated machine arithmetic.
-
-    CDC instructions must give the expected results. Programs in our 53-bit arithmetic must agree
-    with programs in floats. In other arithmetics, Python and compiled programs must agree.
-    """
+    """Yield bit-for-bit checks of simulated machine arithmetic, in instructions and programs."""
     yield Attempt(Name("words", "vectors"), _vectors)
     for listing, case in all_cells():
         has_all_or_none = listing.label != "custom" and not listing.readings

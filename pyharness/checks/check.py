@@ -157,7 +157,7 @@ Attempts = Iterable[Check | Attempt]
 def make_checks(
     attempts: Attempts, only: Sequence[str], raised: tuple[type[Exception], ...] = (NotBuiltError,)
 ) -> Iterator[Check]:
-    """Yield the finished checks in `attempts`, and the deferred ones that `only` requests.
+    """Yield finished checks, and the deferred ones that `only` requests.
 
     An exception becomes a failed check, unless its type is in `raised`.
     """
@@ -187,12 +187,12 @@ def run_suites(
     suites: Mapping[str, Callable[[], Attempts]],
     only: Sequence[str],
     command: str,
-    of_the_user: Sequence[str] = (),
+    of_the_user: Sequence[str] = (),  # suites that read the user's files
 ) -> Iterator[Check]:
-    """Yield the requested checks of all suites (kinds of checks).
+    """Yield the requested checks of all `suites`.
 
-    An exception becomes a failed check. NotBuiltError is raised instead, and so is InputError in
-    the suites `of_the_user`, which read the user's files.
+    An exception becomes a failed check, except NotBuiltError and, in suites `of_the_user`,
+    InputError.
     """
     for suite, attempts in suites.items():
         raised = (NotBuiltError, InputError) if suite in of_the_user else (NotBuiltError,)

@@ -69,12 +69,10 @@ class Probe:
 
 
 def steady_scene(coefficients: Triple, omega: Triple, step: float) -> Scene:
-    """Return a scene of one `step` (s) in which a constant torque keeps `omega` (rad/s) constant.
-
-    The balance is exact if all numbers have few binary digits.
-    """
+    """Return a scene of one `step` (s) where a constant torque keeps `omega` (rad/s) constant."""
     a, b, c = coefficients
     x, y, z = omega
+    # The balance is exact if all numbers have few binary digits.
     law = TorqueLaw((-a * y * z, -b * x * z, -c * x * y))
     return Scene("steady rotation", omega, None, coefficients, law, step_size=step, steps=1)
 
@@ -91,10 +89,9 @@ def eigenvalues(scene: Scene) -> Array:
 
 
 def first_step(scene: Scene, listing: Listing) -> Probe:
-    """Return the derivative, 3 x 3, of omega after a first step with respect to the initial omega.
+    """Return the 3 x 3 derivative of omega after a first step with respect to initial omega.
 
-    The rotation is steady. Central differences are exact except for rounding, because a step is a
-    polynomial of omega with known degree.
+    The rotation must be steady.
     """
 
     def stepped(omega: Array) -> Array:
@@ -109,10 +106,9 @@ def first_step(scene: Scene, listing: Listing) -> Probe:
 
 
 def later_steps(scene: Scene, listing: Listing) -> Probe:
-    """Return the perturbation of a spinning top after all steps of a scene.
+    """Return the perturbation (omega1, omega2) of a spin about axis 3 after all steps.
 
-    The spin is omega3; omega1 and omega2 are the perturbation. Euler's coefficient C and the torque
-    are zero, so that the equations are linear.
+    Euler's coefficient C and the torque must be zero.
     """
     rows = _run(scene, listing)
     found = rows[-1, :2] if len(rows) == scene.steps else np.full(2, np.nan)
@@ -151,11 +147,9 @@ def complex_step(listing: Listing, step: int, z: complex) -> Probe:
 
 
 def observed_boundary(listing: Listing, direction: complex) -> Probe:
-    """Return the distance of z from 0 at which perturbations begin to grow.
+    """Return abs(z) where perturbations begin to grow, along `direction` (-1 or 1j).
 
-    z is the step size times an eigenvalue of the Jacobian. The distance is found by bisection
-    along `direction`, -1 or 1j, in runs of a spinning top. With the defect `base-not-restored`, the
-    change of omega from step to step is measured, because a constant part might hide the growth.
+    z is the step size times an eigenvalue of the Jacobian.
     """
     matrix = amplification(listing)
     expected, slope = boundary(matrix, direction)
@@ -170,6 +164,7 @@ def observed_boundary(listing: Listing, direction: complex) -> Probe:
         if len(rows) <= _GROWTH_STEPS:
             return True
         if matrix.size > 1:
+            # With `base-not-restored`, a constant part might hide the growth.
             rows = np.diff(rows, axis=0)
         return bool(np.square(rows[-1]).sum() > np.square(rows[0]).sum())
 
@@ -190,11 +185,7 @@ def _moved(listing: Listing, step: int) -> float:
 
 
 def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
-    """Return the derivative of a collocation step by omega, where omega is not constant.
-
-    A step h takes omega to omega + h F + h**2/2 J F + w h**3 Q(F), where F is the right-hand side,
-    J its Jacobian and Q its quadratic part. Only the weight w depends on the collocation points.
-    """
+    """Return the derivative of a collocation step with respect to omega, in unsteady rotation."""
     program, h = listing.program, scene.step_size
     moved = _moved(listing, step)
     coefficients, torque = scene.euler_coefficients, scene.normalized_torque(0.0)
@@ -207,7 +198,10 @@ def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
         return np.array(end)
 
     found, limit = _differentiated(stepped, scene, program, moved)
-    # J at omega, and at the value of F.
+    # A step takes omega to omega + h F + h**2/2 J F + w h**3 Q(F), with the value F of the
+    # right-hand side, its Jacobian J, and its quadratic part Q at F. Only the weight w depends on
+    # the collocation points.
+    # J at omega, and at the value of F:
     slope = scene.right_hand_side()(0.0, scene.omega)
     j, along_rate = jacobians(scene, np.array([scene.omega, slope]))
     third = float(weight_of_squares(listing, step)) * h**3 * (along_rate @ j)
@@ -224,6 +218,7 @@ def _differentiated(
     spread = reach / count
     weights = [float(each) for each in spacing(count)]
     columns = []
+    # A step is a polynomial of omega, so that these differences are exact except for rounding.
     for axis in np.eye(3):
         total = np.zeros(3)
         for i, weight in enumerate(weights, 1):
@@ -272,10 +267,9 @@ DOUBLING = Basis(
 def divergence(
     scene: Scene, time: float, matrix: Amplification, runner: Runner, smallest: float
 ) -> tuple[float, float, float]:
-    """Return measured and predicted step size (s) of divergence, and a bound on their difference.
+    """Return measured and predicted step size (s) of divergence.
 
-    The bound is relative to the predicted step size, with which, by linear theory, the wobble
-    (omega1, omega2) doubles within `time` (s). The body spins about axis 3, which is stable.
+    The third number bounds their relative difference. Rotation about axis 3 must be stable.
     """
     found = smallest_divergent(scene, time, runner, smallest)
     a, b, c = scene.euler_coefficients
@@ -300,8 +294,7 @@ def divergence(
 def smallest_divergent(scene: Scene, time: float, runner: Runner, smallest: float) -> float:
     """Return the smallest step size (s) with which a run diverges.
 
-    A run diverges if a component of omega exceeds twice its largest true value, or if it ends
-    early. Return 0 if steps of `smallest` (s) diverge too, infinity if no step does.
+    Return 0 if steps of `smallest` (s) diverge, infinity if none does.
     """
     bounds = 2.0 * np.array(_bounds(scene, time))
 

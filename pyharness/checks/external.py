@@ -87,11 +87,7 @@ def _triples(triple: Triple | None, part: float) -> Iterator[Triple]:
 
 
 def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> Iterator[Check]:
-    """Yield checks of each method that accepts a problem: ``external/<problem>/<time>/<method>``.
-
-    The value is the error, in the problem's unit, of the omega component with the largest ratio of
-    error to limit.
-    """
+    """Yield checks of methods that accept a problem: ``external/<problem>/<time>/<method>``."""
     for problem in problems:
         # Values are always solved together, so that repeating one check gives the same bits.
         for side in (1.0, -1.0):

@@ -87,12 +87,7 @@ def recorded() -> Iterator[Recorded]:
 
 
 def golden(chosen: Selection) -> Iterator[Attempt]:
-    """Yield comparisons with the golden record, if its folder exists.
-
-    Methods with a tolerance must agree within twice the tolerance, because processors and compilers
-    round differently. Programs and other methods must agree bit for bit. If another mathematical
-    library computed the torque's sines and cosines, the limit is the amplified rounding error.
-    """
+    """Yield comparisons with the golden record, if its folder exists."""
     if not chosen.record.is_dir():
         return
     known = read_record(chosen.record)
@@ -166,7 +161,7 @@ def read_record(folder: Path) -> dict[str, dict[str, Any]]:
 def files_made(folder: Path) -> set[str]:
     """Return the names of the files in `folder` that `verify --update` made.
 
-    If there is one, all files with the name of a record are included, even damaged ones.
+    Damaged files are included if at least one is intact.
     """
     found = set()
     for path in folder.glob("*.toml"):

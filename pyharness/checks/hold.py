@@ -117,11 +117,7 @@ def check_methods(
 ) -> Iterator[Attempt]:
     """Yield checks of each method's error at `time` (s) in the scene of `name`.
 
-    By default, the limit is the sum of the amplified tolerance, the amplified rounding error, and
-    the true solution's error. For fixed steps without torque, a bound from the order of convergence
-    replaces the tolerance. Other runs without tolerance have no limit; nor has a run if the sum
-    would exceed 1 % of omega. Without torque, energy and momentum always have a limit, because
-    their errors are not amplified. A refusal fails, unless `refusable` permits it.
+    By default, the limits are from `DERIVED`.
     """
     scene = scene_of(name)
     known = cache(partial(truth, scene, time))
@@ -149,11 +145,7 @@ def _steps(scene: Scene, time: float) -> int:
 
 
 def refusable(tried: MethodRun, truth: Truth, why: str) -> bool:
-    """Return whether a method may refuse a scene.
-
-    `quick` may refuse any scene; `closed-form`, a scene without closed form; a series method, a
-    scene in which the phase of a sine or cosine of the torque exceeds 1e8 rad by the end.
-    """
+    """Return whether the method in `tried` may refuse its scene."""
     method, scene = tried.method, tried.scene
     if method == "closed-form":
         return closed_form(scene) is None
@@ -197,6 +189,7 @@ def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check
     yield judge(name.with_quantity("error"), tried, truth, DERIVED)
     answer = tried.answer
     if truth.exact and answer.is_whole and not answer.refusal:
+        # Errors of energy and momentum are not amplified, and always have a limit.
         made = promised_sum(tried, truth)
         lost = truth.flow.unamplified + _roundings(tried, truth) * ROUNDING
         if made is None:
@@ -216,11 +209,7 @@ def scene_of(name: Name) -> Scene:
 
 
 def promised_sum(tried: MethodRun, truth: Truth) -> float | None:
-    """Return a bound on the sum of all steps' errors, relative to the largest omega, or None.
-
-    For fixed steps without torque, the bound is infinite if the largest Euler coefficient times the
-    largest omega times the step is 0.5 rad or more.
-    """
+    """Return a bound on the steps' summed errors relative to the largest omega, or None."""
     method = tried.method
     if method not in FIXED_STEP or not truth.exact:
         return tried.tolerance
@@ -236,13 +225,13 @@ def promised_sum(tried: MethodRun, truth: Truth) -> float | None:
 def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:
     """Return the smallest error of `omega` that explains its drift of energy and momentum.
 
-    The error is relative to `largest` (rad/s). Energy and squared momentum are sums of q w**2 over
-    the components w, where q is the moment or its square. An error e changes such a sum by at most
-    2 e times the sum of q abs(w).
+    The error is relative to `largest` (rad/s).
     """
     assert scene.moments is not None
     if not np.isfinite(omega).all():
         return math.inf
+    # An error e changes a sum of q w**2, with q the moment or its square, by at most 2 e times the
+    # sum of q abs(w).
     worst = Fraction(0)
     big = Fraction(largest)
     for power in (1, 2):

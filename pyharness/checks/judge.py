@@ -170,10 +170,9 @@ class Policy:
 
 
 def allowed(truth: Truth, made: float, growth: float, steps: float = 0.0) -> float:
-    """Return an error's limit: the sum of step errors, rounding errors and the truth's error.
+    """Return an error's limit: step errors `made` times `growth`, plus rounding and truth's error.
 
-    `made`, the sum of step errors, is multiplied by `growth`; `steps` counts uncompensated
-    roundings of omega.
+    `steps` counts uncompensated roundings of omega.
     """
     if truth.attitude is not None:
         return truth.flow.angle_limit(made * growth, truth.end) + truth.angle_error
@@ -221,11 +220,7 @@ AMPLIFIED = Policy(_granting(lambda growth: growth), FLOW)
 
 
 def judge(name: Name, tried: MethodRun, truth: Truth, policy: Policy) -> Check:
-    """Return the check that a method's error is within its limit, or that its refusal is permitted.
-
-    Without a limit, a finite error is only reported. `closed-form` must refuse a scene without
-    closed form.
-    """
+    """Return the check that a method's error is within its limit, or its refusal permitted."""
     answer = tried.answer
     if why := answer.refusal:
         return name.judged(policy.may_refuse(tried, truth, why), f"{REFUSED}{why}")

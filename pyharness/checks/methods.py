@@ -67,10 +67,7 @@ def methods(chosen: Selection) -> Iterator[Attempt]:
 
 
 def prepared(chosen: Selection) -> Iterator[Attempt]:
-    """Yield checks of prepared solvers, at positive and negative times.
-
-    With a fixed step, they must agree bit for bit with the unprepared method.
-    """
+    """Yield checks of prepared solvers; with a fixed step they must equal the unprepared method."""
     for case in cases(chosen):
         scene = case_scene(case)
         forms = _PREPARED if closed_form(scene) else _PREPARED[:-1]
@@ -215,12 +212,12 @@ def in_few_steps(scene: Scene, time: float) -> Scene:
 def order_if_seen(scene: Scene, truth: Callable[[], Reference], name: Name) -> Check:
     """Return the check of a fixed-step method's order.
 
-    The order is only reported if the scene is too fast or sensitive for 4096 steps, or if the
-    torque has a table, which lowers it.
+    It always passes if the order is undecided, or the torque has a table.
     """
     method = name.setting or name.subject
     found = _order_of_method(scene, method, truth(), most_steps=_MOST)
     tape = scene.torque.tape if isinstance(scene.torque, StateTorque) else None
+    # A table lowers the order.
     has_tables = tape is not None and any(each.table for each in tape.operations)
     if found.is_judged and not has_tables:
         return judged_order(name, found)

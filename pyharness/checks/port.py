@@ -78,10 +78,9 @@ def port_cells(programs: Sequence[str], cases: Sequence[int], cells: Sequence[st
 def random_cells(
     seed: str, draws: int, cells: Sequence[str] = (), programs: Sequence[str] = PROGRAMS
 ) -> list[Cell]:
-    """Return runs in random scenes, named as in ``random/7/two-term`` and ordered by scene number.
+    """Return runs in random scenes, ordered by number and named as in ``random/7/two-term``.
 
-    `cells` has beginnings of the requested names; their scene numbers may exceed `draws`. If it is
-    empty, all `draws` scenes are requested.
+    Beginnings of names in `cells` select runs.
     """
     named = {int(match[1]) for each in cells if (match := _DRAWN.match(each))}
     found = []
@@ -97,9 +96,9 @@ def random_cells(
 
 
 def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Iterator[PortCheck]:
-    """Yield checks that a port, started by `command`, agrees bit for bit with the Python version.
+    """Yield checks that a port agrees bit for bit with the Python version.
 
-    An invalid answer, or none within `patience` (s), fails and ends the comparison.
+    They end without a valid answer within `patience` (s).
     """
     name, again = Name("port", "start"), replay_command(command)
     try:

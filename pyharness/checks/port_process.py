@@ -45,10 +45,7 @@ def split_command(command: str, option: str = "--port") -> list[str]:
 def refuse_other(
     command: str, option: str, instead: str, line: bytes, read: Callable[[bytes], object]
 ) -> None:
-    """Raise InputError that advises the option `instead` if `command` answers its requests.
-
-    `line` is one of these requests; `read` raises PortError for an invalid answer.
-    """
+    """Raise InputError that advises option `instead` if `command` answers `line`, its request."""
     with contextlib.suppress(PortError), PortProcess(command, _PROBE, option) as process:
         read(process.ask(line))
         raise InputError(
@@ -120,7 +117,7 @@ class PortProcess:
     def ask(self, line: bytes) -> bytes:
         """Send a request and return the answer, both without line feed.
 
-        Raise PortError if the port ends, or the answer is late, too long or more than one line.
+        Raise PortError if no valid answer comes in time.
         """
         end = time.monotonic() + self._patience
         rest = line + b"\n"

@@ -34,9 +34,9 @@ class Answer:
 def request(
     scene: Scene, listing: Listing, lipschitz: float | None = None, may_stop: bool = True
 ) -> bytes:
-    """Return the line of JSON that requests a run; its decimals represent floats exactly.
+    """Return the JSON line that requests a run; its decimals represent floats exactly.
 
-    `lipschitz` is the constant of the stop test (1/s), by default as in the author's decks.
+    `lipschitz` is the stop test's constant (1/s).
     """
     asked = {
         "schema": SCHEMAS["port request"],

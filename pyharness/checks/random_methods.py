@@ -74,9 +74,9 @@ Entrances = dict[str, Callable[[], MethodRun]]
 
 
 def truth_of(drawn: Draw) -> Truth:
-    """Return the true omega of a draw at 0.4 times its end time, and at the end.
+    """Return a draw's true omega, before and at its end.
 
-    Raise InputError if the motion is unbounded or too fast, or rounding leaves no digit of omega.
+    Raise InputError if the motion is unbounded, too fast or too sensitive.
     """
     times = [_EARLIER * drawn.time, drawn.time]
     path = integer_series(drawn.scene, times)
@@ -88,12 +88,7 @@ def truth_of(drawn: Draw) -> Truth:
 
 
 def may_refuse(tried: MethodRun, truth: Truth, why: str) -> bool:
-    """Return whether a method may refuse its run `tried` with the message `why`.
-
-    `auto` never may, `quick` always, a closed form only near the limits of binary64. Other methods
-    may refuse scenes of `_MAY_REFUSE`, or scenes with an error amplification above 10. SciPy's
-    methods may also refuse tolerances finer than they meet, or below 1e-9 if the work is too much.
-    """
+    """Return whether a method may refuse its run `tried` with the message `why`."""
     method, kind = tried.method, tried.scene.name
     if method == "auto":
         return False

@@ -143,11 +143,7 @@ _SAMPLES = (
 
 
 def samples(checks: Sequence[Check], rounding: float) -> Section:
-    """Return a table of the largest ratios of error to tolerance.
-
-    First, `rounding` times the error amplification is subtracted from the error. Rows are entry
-    points and tolerances, columns ranges of the amplification.
-    """
+    """Return the largest ratios of error to tolerance, by entry point and error amplification."""
     cells: dict[tuple[str, str], list[list[float]]] = {}
     for check in checks:
         if isinstance(check, Sample) and check.value is not None:

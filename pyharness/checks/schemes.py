@@ -149,14 +149,14 @@ class _Quotients:
     """The quotients that the program compares with its stop constant, in the program's order."""
 
     values: Array  # shape (n, m) for n steps, 1/s
-    rounding: Array  # shape (n, m): bound on the difference of two computations, 1/s
+    rounding: Array  # shape (n, m): bound on a quotient's difference in two computations, 1/s
     names: list[str]  # names of the m quotients
 
 
 def stops(chosen: Selection) -> Iterator[Attempt]:
     """Yield checks of stops, for every combination of the stop test's defects.
 
-    The value is the largest difference from a recomputed quotient, divided by its rounding bound.
+    Values are differences from recomputed quotients, divided by rounding bounds.
     """
     ways = tuple(name for name in names_of("defect", _PROGRAM) if name.startswith("lipschitz"))
     for case in cases(chosen, (3,)):

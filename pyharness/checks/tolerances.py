@@ -57,8 +57,7 @@ def finest_and_middling(name: str, scene: Scene, time: float) -> list[float]:
 def affordable(name: str, scene: Scene, time: float, flow: Conditioning) -> list[float | None]:
     """Return the tolerances at which a method is checked until `time` (s) in a scene.
 
-    These are the finest within the work limit, and 1e-6 if affordable. For fixed steps and Gauss
-    collocation, None means the scene's step size.
+    None means the scene's step size.
     """
     if name in FIXED_STEP:
         return [None]

@@ -140,8 +140,8 @@ def _integrator_self_test(
 
 def show_self_test(
     options: argparse.Namespace,
-    outcomes: Iterable[Outcome],
-    count: int,
+    outcomes: Iterable[Outcome],  # the first is the control, a run without fault
+    count: int,  # of planted faults
     title: Sequence[str],
     again: str,
     refuse: Callable[[], None] = lambda: None,
@@ -149,7 +149,6 @@ def show_self_test(
 ) -> int:
     """Write the report of a self-test; return 1 if an outcome fails, else 0.
 
-    `outcomes` begins with a control, a run without fault; runs with `count` planted faults follow.
     `refuse` is called if the control fails.
     """
     found = []

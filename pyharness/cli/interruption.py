@@ -65,9 +65,9 @@ def came() -> bool:
 
 
 def leave_when_interrupted() -> bool:
-    """Make Ctrl-C end the process at once and return True; return False if SIGINT is ignored.
+    """Make Ctrl-C end the process at once; return False if SIGINT is ignored.
 
-    Call it only while nothing needs cleanup: during imports, and after output.
+    Call this only while nothing needs cleanup.
     """
     # A shell starts background processes with SIGINT ignored, which must remain so.
     if not callable(signal.getsignal(signal.SIGINT)):
@@ -110,8 +110,7 @@ def report() -> int:
 def leave(code: int) -> None:
     """Remove temporary files and end the process with exit status `code`.
 
-    Python's own exit would wait for threads; Ctrl-C might be ignored or kill the process. If `code`
-    is 130, child processes are killed, and cleanup takes at most two seconds.
+    If `code` is 130, child processes are killed.
     """
     if code == CODE:
         # Messages of ending threads and finalizers would follow the report of the interrupt.
@@ -130,6 +129,7 @@ def leave(code: int) -> None:
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(Exception):
             stream.flush()
+    # Python's own exit would wait for threads; Ctrl-C might be ignored or kill the process.
     os._exit(code)
 
 

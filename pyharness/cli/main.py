@@ -44,13 +44,9 @@ VERBS = {verb: about for group in _GROUPS.values() for verb, about in group.item
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command line, by default this process's, and return its exit status.
+    """Run a command line, by default this process's; return the exit status.
 
-    - 0 for expected results;
-    - 1 for an unexpected result, such as a failed check;
-    - 2 for wrong usage or input;
-    - 3 if the Fortran extension is missing;
-    - 130 after an interrupt.
+    Status 1 is for unexpected results, such as failed checks.
     """
     # Garbage collection during the imports takes 4 % of a command's time and frees nothing.
     gc.set_threshold(100_000)

@@ -97,7 +97,7 @@ SCENES = Cost("random scenes", 8.0, 1e5, 10_000)
 def outputs(formats: Sequence[str] = FORMATS, plot: str = "the results") -> dict[str, str]:
     """Return the help texts of --format, --plot and --out, by option.
 
-    The first of `formats` is the default. `plot` names the content of the picture; "" omits --plot.
+    The first format is the default; an empty `plot` omits --plot.
     """
     first, *others = formats
     form = {"--format F": f"Output format: {first} (default), {', '.join(others)}."}
@@ -156,8 +156,7 @@ def chosen_names(text: str | None, what: str, allowed: Sequence[str]) -> list[st
 def chosen_scene(options: argparse.Namespace, **allowed: bool) -> Scene:
     """Return the scene of --case or --scene, changed by --omega, --step-size and --steps.
 
-    Warn of impossible moments of inertia, and of a normalised attitude. `allowed` are flags of
-    `checked_scene`.
+    `allowed` are flags of `checked_scene`.
     """
     if (options.case is None) == (options.scene is None):
         raise InputError("give either --case N (1 to 7) or --scene FILE")
@@ -203,7 +202,7 @@ def chosen_listing(options: argparse.Namespace) -> Listing:
 def changes_of(options: argparse.Namespace) -> dict[str, Any]:
     """Return the names in --fix, --keep, --reading and --conjecture, as arguments of `subset`.
 
-    Raise InputError for --fix in a corrected program, or --keep in an original one.
+    Raise InputError for a change without meaning.
     """
     if options.listing == "corrected":
         refuse(options, "--listing corrected", ("fix",))
@@ -261,8 +260,7 @@ def refuse(
 ) -> None:
     """Raise InputError if an option of `names` is given besides `chosen`.
 
-    A name is an attribute of `options`, such as "no_stop", or a key of OPTIONS, as "--case N".
-    The message ends with what is `allowed`.
+    Names are as in `options` ("no_stop") or OPTIONS ("--case N").
     """
     for name in names:
         option = name.partition(" ")[0].removeprefix("--").replace("_", "-")
@@ -315,7 +313,7 @@ def whole_up_to(most: int, text: str | None, option: str, default: int) -> int:
 def chosen_count(text: str | None, option: str, default: int, least: int, cost: Cost) -> int:
     """Return an option's number of draws, from `least` to `cost.most`, or the default.
 
-    Print a forecast if the draws take more than a minute.
+    Print a forecast of a long run.
     """
     if text is None:
         return default
@@ -407,10 +405,9 @@ def show(
     own: Mapping[str, Callable[[], str | bytes]] | None = None,
     failed: object = False,
 ) -> int:
-    """Write a report in the format of --format, the picture of --plot, and the files of --also.
+    """Write what --format, --plot and --also request; return 1 if `failed`, else 0.
 
-    `own` maps formats of this report alone, such as "tape5", to functions that return the content.
-    Return 1 if `failed`, else 0.
+    `own` maps formats of this report alone to functions.
     """
     from pyharness.views.render import render
 

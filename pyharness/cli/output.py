@@ -66,7 +66,7 @@ def write_folder(path: str, contents: dict[str, bytes], option: str) -> None:
 def check_tree(path: str, mark: str, option: str, kind: str = "edition") -> None:
     """Raise InputError if `write_tree` may not replace the folder.
 
-    The folder may contain only the JSON file `mark`, of schema `kind`, and the files listed in it.
+    The folder may contain only the JSON file `mark` and files listed there.
     """
     check_replaceable(path, lambda folder: {mark, *_listed(folder / mark, kind)}, option)
 
@@ -74,8 +74,7 @@ def check_tree(path: str, mark: str, option: str, kind: str = "edition") -> None
 def check_replaceable(path: str, made: Callable[[Path], set[str]], option: str) -> None:
     """Raise InputError if `write_tree` may not replace the folder.
 
-    The folder may be missing, or contain only files that the verb wrote, named by
-    ``made(folder)``.
+    The folder may contain only the files named by ``made(folder)``.
     """
     check_folder(path, (), option)
     folder = Path(os.path.realpath(path))
@@ -127,7 +126,7 @@ def _beside(folder: Path) -> tuple[Path, Path]:
 def write_tree(path: str, contents: dict[str, bytes], option: str) -> None:
     """Replace a folder by one with only the files in `contents`, by path.
 
-    The new folder is complete before the old one is removed; on failure the old one remains.
+    On failure the old folder remains.
     """
     folder = Path(os.path.realpath(path))
     new, old = _beside(folder)

@@ -21,19 +21,15 @@ class Item(NamedTuple):
 
 
 class Entry(NamedTuple):
-    """A public name on the API page.
-
-    `kind` is "function", "class" or "property". `summary`, `text` and `groups` are the docstring's
-    first line, other paragraphs, and sections by title.
-    """
+    """A public name on the API page."""
 
     name: str
     anchor: str
-    kind: str
+    kind: str  # "function", "class" or "property"
     signature: str
-    summary: Markup
-    text: list[Markup]
-    groups: list[tuple[str, list[Item]]]
+    summary: Markup  # first line of the docstring
+    text: list[Markup]  # its other paragraphs
+    groups: list[tuple[str, list[Item]]]  # its sections, by title
     methods: "list[Entry]"
 
 

@@ -21,8 +21,7 @@ _COMMENT = re.compile(r"^ *//.*\n", re.M)
 def bundle(entry: Path) -> str:
     """Return the module in `entry` and all its imports as one script without global names.
 
-    Raise ValueError, with file and line, for an unsupported form, a missing file or name, or
-    circular imports.
+    Raise ValueError for anything unsupported or missing.
     """
     exports: dict[Path, list[str]] = {}
     parts: list[str] = []

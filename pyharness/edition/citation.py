@@ -60,7 +60,7 @@ def check_publishable() -> None:
 def bibtex(place: str = "", path: str = "") -> str:
     """Return BibTeX entries of the thesis and of the edition, or a `place` in it.
 
-    The place's `path` is appended to the address of the pages, if they have one.
+    `path` is appended to the pages' address.
     """
     described = codemeta()
     version, thesis = described["version"], described["referencePublication"]

@@ -33,24 +33,18 @@ _ORDER = (
 
 
 class Run(NamedTuple):
-    """Successive characters of a card or its line in the scan.
-
-    If card and scan differ here, `entry` identifies the note on it.
-    """
+    """Successive characters of a card or its line in the scan."""
 
     text: str
-    entry: str | None = None
+    entry: str | None = None  # the note, if card and scan differ here
 
 
 class Note(NamedTuple):
-    """A numbered note (apparatus entry), and the cards of one program to which it applies.
-
-    `cards` is a text, as in ``860-910, 1040-1090``.
-    """
+    """A numbered note (apparatus entry), and the cards of one program to which it applies."""
 
     number: int
     entry: dict[str, Any]
-    cards: str
+    cards: str  # as in ``860-910, 1040-1090``
 
     @property
     def kind(self) -> str:
@@ -58,49 +52,38 @@ class Note(NamedTuple):
 
 
 class Corrected(NamedTuple):
-    """The corrected form of a card, with the cards `inserted` after it.
+    """The corrected form of a card, with the cards `inserted` after it."""
 
-    `text` is None for a deleted card; `changes` is true for a deleted or replaced one.
-    """
-
-    text: str | None
-    changes: bool
+    text: str | None  # None for a deleted card
+    changes: bool  # true for a deleted or replaced card
     inserted: list[tuple[int, str]]
     defects: list[str]
 
 
 class CardView(NamedTuple):
-    """A card as shown on a page.
-
-    `card` is our text, in brackets if the scan lacks it. `witness` is our text with the scan's
-    names: None if equal to `card`, empty if the scan lacks it. `scan` is the scan's line, or None;
-    `after` has the scan's next lines, which belong to no card. `port` has each line of the Fortran
-    port, the defect or reading that switches it, and whether it is executed if this is active.
-    `notes` begin with the most important kind; `begins` has the notes on a range of cards that
-    begins here, each with only this range.
-    """
+    """A card as shown on a page."""
 
     number: int
-    card: list[Run]
+    card: list[Run]  # our text, in brackets if the scan lacks it
+    # Our text with the scan's names; None if equal to `card`, empty if the scan lacks it.
     witness: str | None
-    after: list[Run]
-    scan: list[Run] | None
+    after: list[Run]  # next lines of the scan, which belong to no card
+    scan: list[Run] | None  # line of the scan
     corrected: Corrected
+    # Each line of the Fortran port, the defect or reading that switches it, and whether the line is
+    # executed if this is active.
     port: list[tuple[Place, str | None, bool]]
-    notes: list[Note]
-    begins: list[Note]
+    notes: list[Note]  # the most important kind first
+    begins: list[Note]  # notes on a range of cards that begins here, each with only this range
     kinds: list[str]  # kinds of the notes, by precedence
 
 
 class Sheet(NamedTuple):
-    """A printed page, numbered from 1.
-
-    `moved` is the text of the note that the page is out of place in the scan, or None.
-    """
+    """A printed page, numbered from 1."""
 
     number: int
     cards: list[CardView]
-    moved: str | None
+    moved: str | None  # note that the page is out of place in the scan
 
 
 def sheets(program: str) -> list[Sheet]:

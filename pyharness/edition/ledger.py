@@ -34,19 +34,14 @@ class SentenceVerdicts(NamedTuple):
 
 
 class Formula(NamedTuple):
-    """A displayed formula of the thesis.
+    """A displayed formula of the thesis."""
 
-    `number`, such as ``34a`` or ``13-15``, may be empty; `lines` are MathML; `what` is an
-    explanation. `cards` has, by program, the cards that compute it; `entry` is its apparatus entry,
-    or empty.
-    """
-
-    number: str
+    number: str  # such as ``34a`` or ``13-15``, or empty
     where: str
-    lines: list[Markup]
-    what: Markup
-    cards: dict[str, str]
-    entry: str
+    lines: list[Markup]  # MathML
+    what: Markup  # explanation
+    cards: dict[str, str]  # cards that compute the formula, by program
+    entry: str  # apparatus entry, or empty
 
     @property
     def title(self) -> str:
@@ -171,10 +166,9 @@ def draw_figures(figures: Mapping[str, FigureFinding]) -> dict[str, bytes]:
 def printed_figures(
     figures: Mapping[str, FigureFinding], told: Sequence[SentenceVerdicts]
 ) -> list[dict[str, Any]]:
-    """Return the thesis's figures in order, with number, caption and place.
+    """Return the thesis's figures in order, with our drawings (`drawn`) or our text (`ours`).
 
-    `drawn` has our drawings. `says` has the thesis's sentences on the figure, with their anchors,
-    "" in sections I to IV. `ours` is our text on a figure that we do not draw.
+    `says` has the thesis's sentences and their anchors.
     """
     found = []
     for each in facts("figures")["printed"]:

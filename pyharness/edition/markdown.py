@@ -34,10 +34,9 @@ class Document(NamedTuple):
 
 
 def document(text: str, link: Callable[[str], str | None]) -> Document:
-    """Return a Markdown text, whose first line is the title, as a Document.
+    """Return a Markdown text, which begins with its title, as a Document.
 
-    `link` maps a link's or picture's target to the site's, or to None: then a link becomes plain
-    text, and a picture raises ValueError.
+    `link` returns a target's address on the site, or None.
     """
     tokens = _parser().parse(text)
     for token in _walk(tokens):

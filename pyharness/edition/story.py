@@ -46,23 +46,18 @@ class Curve(NamedTuple):
 
 
 class Chart(NamedTuple):
-    """A chart with fixed axes.
-
-    `x` and `y` are ranges; on a logarithmic axis, `y` has exponents of ten. Ticks have position and
-    label.
-    If `is_marked`, curves are points without lines; `marks` distinguish coincident curves.
-    """
+    """A chart with fixed axes."""
 
     name: str
     axes: tuple[str, str]
     x: Range
-    y: Range
-    x_ticks: list[tuple[str, str]]
+    y: Range  # exponents of ten if logarithmic
+    x_ticks: list[tuple[str, str]]  # positions and labels
     y_ticks: list[tuple[str, str]]
     curves: list[Curve]
     is_logarithmic: bool = False
-    is_marked: bool = False
-    marks: Sequence[Curve] = ()
+    is_marked: bool = False  # whether curves are points without lines
+    marks: Sequence[Curve] = ()  # distinguish coincident curves
 
 
 def data() -> dict[str, Any]:

@@ -52,22 +52,17 @@ class Solver:
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Many scenes, solved by one method or program when a result is first read.
+    """Many scenes, solved by one method or program when a result is first read."""
 
-    `scene` has the shared quantities; `arrays` has the others, with a row for each scene, under the
-    argument names of `solve_many` and `run_many`, among them `omega`. `listing` is None for a
-    method. `t_end` (s) has shape (n,). `attitude`, for methods only, requests attitudes.
-
-    Checks of the thesis's claims may use `omega0`, `omega`, `status`, `n_rows`, `stop_variable`,
-    `rows` and `by_method`.
-    """
-
-    scene: Scene
+    # Checks of the thesis's claims may use only `omega0`, `omega`, `status`, `n_rows`, `rows`,
+    # `stop_variable` and `by_method`.
+    scene: Scene  # the shared quantities
     solver: Solver
-    listing: Listing | None
-    t_end: Array
+    listing: Listing | None  # None for a method
+    t_end: Array  # s, shape (n,)
+    # Quantities that differ, a row for each scene, named as in `solve_many` and `run_many`.
     arrays: Mapping[str, Array]
-    attitude: bool = False
+    attitude: bool = False  # whether a method computes attitudes
     # Results by number of samples.
     _rows: dict[int, Array] = field(default_factory=dict, init=False, repr=False)
     _found: dict[int, list[Ensemble]] = field(default_factory=dict, init=False, repr=False)
@@ -122,10 +117,7 @@ class Batch:
         return [max(1, round(steps * (i + 1) / samples)) for i in range(samples)]
 
     def rows(self, samples: int) -> Array:
-        """Return omega (rad/s) at the ends of `samples` equal parts, shape (n, samples, 3).
-
-        For a program, these are the steps from `sample_steps`.
-        """
+        """Return omega (rad/s) after `samples` equal parts of a run, shape (n, samples, 3)."""
         if not self.is_program:
             return np.stack([each.omega for each in self._samples(samples)], axis=1)
         if samples not in self._rows:
@@ -133,9 +125,9 @@ class Batch:
         return self._rows[samples]
 
     def attitudes(self, samples: int) -> Array:
-        """Return quaternions at the ends of `samples` equal parts, shape (n, samples, 4).
+        """Return scalar-first quaternions after equal parts of a run, shape (n, samples, 4).
 
-        They are scalar first, and rotate from the body's axes to its axes at time 0.
+        They rotate from body axes to initial body axes.
         """
         ends = [each.attitude for each in self._samples(samples) if each.attitude is not None]
         found = np.stack(ends, axis=1)
@@ -160,8 +152,7 @@ class Batch:
     def run(self, at: list[int]) -> ProgramEnsemble:
         """Return a program's results at the ascending steps `at`.
 
-        If the scenes differ in `torque_rate`, or the program refuses one, each scene runs alone,
-        without the error codes IER.
+        The error codes IER are missing if scenes run one by one.
         """
         if "torque_rate" not in self.arrays:  # `run_many` takes one rate for all bodies
             try:

@@ -94,8 +94,7 @@ def prepared_candidate(
 ) -> Candidate:
     """Return a candidate that calls a prepared solver of the method `name`.
 
-    If `primed`, the solver is first called with another omega. Fixed-step methods, and Gauss
-    collocation without a tolerance, use the scene's step.
+    If `primed`, the solver is first called with another omega.
     """
     make: Any = partial(prepare, attitude=attitude, compiled=compiled)
     read = _turned if attitude else _answered

@@ -146,10 +146,9 @@ def listings_for(
     readings: Sequence[str] = (),
     conjectures: Sequence[str] | None = None,
 ) -> list[Listing]:
-    """Return each program's original, selected (if any) and corrected listings.
+    """Return each program's original, changed (by `fix`, `keep`) and corrected listing.
 
-    `fix` and `keep` select a listing by changing defects of `base`. Without them, a specified
-    `base` is the only listing. `readings` and `conjectures` apply to all.
+    Without `fix` and `keep`, a specified `base` is the only listing.
     """
     chosen = list(programs)
     assumed = [name for name in conjectures or () if name != "none"]

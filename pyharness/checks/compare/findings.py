@@ -111,12 +111,7 @@ class Comparison:
 
     @property
     def unexpected(self) -> tuple[str, ...]:
-        """Return a sentence for each unexpected result.
-
-        For programs, these are differences between Fortran and Python, and a missed order; for
-        methods alone, errors above the limit that follows from the tolerance, missing times, and no
-        result at all.
-        """
+        """Return a sentence for each unexpected result of programs or, without any, of methods."""
         found = [] if self.programs else [*filter(None, map(self._excess, self.methods))]
         if not self.programs and all(each.trajectory is None for each in self.methods):
             found.append("no method has a result")

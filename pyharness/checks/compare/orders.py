@@ -80,11 +80,7 @@ class _SingularError(Exception):
 def measured_order(
     scene: Scene, program: Program, listing: Listing, truth: Reference, pairs: int = 2
 ) -> Order:
-    """Return the measured order of convergence of a compiled program's omega to `truth`.
-
-    Without convergence, the state is `misses` if a textbook method of the same order converges,
-    `sensitive` if the error may be amplified rounding.
-    """
+    """Return the measured order of convergence of a compiled program's omega to `truth`."""
 
     def omega(finer: Scene) -> Array:
         run = program.run(finer, listing, may_stop=False, velocity=False)
@@ -112,15 +108,12 @@ def order_of(
     due: int,
     truth: Reference,
     quantity: Literal["omega", "velocity"] = "omega",
-    pairs: int = 2,
+    pairs: int = 2,  # successive orders that must agree
     most_steps: int | None = None,
 ) -> Order:
     """Return the order of a numerical solution, measured by halving the step size.
 
-    `solution` returns `quantity` after each step, shape (n, 3), with fewer rows after an overflow.
-    The measurement ends when `pairs` successive orders are all at least `due` - 0.5 or all smaller,
-    or the error is only rounding. A run has at most `most_steps` steps, by default 2**18 or, if
-    larger, the number after eight halvings.
+    `solution` returns `quantity` after each step, until an overflow.
     """
     n = len(truth.time)
     if n < scene.steps:

@@ -39,11 +39,7 @@ def _curves(comparison: Comparison) -> list[tuple[str, str, Trajectory, Accuracy
 
 
 def comparison_picture(comparison: Comparison) -> Picture:
-    """Return a picture with one column per program or method.
-
-    Its panels show omega's components, their largest error (rad/s) and, if compared, the attitude's
-    error (rad).
-    """
+    """Return a picture of omega and the errors, with a column for each program or method."""
     from matplotlib.figure import Figure
 
     curves = _curves(comparison)

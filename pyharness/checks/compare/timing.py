@@ -18,19 +18,14 @@ Clock = Callable[[], float]
 
 def seconds(
     runs: Sequence[Run],
-    length: float,
+    length: float,  # of the calls of one function in a round (s)
     rounds: int,
     say: Callable[[str], None] = lambda _: None,
     statistic: Callable[[Sequence[float]], float] = statistics.median,
     clocks: Sequence[Clock] | None = None,
-    slow: float = SLOW,
+    slow: float = SLOW,  # a first call of this length (s) reduces the rounds
 ) -> list[float]:
-    """Return the time of one call of each function in `runs` (s), measured in several rounds.
-
-    A round calls each function for about `length` seconds. If the first call, not counted, takes at
-    least `slow` seconds, there are three rounds; if five times as long, one. `statistic` combines
-    the rounds' times.
-    """
+    """Return the time (s) of one call of each function, a `statistic` of several `rounds`."""
     clocks = [perf_counter] * len(runs) if clocks is None else clocks
     timed = list(zip(runs, clocks, strict=True))
     enabled = gc.isenabled()

@@ -32,20 +32,17 @@ class State(NamedTuple):
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault of an integrator: its name, a sentence on it, and its changes.
-
-    `scene` returns the scene that the faulty integrator solves, or None if the fault has no effect.
-    `times` returns the times (s) of its states, from the requested times and the step size (s).
-    `state` then changes the states; its second argument is the unchanged scene. If `of_step`, the
-    states approach the true ones as the step decreases.
-    """
+    """A fault of an integrator, with the changes that it makes to a motion."""
 
     name: str
-    says: str
+    says: str  # a sentence on the fault
+    # Returns the scene that the faulty integrator solves, or None without effect.
     scene: Callable[[Scene], Scene | None] = lambda scene: scene
+    # Returns the times (s) of its states, from the requested times and the step size (s).
     times: Callable[[Array, float], Array] = lambda times, step: times
+    # Returns the faulty states, from the states at these times and the unchanged scene.
     state: Callable[[State, Scene], State] = lambda state, scene: state
-    of_step: bool = False
+    of_step: bool = False  # whether the states approach the true ones as the step decreases
 
     def motion(self, scene: Scene, times: Array, step: float) -> State | None:
         """Return the faulty states for `times` (s) and a step size (s); None without effect."""

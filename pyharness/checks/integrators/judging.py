@@ -85,15 +85,14 @@ class Verdict:
 def judge_integrator(
     command: str,
     chosen: Sequence[Problem],
-    again: Callable[[str], str],
-    due: float = 1.0,
+    again: Callable[[str], str],  # returns the command that repeats a scene's checks
+    due: float = 1.0,  # required order of convergence
+    # Receives the number of finished problems and the name of the next.
     told: Callable[[int, str], None] = lambda done, what: None,
 ) -> Verdict:
     """Return the results of all checks of an integrator, started by `command`.
 
-    `chosen` are random scenes; `due` is the required order of convergence. ``again(name)`` returns
-    the command that repeats a scene's checks. `told` receives the number of finished problems and
-    the name of the next. An invalid answer ends the checks.
+    An invalid answer ends the checks.
     """
     found = Verdict(command, again)
     where = "start"

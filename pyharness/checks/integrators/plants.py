@@ -31,16 +31,12 @@ Advance = Callable[[Any, Array, Array, float], Any]
 
 @dataclass(frozen=True)
 class IntegratorPlant:
-    """A fault planted in an integrator, which must be recognised by its name.
-
-    `request` changes the request, `state` the answered states. `advance` computes the attitude
-    after each step.
-    """
+    """A fault planted in an integrator, which must be recognised by its name."""
 
     name: str
-    request: Callable[[dict[str, Any]], object] | None = None
-    state: Callable[[State, Scene], State] | None = None
-    advance: Advance | None = None
+    request: Callable[[dict[str, Any]], object] | None = None  # changes the request
+    state: Callable[[State, Scene], State] | None = None  # changes the answered states
+    advance: Advance | None = None  # computes the attitude after each step
     # Properties of integrator and scenes, as in `_possible`, without which the fault has no effect.
     needs: tuple[str, ...] = ()
 
@@ -182,7 +178,7 @@ def with_plant(ask: Ask, plant: IntegratorPlant, scene: Scene) -> Ask:
 def self_test(command: str, chosen: Sequence[Problem], due: float = 1.0) -> Iterator[Outcome]:
     """Yield the outcome without a fault (the control), then with each planted fault.
 
-    An invalid answer ends the self-test with a failed control.
+    An invalid answer yields a failed control.
     """
 
     def judge(plant: IntegratorPlant | None = None) -> tuple[Verdict, list[str], int]:

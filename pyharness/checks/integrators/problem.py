@@ -138,15 +138,12 @@ def finite_or_infinite(x: float) -> float:
 
 @dataclass(frozen=True)
 class Convergence:
-    """The errors of a `part`, omega or attitude, in one problem, at decreasing settings.
+    """The errors of omega or attitude in one problem, at decreasing step sizes or tolerances."""
 
-    They are proportional to the power `order` of the setting, a step size (s) or a tolerance;
-    `order` is None if all errors are rounding errors.
-    """
-
-    part: str
+    part: str  # "omega" or "attitude"
     settings: tuple[float, ...]
     errors: tuple[float, ...]
+    # Power of the setting to which the errors are proportional; None if all are rounding errors.
     order: float | None
 
     @property
@@ -179,9 +176,7 @@ def convergence(
 ) -> Convergence:
     """Return a part's errors and their order of convergence, measured above `floor`.
 
-    The order is measured between the last two settings. With tolerances, errors decrease
-    irregularly; then `overall` requests the smaller of the orders over all and over the last four
-    settings.
+    `overall` measures it over more than the last two settings.
     """
     seen = [k for k in range(1, len(errors)) if not errors[k] <= floor]
     order = None
@@ -213,14 +208,12 @@ class Judged:
 
     @cached_property
     def lost(self) -> int:
-        """The number of states that should be finite and are not.
-
-        A level (step size or tolerance) may overflow if its predicted error is 1 or more.
-        """
+        """The number of states that should be finite and are not."""
         rows = self.finest.lost
         for level in range(LEVELS - 2, -1, -1):
             lost, next_lost = (each.lost for each in self.answers[level : level + 2])
             predicted = max(each.predicted(level) for each in self.convergences)
+            # A coarse step or tolerance may overflow.
             if lost and not next_lost and predicted >= 1.0:
                 break
             rows += lost
@@ -229,7 +222,7 @@ class Judged:
     def error(self, level: int) -> float:
         """Return the larger of the errors of omega (relative) and attitude (rad).
 
-        It is at least the tolerance or, with a step size, the rounding error.
+        It is at least the tolerance or rounding error.
         """
         problem, finest = self.problem, self.finest
         by_tolerance = finest.control == "tolerance"
@@ -249,27 +242,23 @@ def problems(seed: str, draws: int, names: Sequence[str] = ()) -> list[Problem]:
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """The drifts since time 0 at n `times` (s), and the largest `change` of any from time to time.
+    """The drifts of a long motion since time 0."""
 
-    `named` has the drifts, shape (n,), of "energy", "momentum" and, with an attitude, "direction".
-    """
-
-    times: Array
-    named: dict[str, Array]
-    change: float
+    times: Array  # s, shape (n,)
+    named: dict[str, Array]  # of "energy", "momentum" and, with attitudes, "direction", shape (n,)
+    change: float  # largest change of a drift between successive times
 
 
 def long_motion(free: Judged) -> tuple[int, Array, float | None]:
-    """Return level and times (s) of a long motion, and the limit of drift between successive times.
+    """Return level, times (s) and limit of drift between times for a long motion.
 
-    The level, a step size or tolerance, is the coarsest at which enough times have a useful limit.
-    If no level has, it is the finest or, if errors do not decrease, the coarsest. The limit is None
-    if the errors in `free` are too large.
+    The limit is None if errors are too large.
     """
     control = free.finest.control
     levels = range(_FIRST[control], LEVELS)
     margin = _WITHOUT_ATTITUDE if free.finest.attitude is None else _MARGIN
     limits = [margin * free.error(k) * _BETWEEN / free.problem.times[-1] for k in levels]
+    # The coarsest level whose limit allows enough times.
     number = next((n for n, limit in enumerate(limits) if _TOTAL / limit >= _FEWEST), -1)
     most = max(_FEWEST, _ROWS if control == "tolerance" or number < 0 else _ROWS >> number)
     if number < 0 and limits[-1] > 0.5 * limits[0]:
@@ -303,10 +292,7 @@ def _angle(first: Array, second: Array) -> Array:
 
 
 def growth_power(times: Array, drift: Array) -> float | None:
-    """Return the power of time with which the largest drift grows.
-
-    It is None if the drift is 0 in the first quarter of the time, or not finite.
-    """
+    """Return the power of time with which the largest drift grows; None if unknown."""
     quarter = times <= times[-1] / 4.0
     early, late = float(np.abs(drift[quarter]).max()), float(np.abs(drift).max())
     if not math.isfinite(late) or early <= 0.0:

@@ -23,19 +23,13 @@ ROUNDINGS = {"binary64": 2.0**-53, "binary32": 2.0**-24}
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """An integrator's states at the requested times, or its refusal.
+    """An integrator's states at the requested times, or its refusal."""
 
-    `omega` (rad/s) is about the body axes, shape (n, 3). `attitude` is from body to space, scalar
-    first, normalised, shape (n, 4); before normalisation, its norm deviated from 1 by at most
-    `norm`. `control` is the request's field that sets the accuracy; `rounding` is the relative
-    rounding error of the arithmetic.
-    """
-
-    omega: Array
-    attitude: Array | None = None
-    norm: float = 0.0
-    control: str = CONTROLS[0]
-    rounding: float = ROUNDINGS["binary64"]
+    omega: Array  # rad/s, about the body axes, shape (n, 3)
+    attitude: Array | None = None  # unit quaternions, scalar first, body to space, shape (n, 4)
+    norm: float = 0.0  # largest deviation of a quaternion's norm from 1 in the answer
+    control: str = CONTROLS[0]  # the request's field that sets the accuracy
+    rounding: float = ROUNDINGS["binary64"]  # relative rounding error of the arithmetic
     refusal: str = ""
 
     @property
@@ -46,9 +40,9 @@ class Motion:
 
 
 def request(scene: Scene, times: Sequence[float], step_size: float, tolerance: float) -> bytes:
-    """Return the line of JSON that requests a scene's states at `times` (s).
+    """Return the JSON line that requests states at `times` (s), multiples of `step_size` (s).
 
-    Times are multiples of `step_size` (s); `tolerance` is relative to the largest omega.
+    `tolerance` is relative to the largest omega.
     """
     asked = {
         "schema": SCHEMAS["integrator request"],

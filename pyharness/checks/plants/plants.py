@@ -172,7 +172,7 @@ def _shifted(
 
 
 def _wrong_card(size: float) -> AbstractContextManager[Any]:
-    """Return a context in which compiled programs exchange the flags of two defects."""
+    """Return a context in which compiled programs get the flags of two defects exchanged."""
     known = [entry["flag"] for entry in flagged() if entry["kind"] != "reading"]
     flags = Listing.flags.fget  # type: ignore[attr-defined]
 

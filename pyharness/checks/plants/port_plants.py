@@ -172,9 +172,9 @@ PLANTS = (
 
 
 def self_test(command: str, cells: Sequence[Cell]) -> Iterator[Outcome]:
-    """Yield the outcome without a fault, then with each planted fault.
+    """Yield the outcome without a fault (the control), then with each planted fault.
 
-    If the port fails or its answer is invalid, a failed control ends the self-test.
+    An invalid answer yields a failed control.
     """
     chosen = _chosen(cells)
     try:

@@ -87,8 +87,7 @@ def random_scene(kind: str, seed: str | int, name: str = "") -> Scene:
 def draw_moderate(seed: str, kind: str, number: int) -> Scene:
     """Return scene `number` of a seed, with a torque of `kind`, an element of `MODERATE`.
 
-    A body can have these moments, which differ by at least a tenth. The body rotates by
-    several radians in 12 steps of 0.5 s; torques over moments are a few tenths of 1 rad/s2.
+    The body rotates by several radians.
     """
     source = Random(f"{seed}/moderate/{kind}/{number}")
     size = 10.0 ** source.uniform(-1.0, 1.0)

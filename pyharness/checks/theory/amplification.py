@@ -64,10 +64,7 @@ class Amplification:
         return np.asarray(np.abs(np.linalg.eigvals(self.evaluate(z))).max(axis=-1))
 
     def moving(self) -> "Amplification":
-        """Return the matrix without the row and column of the step's result.
-
-        The whole matrix is returned if the old result affects more than the new one.
-        """
+        """Return the matrix, without its last row and column if these add a constant eigenvalue."""
         column = self.coefficients[:, -1]
         if self.size > 1 and not column[:-1].any() and not column[-1, 1:].any():
             return Amplification(self.coefficients[:-1, :-1])
@@ -150,10 +147,9 @@ def _polynomial_text(coefficients: Fractions) -> str:
 
 
 def boundary(matrix: Amplification, direction: complex) -> tuple[float, float]:
-    """Return the distance of the stability boundary from z = 0, and a slope there.
+    """Return the stability boundary's distance from z = 0, and the spectral radius's slope beyond.
 
-    `direction` is -1 (negative real axis) or 1j (imaginary axis). The spectral radius has
-    this slope just beyond the boundary. Return (0, 1) if perturbations grow at a distance of 1/16.
+    `direction` is -1 or 1j.
     """
 
     def grows(distance: float) -> bool:
@@ -194,10 +190,7 @@ class Regions:
 
 
 def regions() -> Regions:
-    """Return the stability regions of all programs, original and corrected.
-
-    The Runge-Kutta program also runs with `stage-base` or `base-not-restored` as its only defect.
-    """
+    """Return the stability regions of programs, and of two defects of the Runge-Kutta program."""
     real, imaginary = np.linspace(*_REAL), np.linspace(*_IMAGINARY)
     distances = np.geomspace(*_DISTANCES)
     plane = real[None, :] + 1j * imaginary[:, None]

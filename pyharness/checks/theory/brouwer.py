@@ -116,7 +116,7 @@ def floats(rows: Sequence[Sequence[Decimal]]) -> Array:
 def taylor_noise(body: Orbit, scene: Scene, step: float, order: int, left_out: float) -> Noise:
     """Return bounds on the errors of a Taylor step (s), by running error analysis.
 
-    `left_out` is the truncation error relative to the largest omega.
+    `left_out` is the relative truncation error.
     """
     a = np.abs(np.array(scene.euler_coefficients))
     terms, errors = _terms(body, scene, step, order), [np.abs(body.states)]
@@ -180,10 +180,9 @@ def _terms(body: Orbit, scene: Scene, step: float, order: int) -> list[Array]:
 def errors(
     scene: Scene, body: Orbit, time: float, omega: Array, rounded: bool = True
 ) -> dict[str, float]:
-    """Return the signed errors of energy and momentum (relative) and of the phase (rad).
+    """Return signed errors of energy and momentum (relative) and phase (rad).
 
-    The phase error is the time by which `omega` is ahead, times the frequency of the motion. If
-    `rounded`, the exact solution uses A, B, C rounded to binary64, as methods do.
+    If `rounded`, the exact solution uses rounded coefficients A, B, C.
     """
     start = [Decimal(w) for w in scene.omega]
     found = [Decimal(float(w)) for w in omega]
@@ -200,6 +199,7 @@ def errors(
     error = np.array([float(x - y) for x, y in zip(found, truth, strict=True)])
     x, y, z = (float(w) for w in truth)
     slope = np.array(scene.euler_coefficients) * np.array([y * z, z * x, x * y])
+    # Time (s) by which `omega` is ahead.
     late = float(error @ slope / (slope @ slope))
     return {"energy": change(1), "momentum": 0.5 * change(2), "phase": body.frequency * late}
 

@@ -193,12 +193,9 @@ def _small_step(program: str) -> tuple[Fraction, Fractions]:
 
 
 def solver_roundings(program: str) -> tuple[float, float]:
-    """Return two bounds on the rounding error that the solver adds to a step's result.
+    """Return bounds on the solver's rounding error, for equal rates and for deviations.
 
-    Both are in units of 2**-53 times step size times rate, and independent of the step size while
-    each row's largest element is 1. The first is for equal rates at all points, where only the
-    coefficient of t is not zero. The second, for unequal rates, is to be multiplied by their
-    relative deviation from equal rates.
+    Their unit is 2**-53 times step size times rate or deviation.
     """
     step, matrix = _small_step(program)
     count = len(matrix)
@@ -211,16 +208,14 @@ def solver_roundings(program: str) -> tuple[float, float]:
         for i in candidates:
             factor_sizes[i] += abs(rows[i, j] / rows[chosen, j] * rows[chosen])
     sizes = reach @ factor_sizes
+    # With equal rates, only the coefficient of t is not zero. While each row's largest element is
+    # 1, the bounds are independent of the step size.
     constant, varying = powers @ sizes[:, 0], powers @ (sizes @ reach).sum(axis=1)
     return 3 * count * float(constant / step), 3 * count * float(varying / step)
 
 
 def singular_below(program: str, bits: int = 53) -> float:
-    """Return the largest step size (s) for which LEQT1F must report a singular matrix.
-
-    It does so if the number of rows plus the last scaled pivot, in `bits` bits, equals the number
-    of rows.
-    """
+    """Return the largest step (s) for which LEQT1F, in `bits` bits, reports a singular matrix."""
     step, matrix = _small_step(program)
     count = len(matrix)
     *_, (chosen, candidates, _) = _columns(matrix)

@@ -50,12 +50,7 @@ _Sample = TypeVar("_Sample")
 
 @dataclass(frozen=True)
 class Conditioning:
-    """The sensitivity of omega at the end of a motion to errors during it.
-
-    `limit` and `angle_limit` add rounding errors to `made`, the sum of the steps' allowed errors
-    (relative, or rad). `limit` amplifies `made`; its `steps` is the number of roundings of omega, 0
-    with compensated summation. `angle_limit` assumes omega's largest rounding error at all times.
-    """
+    """The sensitivity of omega at the end of a motion to errors during it."""
 
     # Largest factor, at least 1, from an error of omega at any time to the error at the end.
     amplification: float
@@ -68,13 +63,17 @@ class Conditioning:
     largest: float  # largest abs(omega) until the end (rad/s)
 
     def limit(self, made: float, steps: float = 0.0) -> float:
-        """Return the largest allowed final error of omega, relative to `largest`; at most 2."""
+        """Return the allowed final error of omega, relative to `largest`.
+
+        `made` is the sum of step errors; `steps` counts uncompensated roundings.
+        """
         allowed = made * self.amplification + self.rounding + steps * self.storing
         # NaN allows no error.
         return 0.0 if math.isnan(allowed) else min(2.0, allowed)
 
     def angle_limit(self, made: float, time: float) -> float:
-        """Return the largest allowed error (rad) of an attitude at `time` (s)."""
+        """Return an attitude's allowed error (rad) at `time` (s); `made` sums step errors."""
+        # Omega has its largest rounding error at all times.
         turned = self.rounding * (1.0 + math.sqrt(3.0) * self.largest * abs(time))
         return made + turned + ATTITUDE
 
@@ -82,8 +81,7 @@ class Conditioning:
 def conditioning(scene: Scene, time: float) -> Conditioning:
     """Return the sensitivity of omega at `time` (s) to earlier errors.
 
-    Raise InputError if the solution is unbounded before `time`, too fast or too long to be sampled,
-    or amplifies errors beyond binary64.
+    Raise InputError for an unbounded, too fast or too sensitive motion.
     """
     # Near the separatrix a numerical integration deviates after a few revolutions.
     method = "closed-form" if closed_form(scene) else "taylor"
@@ -105,10 +103,9 @@ def conditioning(scene: Scene, time: float) -> Conditioning:
 
 
 def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
-    """Return the final sensitivity along `omega` (rad/s), the solution at n `times` (s).
+    """Return the final sensitivity along the solution `omega` (rad/s), shape (n, 3).
 
-    `omega` has the shape (n, 3). The times begin at 0, close enough that omega changes little
-    between them.
+    Its `times` (s) begin at 0 and are close together.
     """
     with np.errstate(all="ignore"):
         largest = float(np.abs(omega).max()) or 1.0
@@ -119,10 +116,9 @@ def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
 def sampled(
     sample: Callable[[Array], tuple[float, _Sample]], time: float, fewest: int, most: int
 ) -> tuple[Array, _Sample]:
-    """Return equally spaced times (s), close enough for the rates, and the results of `sample`.
+    """Return equally spaced times (s) that suit the rate (1/s) from `sample`, and its results.
 
-    `sample` takes times up to `time`, and returns the largest rate (1/s) and the results. It is
-    first called with `fewest` intervals, finally with at most `most`.
+    There are `fewest` to `most` intervals.
     """
     count = fewest
     while True:
@@ -140,12 +136,11 @@ def sampled(
 
 
 def of_flow(flow: Array, times: Array, state: Array, source: Array, largest: float) -> Conditioning:
-    """Return the sensitivity of a final state, from state-transition matrices.
+    """Return a final state's sensitivity; `flow` has the matrix from each time to the last.
 
-    `flow` has the matrix from each time to the last, shape (n, m, m). `state`, and `source`, the
-    sums of magnitudes of its derivative's terms, have the shape (n, m). Errors are divided by
-    `largest`.
+    `source` sums the magnitudes of the derivative's terms.
     """
+    # Shapes: `flow` (n, m, m), `state` and `source` (n, m).
     steps, sizes = np.diff(times), np.abs(flow)
 
     def gathered(made: Array) -> Array:
@@ -170,16 +165,14 @@ def of_flow(flow: Array, times: Array, state: Array, source: Array, largest: flo
 
 
 def magnitudes(scene: Scene, times: Array, omega: Array) -> Array:
-    """Return the sums of magnitudes of the terms of Euler's equations (rad/s2), shape (n, 3).
-
-    A wave's amplitude is multiplied by 1 plus its angle, to allow for the angle's rounding error.
-    """
+    """Return the sums of magnitudes of the terms of Euler's equations (rad/s2), shape (n, 3)."""
     products = np.abs(np.roll(omega, -1, 1) * np.roll(omega, -2, 1))
     products *= np.abs(scene.euler_coefficients)
     law = scene.body_torque
     moments = np.array(scene.moments or (1.0, 1.0, 1.0))
     torque = np.abs(law.constant) + np.abs(law.rate) * np.abs(times)[:, None]
     for amplitude, frequency in law.sines + law.cosines:
+        # The factor allows for the rounding error of the angle.
         torque = torque + np.abs(amplitude) * (1.0 + np.abs(frequency * times))[:, None]
     return np.asarray(products + torque / moments)
 
@@ -189,14 +182,10 @@ _OF_ANGLE = 0.5
 
 
 def conditioning_at(scene: Scene, times: Sequence[float]) -> Conditioning:
-    """Return the sensitivity of a scene's solution at `times` (s) to earlier errors.
-
-    Under a torque law, this is the sensitivity at the last time; under other torques, where damping
-    may reduce errors, the largest at any of the times. Raise InputError as `conditioning` does, or
-    if the torque can't be recorded.
-    """
+    """Return the sensitivity of a scene's solution at `times` (s), or raise InputError."""
     if not isinstance(scene.torque, StateTorque):
         return conditioning(scene, times[-1])
+    # Damping may reduce errors, so the largest sensitivity at any of the times counts.
     each = [astuple(_of_state(scene, time)) for time in times]
     return Conditioning(*map(max, zip(*each, strict=True)))
 

@@ -17,10 +17,9 @@ _NEAR = 2.0**-27
 
 
 def flip_times(moments: ArrayLike, omega0: ArrayLike) -> Array:
-    """Return the time (s) between flips of each body, half the period of omega, shape (n,).
+    """Return the time (s) between flips of each body, shape (n,), infinite without flips.
 
-    It is infinite on the separatrix and in steady rotation. `moments` (kg m2, in any order) and
-    `omega0` (rad/s) have the shape (n, 3) or (3,).
+    The `moments` may have any order.
     """
     bodies, omega = np.broadcast_arrays(np.atleast_2d(moments), np.atleast_2d(omega0))
     order = np.argsort(bodies, axis=1, kind="stable")

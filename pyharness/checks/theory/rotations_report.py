@@ -128,10 +128,9 @@ _POINTS = 181
 
 
 def rotations_picture(scene: Scene) -> Picture:
-    """Return the picture of a scene's polhodes and of the growth rates of all bodies.
+    """Return the picture of a scene's polhodes, and of growth rates about all bodies' middle axes.
 
-    The scene must have moments. The right panel shows the growth rate about the middle axis,
-    divided by the spin.
+    The scene must have moments.
     """
     from matplotlib.figure import Figure
 
@@ -223,8 +222,7 @@ def _square(axes: "Axes", scene: Scene) -> list[list[Any]]:
 def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
     """Yield name and points, shape (n, 3), of torque-free curves of L / abs(L).
 
-    L is the angular momentum in body axes. The last two curves are the separatrix; with two equal
-    moments, both are the circle across the third axis. A sphere has no curves.
+    L is the angular momentum in body axes.
     """
     high, middle, low = sorted(range(3), key=lambda axis: moments[axis])
     j = min(moments) / np.array(moments)
@@ -253,11 +251,11 @@ def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
 
 
 def growth_of_bodies(first: Array, third: Array) -> Array:
-    """Return the growth rate Re Q about each middle axis, divided by the spin.
+    """Return the growth rate about each middle axis, divided by the spin.
 
-    Q is the root of equation 32 with the largest real part; `first` is A and `third` is -C, both
-    from -1 to 1.
+    `first` and `third` are Euler's coefficients A and -C.
     """
+    # The growth rate is the largest real part of the roots of equation 32.
     a, c = first, -third
     # A body has A + B + C + ABC = 0. At two corners, for bodies without extent, B is arbitrary.
     with np.errstate(invalid="ignore"):

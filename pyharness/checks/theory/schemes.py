@@ -25,7 +25,7 @@ class Numbers:
     """Euler's equations for numbers; omega (rad/s) has the shape (..., 3)."""
 
     def __init__(self, scene: Scene, step: float = 1.0, sizes: bool = False) -> None:
-        """Store step size (s), coefficients and torque; with `sizes`, their magnitudes."""
+        """Store step size (s), and coefficients and torque, as absolute values if `sizes`."""
         self._step = step
         size = np.abs if sizes else np.positive
         self._coefficients = size(np.array(scene.euler_coefficients))
@@ -105,8 +105,7 @@ def collocation(program: str) -> Scheme:
 def collocation_singular(program: str) -> Scheme:
     """Return the scheme of a collocation program whose matrix is reported as singular.
 
-    LEQT1F then returns the right-hand sides, which the program uses as coefficients c1, c2, ... of
-    its trial functions.
+    LEQT1F then returns the right-hand sides as solutions.
     """
     parts = PARTS[program]
 
@@ -132,8 +131,7 @@ def collocation_singular(program: str) -> Scheme:
 def runge_kutta_4(on: Numbers, omega: Array, punched: bool = False) -> Array:
     """Return omega after a step of classical Runge-Kutta (eq. 31).
 
-    If `punched`, it is the original program's first step, whose third and fourth stages start from
-    the previous stage instead of `omega`.
+    If `punched`, it is the first step of the original program.
     """
     first = on.times_step(on.rate(omega))
     at = omega + 0.5 * first
@@ -199,10 +197,9 @@ def local_error(scheme: Scheme, scene: Scene, omega: Array) -> Array:
 
 
 def spacing(count: int) -> Sequence[Fraction]:
-    """Return the weights of a central difference for the first derivative.
+    """Return weights of a central difference for f'(0), exact up to degree 2 `count`.
 
-    Weight i, from 1, multiplies the difference of the values at i and -i spacings. The sum divided
-    by the spacing is exact up to degree 2 `count`.
+    Weight i, from 1, multiplies f(i) - f(-i).
     """
     middle = math.comb(2 * count, count)
     return [

@@ -18,10 +18,7 @@ from pyharness.model.trajectory import Array
 
 @dataclass(frozen=True, eq=False)
 class Tableau:
-    """One correction of a step on the unit interval, as a Runge-Kutta tableau.
-
-    The right-hand side f is evaluated along the first estimate or the previous correction.
-    """
+    """One correction of a step on the unit interval, as a Runge-Kutta tableau."""
 
     # Shape (m,), in units of the step size h: where f is evaluated, the collocation points or the
     # quadrature nodes of the weighted integrals.
@@ -32,15 +29,14 @@ class Tableau:
 
 @cache
 def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None = None) -> Tableau:
-    """Return the tableau of one weighted residual method.
+    """Return the tableau of a weighted residual method.
 
-    `weighting` is "collocation", "subdomain", "galerkin" or "least-squares", `terms` is n;
-    `points`, for collocation, is as in `grid`. Other weightings use Gauss-Legendre quadrature,
-    exact under constant torque; under other torques, its error is of order 2n + 1 or higher, above
-    the method's.
+    `weighting` is "collocation", "subdomain", "galerkin" or "least-squares"; `points` is as in
+    `grid`.
     """
     # Products of two omegas have degree 2n, and the weight functions n (Galerkin), n - 1 (least
-    # squares) or 0 (subdomain).
+    # squares) or 0 (subdomain). The quadrature is exact under constant torque; under other torques,
+    # its error is of order 2n + 1 or higher, above the method's.
     n = terms
     if weighting == "collocation":
         nodes = grid(points, n)
@@ -69,11 +65,7 @@ def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None =
 
 
 def grid(points: str | tuple[float, ...] | None, n: int) -> Array:
-    """Return the n collocation points in units of the step, shape (n,).
-
-    `points` is "gauss" for Gauss-Legendre nodes, "thesis" or None for k / (n + 1) with k = 1 to n,
-    or a tuple of points.
-    """
+    """Return n collocation points in units of the step, by default those of the thesis."""
     if points == "gauss":
         return _gauss(n)[0]
     if points is None or points == "thesis":

@@ -50,16 +50,12 @@ SCENES = {
 
 @dataclass(frozen=True)
 class Symmetry:
-    """A rotation or rescaling of a problem, with its inverse for omega.
-
-    `turn` transforms the scene, `back` the resulting omega. A time t becomes t/`faster`. The
-    methods in `bitwise` must return the same bits.
-    """
+    """A rotation or rescaling of a problem, with its inverse for omega."""
 
     turn: Callable[[Scene], Scene]
-    faster: float
-    back: Callable[[Array], Array]
-    bitwise: tuple[str, ...]
+    faster: float  # a time t becomes t / `faster`
+    back: Callable[[Array], Array]  # transforms the resulting omega
+    bitwise: tuple[str, ...]  # methods that must return the same bits
 
 
 def _signs(first: float, second: float, third: float) -> Symmetry:

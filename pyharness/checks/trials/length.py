@@ -62,23 +62,19 @@ CLOSED_FORM = Basis(
 )
 """Basis of limits that assume at most 16 rounding errors of a closed form."""
 
+# Returns omega, shape (n, 3), and the number of steps until each of n times (s).
 Runner = Callable[[Scene, Sequence[float]], tuple[Array, Array]]
 
 
 @dataclass(frozen=True)
 class Integrator:
-    """A method whose error growth is measured.
-
-    `run` returns omega, shape (n, 3), and the number of steps until each time; `noise` bounds the
-    errors of a step of given size (s). `revolutions` is the length of the first run, `others` is
-    the length of runs from other initial conditions. `preference` means biased rounding.
-    """
+    """A method whose error growth is measured."""
 
     run: Runner
-    noise: Callable[[Orbit, Scene, float], Noise]
-    revolutions: float
-    others: float
-    preference: bool = False
+    noise: Callable[[Orbit, Scene, float], Noise]  # bounds the errors of a step of a size (s)
+    revolutions: float  # length of the first run
+    others: float  # length of the runs from other initial conditions, in revolutions
+    preference: bool = False  # whether rounding is biased
 
 
 def _taylor(scene: Scene, times: Sequence[float]) -> tuple[Array, Array]:
@@ -156,19 +152,15 @@ def check_growth(integrator: Integrator, name: Name) -> Iterator[Check]:
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """The errors of one quantity, `what`, after n numbers of `steps`.
-
-    `error` is the root mean square over `starts` initial conditions; `limits` are its bounds by
-    Brouwer's law.
-    """
+    """The errors of one quantity, `what`, after n numbers of `steps`."""
 
     motion: str
     method: str
     what: str
     steps: Array
-    error: Array
-    limits: Array
-    starts: Array
+    error: Array  # root mean square over initial conditions
+    limits: Array  # bounds of `error` by Brouwer's law
+    starts: Array  # number of initial conditions
 
 
 def curves() -> Iterator[Drift]:
@@ -185,7 +177,7 @@ def measured(
 ) -> Iterator[tuple[str, Array, Array, list[float]]]:
     """Yield name, errors, numbers of steps and error bounds of each quantity.
 
-    Errors have the shape (initial conditions, times), NaN after the end of a run.
+    Errors have the shape (initial conditions, times).
     """
     turn = 2.0 * math.pi / body.largest
     reached = [r for r in REVOLUTIONS if r <= 1.01 * integrator.revolutions]

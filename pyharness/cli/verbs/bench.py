@@ -137,9 +137,9 @@ def _count(options: argparse.Namespace) -> int:
 def chosen(
     contenders: Sequence[SceneContender], text: str | None, what: str, attitude: bool = False
 ) -> list[SceneContender]:
-    """Return the solvers that `text`, the value of option `what`, selects, by default all.
+    """Return the solvers named in `text`, by default all.
 
-    With `attitude`, solvers named in `text` must compute attitudes.
+    With `attitude`, named solvers must compute attitudes.
     """
     found = named(contenders, text, what)
     lacking = [each.name for each in found if not each.attitude]

@@ -46,10 +46,9 @@ EXAMPLE = "cards runge-kutta:860"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print cards with their scan, our Fortran and Python, and notes, or a requested comparison.
+    """Print cards with scan, ports and notes, or a requested comparison.
 
-    Return 1 if --scan or --collate finds a difference without a note, or --origins a mistake
-    in its data.
+    Return 1 for an unexplained difference or a mistake in data.
     """
     given = [options.format == "tei", options.classes, options.collate, options.origins]
     given += [options.second_reading, options.scan is not None]

@@ -49,8 +49,7 @@ EXAMPLE = "compare --case 3 --listing original --plot case-3.png"
 def run(options: argparse.Namespace) -> int:
     """Compare original and corrected programs, or methods, with the reference solution.
 
-    Return 1 for an unexpected result (`Comparison.unexpected`). With --strict, also return 1 for an
-    incomplete result, or if amplified rounding errors may exceed the tolerance.
+    Return 1 for unexpected or, with --strict, incomplete or sensitive results.
     """
     if options.method is not None:
         return _methods(options)

@@ -29,7 +29,7 @@ EXAMPLE = "words --case 2 --program runge-kutta"
 def run(options: argparse.Namespace) -> int:
     """Print the programs' errors in CDC arithmetic or other precisions.
 
-    With --vectors, check our emulation of CDC arithmetic; return 1 if a result differs.
+    With --vectors, check CDC arithmetic; return 1 for a wrong result.
     """
     if options.vectors is not None:
         shared.refuse(options, "--vectors", ("case", "program", "lengths", "all", "plot"))

@@ -189,7 +189,7 @@ def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check
     yield judge(name.with_quantity("error"), tried, truth, DERIVED)
     answer = tried.answer
     if truth.exact and answer.is_whole and not answer.refusal:
-        # Errors of energy and momentum are not amplified, and always have a limit.
+        # Errors of energy and momentum are not amplified, so they always have a limit.
         made = promised_sum(tried, truth)
         lost = truth.flow.unamplified + _roundings(tried, truth) * ROUNDING
         if made is None:

@@ -14,15 +14,12 @@ CONTROL = "none"
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of one planted fault.
-
-    `passed` means that it was detected, `failed` is the number of failed checks.
-    """
+    """The outcome of one planted fault, or of the control (no fault)."""
 
     name: str
     fault: str
-    passed: bool
-    failed: int
+    passed: bool  # the fault was detected or, in the control, no check failed
+    failed: int  # number of failed checks
     note: str
     has_effect: bool = True  # the fault changed a result
 

@@ -18,7 +18,7 @@ class Outcome:
 
     name: str
     fault: str
-    passed: bool  # the fault was detected or, in the control, no check failed
+    passed: bool  # fault detected or without effect; in the control, no check failed
     failed: int  # number of failed checks
     note: str
     has_effect: bool = True  # the fault changed a result

@@ -68,7 +68,7 @@ def estimates(
 ) -> tuple[float, float]:
     """Return the estimated error of omega (rad/s), and the error amplification.
 
-    Both are maxima over the ends of up to five macro-steps, including the last.
+    Both are maxima over the ends of up to five macro-steps.
     """
     a, b, c = coefficients
     error, growth, count = 0.0, 1.0, len(done)
@@ -96,15 +96,9 @@ def estimates(
 def averaged(
     scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
 ) -> Trajectory:
-    """Return the trajectory under a weak torque at `times` (s), by averaging.
+    """Return the trajectory at `times` (s) under a weak torque.
 
-    The result's `steps` are macro-steps, of 100 revolutions or more. A recorded torque must be a
-    sum of products of a polynomial in omega and time with sines and cosines of time, because a
-    macro-step might miss other changes.
-
-    Raise InputError for another torque, or one that is opaque, depends on the attitude, is not
-    weak, or may be in resonance with omega; also near the separatrix, for a sphere, and at the work
-    limit.
+    The result's `steps` are macro-steps. Raise InputError for an unsuitable scene.
     """
     # The next macro-step refuses a point that is not finite.
     with np.errstate(all="ignore"):

@@ -35,10 +35,7 @@ Torque = Callable[[Array, list[Array]], list[Array] | Array]
 
 
 class Coordinates(NamedTuple):
-    """Constants that relate omega to a point (p1, p2, p3, t), t in s.
-
-    At the angle psi, x + i y = (p1 + i p2) exp(i psi) and w_a^2 = p3 + k y^2.
-    """
+    """The constants in this module's equations between omega and a point (p1, p2, p3, t in s)."""
 
     axes: tuple[int, int, int]  # b, c, a
     on_b: float  # x divided by w_b
@@ -173,10 +170,9 @@ class _Slot(NamedTuple):
 
 
 def fastest_of(torque: TorqueLaw | StateTorque) -> float:
-    """Return the highest frequency (rad/s) of the sines and cosines of time in a torque.
+    """Return the highest frequency (rad/s) of a torque's sines and cosines of time.
 
-    Raise InputError unless a recorded torque is a sum of polynomials of degree 8 at most, times
-    these waves; a macro-step may miss another torque's pulse.
+    Raise InputError if a macro-step may miss its changes.
     """
     if isinstance(torque, TorqueLaw):
         return max((abs(f) for a, f in torque.sines + torque.cosines if any(a)), default=0.0)

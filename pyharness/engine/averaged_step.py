@@ -117,11 +117,7 @@ class NotResolvedError(Exception):
 
 
 class MacroStep:
-    """The solution over one macro-step.
-
-    `stroboscopic`, (4, nodes), is V, the solution at psi = 0; its times omit the part proportional
-    to psi. `error` is the measured error of V; `modulus` is the largest squared elliptic modulus.
-    """
+    """The solution over one macro-step, with the measured `error` of V."""
 
     def __init__(
         self,
@@ -133,10 +129,9 @@ class MacroStep:
         length: float,
         sizes: tuple[int, int],
     ) -> None:
-        """Solve over the angle `length` (rad), a multiple of 2 pi, or raise NotResolvedError.
+        """Solve over `length` (rad), a multiple of 2 pi, or raise NotResolvedError.
 
-        `sizes` are the even numbers of nodes and angles. `varies` says whether the torque depends
-        on time.
+        `sizes` are the even numbers of nodes and angles.
         """
         self.coordinates, self._torque, self._start_time = coordinates, torque, start_time
         self._start, self.length, self._sizes = start[:, None], length, sizes
@@ -175,10 +170,12 @@ class MacroStep:
         self._check(mean)
         if not change <= _ROUNDED:
             raise NotResolvedError
+        # V at the nodes, (4, nodes); the times are without their part proportional to psi.
         self.stroboscopic, self._waves = mean, waves
         self.error = self._measured()
 
     def _check(self, mean: Array) -> None:
+        # The largest squared elliptic modulus.
         self.modulus = float(self.coordinates.modulus(mean).max())
         if not (np.isfinite(mean).all() and self.modulus < 1.0):
             raise NotResolvedError

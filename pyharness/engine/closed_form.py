@@ -47,9 +47,9 @@ def _largest_estimate(
 def known_solution(
     scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
 ) -> Trajectory:
-    """Return the trajectory of a scene at `times` (s) in closed form.
+    """Return the trajectory at `times` (s) in closed form.
 
-    Raise InputError without a closed form, at the work limit, or if the phase exceeds 1e15 rad.
+    Raise InputError if the scene has none, or the phase exceeds 1e15 rad.
     """
     work = np.array([effort, 0.0])
     attitudes = None

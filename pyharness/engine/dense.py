@@ -87,11 +87,9 @@ class _Solved:
 def dense_output(
     scene: Scene, found: Trajectory, rows: Rows, tolerance: float, finest: float, is_closed: bool
 ) -> DenseOutput:
-    """Return the solution as a function of time, between time 0 and the ends of `found`.
+    """Return the solution between time 0 and the ends of `found`.
 
-    ``rows(times, tolerance)`` computes states; a closed form is evaluated directly. `finest` is the
-    method's smallest tolerance; a `tolerance` of 1 means fixed steps. At most 200 000 polynomials
-    are allowed.
+    ``rows(times, tolerance)`` computes states; a `tolerance` of 1 means fixed steps.
     """
     ends = sorted({0.0, *found.time[[0, -1]].tolist()}) if len(found.time) else [0.0]
     states: Callable[[Array], Array]
@@ -108,6 +106,7 @@ def state_pieces(
     ends = sorted({0.0, *found.time[[0, -1]].tolist()})
     if tolerance == 1.0:
         return _of_fixed_steps(scene, ends, rows, partial(rates, scene))
+    # `finest` is the method's smallest tolerance.
     own = [max(finest, part * tolerance) for part in (_NODE_TOLERANCE, _LARGEST_NODE_TOLERANCE)]
     rough = tolerance + _OWN_ROUNDING * (found.growth or 0.0)
     edges = _first_edges(scene, found, ends, tolerance)

@@ -45,15 +45,11 @@ def _refining() -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """The solution of a scene in which events are searched.
+    """The solution of a scene in which events are searched."""
 
-    `pieces` are the polynomials of `sol`, or approximate its closed form. `tolerance` applies to
-    omega; 0 means a fixed step.
-    """
-
-    pieces: Pieces
+    pieces: Pieces  # the polynomials of `sol`, or approximations of its closed form
     sol: DenseOutput
-    tolerance: float
+    tolerance: float  # of omega; 0 means a fixed step
 
     def states(self, times: Array) -> Array:
         """Return omega, attitude and the user's own unknowns at n times (s), (n, m)."""
@@ -110,13 +106,11 @@ class Solution:
         return found[1], *(errors @ np.abs(found - found[1]))
 
     def changed_values(self, g: EventFunction, times: Array, part: float) -> Array:
-        """Return values at n times (s), (m, n): unchanged, then with changed unknowns.
-
-        Each unknown is raised, then each lowered, by the fraction `part` of its size.
-        """
+        """Return values at n times (s), shape (m, n): unchanged, then with one unknown changed."""
         states = self.states(times)
         n, width = states.shape
         count = 2 * width + 1
+        # Each unknown is raised, then each lowered, by the fraction `part` of its size.
         signs = np.eye(count, width, -1) - np.eye(count, width, -1 - width)
         every = states + signs[:, None] * (part * sizes_of(np.abs(states), self.sol.n_own))
         values = self.values(g, np.tile(times, count), every.reshape(-1, width))

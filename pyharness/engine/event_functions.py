@@ -34,11 +34,9 @@ _MORE_ARGUMENTS = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS
 
 @dataclass(eq=False)
 class Event:
-    """An event of `pyharness.events`.
+    """An event of `pyharness.events`; `terminal` and `direction` are as in `crosses`.
 
-    `function` takes time, omega, attitude (followed by own states, `Scene.states`), and the
-    derivative of omega. `terminal` and `direction` are as in `pyharness.events.crosses`. With
-    `counts_touches`, roots without sign change are events.
+    `function` takes time, omega, attitude (with `Scene.states` appended), and omega's derivative.
     """
 
     name: str
@@ -47,21 +45,17 @@ class Event:
     direction: int = 0
     needs_attitude: bool = False
     needs_rates: bool = False
-    counts_touches: bool = True
+    counts_touches: bool = True  # whether roots without sign change are events
 
 
 @dataclass(eq=False)
 class EventFunction:
-    """A checked event.
-
-    Event number `limit`, counted from 1, ends the integration; if infinite, no event does.
-    `is_vectorized` says whether the function accepts arrays; None means unknown.
-    """
+    """A checked event, which is called with n times (s) and states."""
 
     name: str
     event: Event
-    limit: float
-    is_vectorized: bool | None = None
+    limit: float  # number, from 1, of the event that ends the integration; infinite for none
+    is_vectorized: bool | None = None  # whether the function accepts arrays; None: unknown
     _tapes: list[Tape | None] = field(default_factory=list, repr=False)  # at most one
 
     def __call__(self, times: Array, states: Array, rates: Array | None = None) -> Array:

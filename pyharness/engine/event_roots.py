@@ -68,18 +68,14 @@ def together(parts: list[C], order: str) -> C:
 
 @dataclass(frozen=True, eq=False)
 class Fits(_Columns):
-    """Chebyshev `coefficients`, (p, NODES), of a function on p intervals from `low` to `high` (s).
+    """Polynomials that approximate a function on p intervals."""
 
-    `first` and `last` are the function's values at `low` and `high`, equal at common ends. Values
-    below `noise` can't be distinguished from 0.
-    """
-
-    low: Array
-    high: Array
-    first: Array
-    last: Array
-    coefficients: Array
-    noise: Array
+    low: Array  # s
+    high: Array  # s
+    first: Array  # the function's values at `low`
+    last: Array  # the function's values at `high`; equal to the next `first` at a common end
+    coefficients: Array  # Chebyshev coefficients, shape (p, NODES)
+    noise: Array  # smaller values can't be distinguished from 0
 
     @cached_property
     def sizes(self) -> Array:
@@ -90,21 +86,15 @@ class Fits(_Columns):
 
 @dataclass(frozen=True, eq=False)
 class Roots(_Columns):
-    """Candidates for roots at n times (s).
+    """Candidates for roots at n times."""
 
-    `change` is the sign (1 or -1) after a sign change, else 0. `slope` and `curvature` are the
-    polynomial's time derivatives. Function values below `noise`, and polynomial values below
-    `near`, can't be distinguished from 0. The function remains 0 for `lasting` (s), negative before
-    time 0.
-    """
-
-    time: Array
-    change: Index
-    slope: Array
-    curvature: Array
-    noise: Array
-    near: Array
-    lasting: Array
+    time: Array  # s
+    change: Index  # the sign, 1 or -1, after a sign change; else 0
+    slope: Array  # the polynomial's first derivative by time
+    curvature: Array  # the polynomial's second derivative by time
+    noise: Array  # smaller values of the function can't be distinguished from 0
+    near: Array  # smaller values of the polynomial can't be distinguished from 0
+    lasting: Array  # time (s) during which the function remains 0; negative before time 0
 
     @classmethod
     def bare(cls, time: Array, change: Index, noise: Any = 0.0, lasting: Any = 0.0) -> "Roots":

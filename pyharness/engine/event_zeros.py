@@ -23,23 +23,19 @@ _PARTS = np.array([0.1459, 0.382, 0.618, 0.8541, 1.0])
 
 @dataclass(frozen=True, eq=False)
 class ZeroIntervals:
-    """The ascending intervals, `low` to `high` (s), in which a function is 0 to within its error.
+    """The ascending intervals in which a function is 0 to within its error."""
 
-    Near an interval, values below `noise` can't be distinguished from 0. `before` and `after` are
-    the function's signs on both sides: 0 where it decays to 0, or at an end of the solution.
-    """
-
-    low: Array
-    high: Array
-    noise: Array
+    low: Array  # s
+    high: Array  # s
+    noise: Array  # smaller values near the interval can't be distinguished from 0
+    # Signs of the function on both sides; 0 if it decays to 0, or at an end of the solution.
     before: Array
     after: Array
 
     def roots(self, counts_touches: bool) -> Roots:
-        """Return each interval's root, at the end that integration from time 0 reaches first.
+        """Return each interval's root, where integration from time 0 first reaches it.
 
-        Without `counts_touches`, only intervals that exclude time 0, and have opposite signs on
-        both sides, have a root.
+        Without `counts_touches`, only sign changes away from time 0 count.
         """
         is_before = self.high < 0.0
         is_first = (self.low <= 0.0) & ~is_before

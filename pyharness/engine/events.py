@@ -162,7 +162,7 @@ def _have_one_extremum(g: EventFunction, solution: Solution, roots: Roots, noise
 def _with_extrema(
     g: EventFunction, solution: Solution, roots: Roots, ends: tuple[float, ...]
 ) -> Roots:
-    """Return the roots, with each double root moved to its extremum."""
+    """Return the roots, each double root moved to a nearby extremum that is 0 within the noise."""
     if roots.change.all():
         return roots
     is_double = (roots.change == 0) & ~np.isin(roots.time, ends)
@@ -186,15 +186,13 @@ def _chosen(roots: Roots, group: Index, change: int, ends: tuple[float, ...]) ->
 
 
 def side_events(g: EventFunction, solution: Solution, roots: Roots, side: int) -> Array:
-    """Return event times (s) after (`side` 1) or before (-1) time 0, in order away from 0.
-
-    As in SciPy, a root at time 0 is a sign change from 0, and one at the end a change to 0.
-    """
+    """Return event times (s) after (`side` 1) or before (-1) time 0, in order away from 0."""
     end = solution.pieces.edges[-1 if side > 0 else 0]
     if side * end <= 0.0 or not roots.time.size:
         return np.zeros(0)
     roots = roots.only((side * roots.time >= 0.0) & (side * (roots.time + roots.lasting) >= 0.0))
     time, change, lasting = (side * x[::side] for x in (roots.time, roots.change, roots.lasting))
+    # As in SciPy, a root at time 0 is a sign change from 0, and one at the end a change to 0.
     is_end = (lasting == 0.0) & ((time == 0.0) | (time == side * end))
     last, first = np.append(0.0, time + lasting), np.append(time, side * end)
     for k in np.flatnonzero(is_end):
@@ -225,15 +223,12 @@ def _repeated(
 
 @dataclass(frozen=True, eq=False)
 class FoundEvents:
-    """The ascending `times` (s) and the `states` of each function's events.
-
-    `first` and `last` are the times (s) of terminal events before and after 0, or infinite.
-    """
+    """The ascending `times` (s) and the `states` of each function's events."""
 
     times: list[Array]
     states: list[Array]
-    first: float
-    last: float
+    first: float  # time (s) of the terminal event before time 0, or -infinity
+    last: float  # time (s) of the terminal event after time 0, or infinity
 
 
 def no_events(count: int, columns: int) -> FoundEvents:
@@ -244,9 +239,9 @@ def no_events(count: int, columns: int) -> FoundEvents:
 def found_events(
     functions: list[EventFunction], solution: Solution, period: float = 0.0
 ) -> FoundEvents:
-    """Return the events of several functions, without those beyond a terminal event.
+    """Return the events of several functions, up to a terminal event.
 
-    With a `period` (s), events beyond the polynomials repeat earlier ones.
+    With a `period` (s), they repeat beyond the polynomials' time range.
     """
     roots = [event_roots(g, solution) for g in functions]
     sides: dict[int, list[Array]] = {}

@@ -18,9 +18,7 @@ _MORE, _LESS = 0.25 + math.sqrt(3.0) / 6.0, 0.25 - math.sqrt(3.0) / 6.0
 def attitude_from_rows(scene: Scene, time: Array, omega: Array) -> Array:
     """Return the attitudes, (n, 4), at the times (s) of a table of omega (rad/s).
 
-    A commutator-free step of order 4 (Celledoni, Marthinsen and Owren 2003) leads from each time to
-    the next; Hermite's cubic interpolates omega at its Gauss points. After an overflow, attitudes
-    are NaN.
+    After an overflow they are NaN.
     """
     times = np.concatenate([[0.0], time])
     rows = np.vstack([scene.omega, omega])
@@ -28,6 +26,7 @@ def attitude_from_rows(scene: Scene, time: Array, omega: Array) -> Array:
     slopes = np.array([slope(t, row) for t, row in zip(times, rows.tolist(), strict=True)])
     span = np.diff(times)[:, None]
     first, second = (_between(rows, slopes, span, part) for part in (_EARLY, 1.0 - _EARLY))
+    # A commutator-free step of order 4 (Celledoni, Marthinsen and Owren 2003) from time to time.
     turns = zip(
         _turn(span * (_MORE * first + _LESS * second)),
         _turn(span * (_LESS * first + _MORE * second)),

@@ -39,10 +39,7 @@ def gauss(
 ) -> Trajectory:
     """Return the trajectory by Gauss collocation with 1 to 8 `stages`.
 
-    The step is halved until the estimated relative error of omega meets the tolerance, or the last
-    two solutions differ only by rounding. The estimate is 2 d / (r**p - 1), where 2 is a
-    safety factor, d the largest relative difference of these solutions, and p = min(2 `stages`, 8).
-    The ratio r, at most 2, is the smallest of their numbers of steps between requested times.
+    Steps are halved until the estimated error meets the tolerance.
     """
     given, most = normalized(scene), effort * _MOST_EVALUATIONS / (1.0 + 0.5 * waves(scene))
     if times[-1] == 0.0:
@@ -91,6 +88,7 @@ def gauss(
             difference = float(np.abs(found.rows[:, :n] - before.rows[:, :n]).max(initial=0.0))
             # With as many steps as before in an interval, the difference measures no error, and
             # `known` is 0.
+            # The estimated error is 2 difference / known, where 2 is a safety factor.
             known = float((counts / previous).min(initial=2.0)) ** order - 1.0
             count = int(counts.sum())
             noise = torque_noise(scene, scene.omega, times[-1], count, scale)

@@ -256,9 +256,9 @@ def _set_noise(tape: Structure) -> Iterator[str]:
 
 
 def noises(tape: Structure, number: str, written: Callable[[str], str]) -> Iterator[str]:
-    """Yield C statements that bound the rates' rounding errors, for the C type `number`.
+    """Yield C statements that bound the rates' rounding errors, in the C type `number`.
 
-    `written` translates a definition, such as "e9 = 2.0", to this type.
+    `written` translates a definition to this type.
     """
     lines, rates = _roundings(tape)
     for slot in slots_read(lines + rates):
@@ -270,7 +270,7 @@ def noises(tape: Structure, number: str, written: Callable[[str], str]) -> Itera
 def derivatives(tape: Structure, count: int) -> tuple[list[str], list[dict[int, str]]]:
     """Return C code for values and slopes, and each rate's derivatives by unknown.
 
-    The values are at the fraction u of a step, from `count` terms.
+    Values are at the fraction u of a step.
     """
     # By slot: the names of its derivatives, by unknown.
     by = {slot: {slot: "one"} for slot in unknowns_of(tape)}

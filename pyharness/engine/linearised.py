@@ -16,7 +16,7 @@ def propagators(scene: Scene, times: Array, omega: Array) -> Array:
 def transitions(times: Array, slopes: Array) -> Array:
     """Return the state-transition matrices from each of n times (s) to the last, (n, m, m).
 
-    `slopes` are the intervals' Jacobian matrices (1/s), (n - 1, m, m).
+    `slopes` are the intervals' Jacobians (1/s).
     """
     # The Jacobian hardly changes in an interval, so that exp(interval * Jacobian) is the
     # state-transition matrix.

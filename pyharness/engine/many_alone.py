@@ -75,10 +75,9 @@ def solve_one_by_one(
     scene: Scene, t_end: Any, arrays: dict[str, Any], out: "Ensemble | Array | None", *,
     method: str, tolerance: float, effort: float, estimates: bool, threads: int, compiled: bool,
 ) -> Ensemble:  # fmt: skip
-    """Return final states of bodies by prepared solvers; invalid bodies have the status REFUSED.
+    """Return final states by prepared solvers; invalid bodies have the status REFUSED.
 
-    Raise InputError for a missing attitude, an unsuitable method, or a torque in space with
-    coefficients.
+    Raise InputError for an unsuitable method, attitude or torque.
     """
     by_coefficients = arrays["coefficients"] is not None or scene.coefficients is not None
     if by_coefficients and not isinstance(scene.torque, StateTorque):
@@ -190,7 +189,7 @@ def prepare_details(
 ) -> Callable[[Ensemble], Ensemble]:  # fmt: skip
     """Check the request; return a function that adds events and sensitivities to a result.
 
-    If `has_rows`, `t_end` has the common times (s) of all bodies.
+    With `has_rows`, `t_end` lists common times (s).
     """
     if method not in _METHODS:
         where = "sensitivities" if events is None else "events"

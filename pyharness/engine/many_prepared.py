@@ -104,13 +104,13 @@ def solve_each(
 ) -> None:  # fmt: skip
     """Solve the bodies in `piece`, and write their results to `found`.
 
-    Bodies with recorded equations and a diagonal inertia matrix are solved side by side. Single
-    calls solve the rest, and bodies whose error can't be measured side by side.
+    `turns` are the initial quaternions, if any.
     """
     left = list(range(piece.start, piece.stop))
     if solver.packed[Places.METHOD] == Methods.TAPE and solver.scene.inertia is None:
         own = times if solver.scene.changing is None else times_within(solver.scene, times)
         left = solve_lanes(solver.packed, NO_PARAMETERS, starts, own, turns, found, piece, given_up)
+    # Some bodies' errors can't be measured side by side.
     for i in left:
         if given_up[0]:
             return
@@ -142,10 +142,9 @@ def solve_lanes(
     packed: Array, parameters: Array, starts: Array, times: Array, turns: Array | None,
     found: Ensemble, piece: slice, given_up: NDArray[np.int32],
 ) -> list[int]:  # fmt: skip
-    """Solve bodies side by side into `found`; return the indices of unsolved bodies.
+    """Solve bodies side by side into `found`; return unsolved bodies' indices.
 
-    `packed` has the recorded equations, `parameters`, (n, k) or (1, k), their parameters. `turns`
-    are the initial quaternions, if any.
+    The equations in `packed` use `parameters`, (n, k) or (1, k).
     """
     n = piece.stop - piece.start
     sets = parameters if len(parameters) < 2 else parameters[piece]

@@ -49,11 +49,9 @@ _SHAPES: dict[str, tuple[int, ...]] = {
 
 
 def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Array, Array | None]:
-    """Return arrays of `solve_many` about principal axes, and the axes, for inertia matrices.
+    """Return `solve_many`'s arrays about principal axes, the axes (columns), and their quaternions.
 
-    The arrays have coefficients A, B, C, more accurate than rounded moments; NaN for a matrix that
-    is not symmetric and positive definite. The axes are columns of matrices, (n, 3, 3), and, with
-    attitudes, also quaternions, (n, 4).
+    An invalid inertia has coefficients NaN.
     """
     rows = checked_rows({name: given[name] for name in given if name not in BODIES})
     own = {"inertia": rows_of("inertia", given["inertia"], 3, 3)}
@@ -71,6 +69,7 @@ def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Array, Ar
     vectors = np.concatenate(
         [constant[:, None], rate[:, None], sines[..., :3], cosines[..., :3]], axis=1
     )
+    # The coefficients A, B, C are more accurate than rounded moments.
     coefficients, axes, components, status = (
         np.ascontiguousarray(each.T)
         for each in extension().inertia_frames(matrices.transpose(1, 2, 0), vectors.T)
@@ -141,15 +140,13 @@ def keep_with(scene: Scene, key: tuple[Any, ...], make: Callable[[], Any]) -> An
 
 
 def rows_of_scene(scene: Scene) -> dict[str, Any]:
-    """Return the read-only arrays of a scene, and its torque with waves `merged` by frequency.
-
-    Both are cached, because conversion takes longer than solving few bodies.
-    """
+    """Return the read-only arrays of a scene, and its torque with waves `merged` by frequency."""
 
     def convert() -> dict[str, Any]:
         rows = checked_rows(from_scene(scene))
         return {**rows, "merged": with_merged_rows(*(rows[name] for name in _MERGED))}
 
+    # Conversion takes longer than solving few bodies.
     found: dict[str, Any] = keep_with(scene, (), convert)
     return found
 
@@ -238,8 +235,7 @@ def solve_bodies(
 ) -> tuple[Ensemble, Array, Array]:  # fmt: skip
     """Return final states, initial omegas and times of bodies, by one kernel call.
 
-    Arrays in `own` replace a scene's arrays `ready`. `settings` are the method's code, tolerance,
-    step (s) and effort.
+    Arrays in `own` replace arrays in `ready`.
     """
     code, tolerance, step, effort = settings
     given = checked_rows(own)

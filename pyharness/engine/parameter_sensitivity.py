@@ -97,10 +97,9 @@ def checked_names(
 def sensitivities_at(
     scene: Scene, found: Trajectory, names: Sequence[str], effort: float, states: States
 ) -> dict[str, Array]:
-    """Return, for each parameter, the derivatives of k unknowns at n times by m values, (n, k, m).
+    """Return the derivatives of k unknowns at n times by each parameter's m values, (n, k, m).
 
-    `states` returns the unknowns of a changed scene. The tolerance is relative to the largest
-    derivative by the same value so far.
+    `states` solves a changed scene.
     """
     if not names:
         return {}

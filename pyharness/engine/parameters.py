@@ -34,16 +34,12 @@ _Body = tuple[Triple | None, Triple | None, Matrix | None, Changing | None]
 
 
 class VariedEquations(NamedTuple):
-    """The equations of motion of a scene, and their parameter derivatives.
+    """The equations of motion of a scene, and their parameter derivatives."""
 
-    `tape` gives the derivatives of the n rates, then the rates. `forcings`, (n, m), has the number
-    of the output, from 1, that is d(rate i)/d(value j), or 0 for a zero derivative. `columns` has
-    the columns j of each parameter.
-    """
-
-    tape: Tape
+    tape: Tape  # its outputs are the derivatives of the n rates, then the rates
+    # (n, m): number of the output, from 1, that is d(rate i)/d(value j), or 0 for a derivative 0
     forcings: NDArray[np.int32]
-    columns: dict[str, slice]
+    columns: dict[str, slice]  # the columns j of each parameter
 
 
 def parameters_of(scene: Scene) -> dict[str, list[float] | None]:
@@ -115,8 +111,7 @@ def tape_of_bodies(
 ) -> Tape:  # fmt: skip
     """Return the recorded equations of bodies that differ in parameters.
 
-    Inputs after the state are A, B, C and the reciprocal moments, unless `body` has them, and the
-    torque's parameters `names`.
+    Without `body`, A, B, C and the reciprocal moments are parameters too.
     """
     n_body = 0 if body else 6
     recorder = Recorder(n_inputs=N_INPUTS + n_body + len(names))

@@ -37,9 +37,9 @@ def _is_of_omega(g: EventFunction) -> bool:
 
 
 def repeated(times: Array, period: float, end: float, where: str) -> tuple[Array, int]:
-    """Return the times (s) of events until `end`, and how many precede the repeated period.
+    """Return event times (s) until `end`, and how many precede the repeated period.
 
-    `times` (s) are the events of the first three periods.
+    `times` are events of the first three periods.
     """
     # An event at the end of a period may be found on either side of it.
     margin = _MARGIN * period

@@ -44,10 +44,8 @@ def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
 
 
 def remainders(scene: Scene) -> Triple:
-    """Return the exact coefficients A, B, C minus their values in binary64.
-
-    Without them, a closed form has an error of 1e-10 rad at a phase of 1e6 rad.
-    """
+    """Return the exact coefficients A, B, C minus their values in binary64."""
+    # Without them, a closed form has an error of 1e-10 rad at a phase of 1e6 rad.
     found, moments = scene.euler_coefficients, scene.exact_moments
     # Under a torque, no kernel uses the remainders.
     if moments is None or not scene.torque.is_zero or not all(map(math.isfinite, found)):
@@ -100,11 +98,7 @@ def rows_trajectory(
 
 
 def closed_form(scene: Scene) -> str | None:
-    """Return the kind of closed form of a scene, or None.
-
-    ``sphere`` has A = B = C = 0, ``symmetric`` two equal moments, ``elliptic`` three different
-    ones.
-    """
+    """Return the kind of a scene's closed form: ``sphere``, ``symmetric``, ``elliptic`` or None."""
     law = scene.torque
     if not isinstance(law, TorqueLaw) or law.in_space or scene.changing is not None:
         return None

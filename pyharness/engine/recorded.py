@@ -65,10 +65,9 @@ def outputs_at(tape: Tape, times: Array, state: Array) -> Array:
 
 
 def system_of(scene: Scene, attitude: bool | None = None) -> Tape:
-    """Return the recorded equations of motion of a scene with principal axes.
+    """Return a scene's recorded equations of motion about principal axes.
 
-    The outputs are the derivatives of omega (equations 16-18 of Jacobs 1982), of the quaternion if
-    `attitude` is true (q' = q (0, omega)/2), and of `Scene.states`.
+    The outputs are derivatives of omega, quaternion (if `attitude`) and `Scene.states`.
     """
     torque = scene.torque
     if not isinstance(torque, StateTorque) or torque.tape is None:
@@ -94,6 +93,7 @@ def _system(
     x, y, z, *q = unknowns[: own if n_states else 7]
     states = unknowns[own : own + n_states]
     torque = torque_of(tape, time, (x, y, z), q or IDENTITY, *states)
+    # Equations 16-18 of Jacobs 1982.
     rates: list[Any] = [
         coefficient * product + component / moment
         for coefficient, product, component, moment in zip(
@@ -253,10 +253,9 @@ def has_ready_leaves(tape: Tape) -> bool:
 def packed_scene(
     scene: Scene, code: int, tolerance: float, effort: float, leaves: int = 0
 ) -> Array:
-    """Return a scene and its method's settings as one array, in the order of `Places`.
+    """Return a scene and its method's settings as an array, ordered by `Places`.
 
-    `leaves` is the address of compiled code for the torque; 0 if this was built with the package,
-    or is missing.
+    `leaves` is the address of compiled code.
     """
     if code == Methods.TAPE:
         tape = system_of(with_constant_body(scene))
@@ -296,36 +295,26 @@ def _settings(code: int, step_size: float, tolerance: float, effort: float) -> A
 
 
 class Step(NamedTuple):
-    """A Taylor step of length `h` (s); 0 if even the shortest step exceeds the tolerances.
+    """A Taylor step of n unknowns."""
 
-    `terms`, shape (order + 1, n), are Taylor coefficients times powers of `h`; `state`, shape (n,),
-    is their sum. `expansions` is the number of series that were computed. `is_switched` says
-    whether the step ends where a branch of the torque changes.
-    """
-
-    h: float
-    terms: Array
-    state: Array
-    expansions: int
-    is_switched: bool = False
+    h: float  # length (s); 0 if even the shortest step exceeds the tolerances
+    terms: Array  # Taylor coefficients times powers of `h`, shape (order + 1, n)
+    state: Array  # sum of the terms, shape (n,)
+    expansions: int  # number of computed series
+    is_switched: bool = False  # whether the step ends where a branch of the torque changes
 
 
 def taylor_step(
     tape: Array,
     t: float,
     state: Array,
-    tolerances: Array,
-    relative: float,
-    trial: float,
+    tolerances: Array,  # largest allowed errors of the unknowns, shape (n,)
+    relative: float,  # tolerance that determines the order
+    trial: float,  # guess of the step (s), with the sign of `longest`
     longest: float,
-    is_beyond: bool = False,
+    is_beyond: bool = False,  # whether to end a few rounding errors beyond a switch
 ) -> Step:
-    """Return a step of y' = tape(t, y) from the time `t` and the state, shape (n,).
-
-    `tolerances`, shape (n,), are the components' largest allowed errors; `relative`, a relative
-    tolerance, determines the order. `trial` is a guess of the step, with the sign of `longest`.
-    With `is_beyond`, a step ends a few rounding errors beyond a switch.
-    """
+    """Return a step of y' = tape(t, y) from the time `t` and the state, shape (n,)."""
     h, terms, end, order, expansions, is_switched, status = extension().tape_step(
         tape, t, state, tolerances, relative, trial, longest, is_beyond, Storage.PERTURBATION_LENGTH
     )

@@ -48,15 +48,11 @@ def trajectory_report(
     listing: Listing | None,
     title: str,
     trajectory: Trajectory,
-    form: str = "quaternion",
-    word: str | None = None,
+    form: str = "quaternion",  # of the attitude; or 3-1-3, 3-2-1, matrix
+    word: str | None = None,  # a thesis program's arithmetic; None is binary64
     bound: "ErrorBound | None" = None,
 ) -> Report:
-    """Return the report of a trajectory, with a table and a picture.
-
-    The attitude's `form` is ``quaternion``, ``3-1-3``, ``3-2-1`` or ``matrix``. `word` is a thesis
-    program's arithmetic; None is binary64.
-    """
+    """Return the report of a trajectory, with a table and a picture."""
     times = np.column_stack([trajectory.time, trajectory.recorded_time])
     blocks: list[tuple[tuple[Column, ...], Array]] = [(_TIMES, times), (_OMEGA, trajectory.omega)]
     if trajectory.velocity is not None:

@@ -40,7 +40,7 @@ _NEGLIGIBLE = 2.0**-60
 def scaled(scene: Scene, factor: float) -> Scene:
     """Return the scene whose solution is factor * omega(factor * t).
 
-    Raise InputError if the torque, or a changing inertia, does not permit this.
+    Raise InputError if the torque or a changing inertia prevents this.
     """
     torque = scene.torque
     tape = _tape(torque, factor) if isinstance(torque, StateTorque) else None
@@ -98,14 +98,11 @@ def integrate(
 
 
 def rescaling_factor(scene: Scene, time: float) -> float:
-    """Return the power of 2 that brings omega near 1 rad/s; 1 if unnecessary or impossible.
-
-    This omega is the larger of the initial omega and a bound (an estimate, if the torque depends on
-    the state) of the omega that the torque causes until `time` (s).
-    """
+    """Return the power of 2 that brings omega near 1 rad/s; 1 if unnecessary or impossible."""
     if is_ordinary(scene.omega):
         return 1.0
     torque = scene.torque if isinstance(scene.torque, StateTorque) else None
+    # Bounds, or estimates if the torque depends on the state, of the omega caused until `time` (s).
     by_torque = omega_by_torque if torque is None else _omega_by_state_torque
     largest = max(max(map(abs, scene.omega)), by_torque(scene, time))
     if not (0.0 < largest < math.inf) or 1.0 / _LARGE <= largest <= _LARGE:
@@ -192,8 +189,7 @@ def _tape(torque: StateTorque, factor: float) -> Tape | None:
 def scaled_tape(tape: Tape, exponent: int) -> Tape | None:
     """Return a torque's recorded operations in the unit of time 2**exponent s.
 
-    Each slot (input or result) has its own power of two as factor, the outputs 2**(2 * exponent).
-    Return None if a number would be rounded.
+    The result is None if a number would be rounded.
     """
     # Slot n becomes slot `places[n]`, times 2**`exponents[n]`.
     operations: list[Operation] = []

@@ -18,8 +18,7 @@ from pyharness.model.trajectory import Array
 def rotated(scene: Scene, turn: Callable[[Triple], Triple], body: bool) -> Scene:
     """Return the scene with `turn` applied to omega, torque vectors and, if `body`, moments.
 
-    Attitudes, and torques about the axes of space, are unchanged. If the torque depends on the
-    state, `turn` must be a rotation.
+    `turn` must be a rotation for a StateTorque.
     """
 
     def waves(each: tuple[Wave, ...]) -> tuple[Wave, ...]:
@@ -73,7 +72,7 @@ def restarted_at(
 ) -> Scene:
     """Return the scene whose time 0 is the time `by` (s) of `scene`.
 
-    `omega` (rad/s) and `attitude` are the state then; the torque must not be opaque.
+    `omega` (rad/s) and `attitude` are the state then.
     """
     first, second, third = (float(w) for w in omega)
     torque = scene.torque

@@ -56,8 +56,7 @@ class NoNumberError(Exception):
 class Run:
     """The integrations of one problem from 0 to `end` (s) by `solve_ivp`.
 
-    Together they may evaluate `most` right-hand sides. The state begins with omega (rad/s). The
-    phase (rad) is `rate`, the largest Euler coefficient, times omega and time.
+    Together they may evaluate `most` right-hand sides.
     """
 
     def __init__(
@@ -70,6 +69,7 @@ class Run:
         effort: float,
         most: int,
     ) -> None:
+        # `rate`, the largest Euler coefficient, times omega and time is the phase (rad).
         self.start, self.slopes, self.rate = tuple(start), slopes, rate
         self.end, self.effort, self.most = end, effort, most
         self.label = name.lower()
@@ -91,10 +91,9 @@ class Run:
         state: Sequence[float] | None = None,
         with_steps: bool = False,
     ) -> Any:
-        """Return SciPy's result by its method `name`, with times in units of `self.unit` s.
+        """Return SciPy's result by method `name`, with times in units of `self.unit` s.
 
-        It has dense output with `with_steps` or without `times`. Raise NoNumberError if the linear
-        algebra of Radau refuses a number, or the time is NaN.
+        Raise NoNumberError if infinities or NaNs stop SciPy.
         """
         from scipy.integrate import solve_ivp
 

@@ -41,15 +41,9 @@ def solve_state(
     most: float,
     with_steps: bool = False,
 ) -> Trajectory:
-    """Return the trajectory under a torque that depends on the state, by SciPy's method `name`.
+    """Return the trajectory under a state-dependent torque by SciPy's method `name`.
 
-    The estimated error at `times` (s) is at most `tolerance`. `most` is the work limit, in
-    evaluations of torque-free right-hand sides. With `with_steps`, `sol` has SciPy's interpolants
-    if the torque is opaque.
-
-    The ending is ``overflow`` if omega grows without bound or the torque is singular, ``unchecked``
-    if the Taylor series that checks a recorded torque ends early. Raise InputError if an opaque
-    function fails, the tolerance can't be met, or the work limit is exceeded.
+    `most` is the work limit in torque-free right-hand sides.
     """
     run = StateRun(scene, times[-1], name, effort, most)
     run.with_steps = with_steps and not run.is_smooth
@@ -74,6 +68,7 @@ def solve_state(
     if not found.is_complete:
         run.check_undefined()
     count = len(found.state)
+    # A recorded torque is unchecked if its Taylor series ends early.
     ended = "overflow" if not found.is_complete else "complete" if is_checked else "unchecked"
     result = rows_of(times[:count], found.state, run.evaluations, len(times), ended)
     return replace(result, sol=run.steps(scene)) if ended == "complete" else result

@@ -45,12 +45,11 @@ def torque_noise(
 ) -> float:
     """Return the rounding error of nearly cancelling torque terms, in rounding errors of omega.
 
-    It is the |omega| that the single terms would cause until `t_end` (s), rounded in each of
-    `steps` steps, divided by `scale` (rad/s). The default scale is the larger of the initial
-    |omega| and the omega that the whole torque causes. The result is 0 if no terms nearly cancel.
+    `scale` is the largest |omega| (rad/s).
     """
     if isinstance(scene.torque, StateTorque) or not (scene.law.sines or scene.law.cosines):
         return 0.0
+    # If negative, the kernel takes the larger of -scale and the omega that the torque causes.
     if scale is None:
         scale = -max(map(abs, omega0))
     return float(
@@ -68,10 +67,9 @@ def growth_of_rounding(scene: Scene, growth: float | None) -> float | None:
 def closed_form_estimate(
     scene: Scene, omega0: Triple, t_end: float, noise: float = 0.0
 ) -> tuple[float | None, float | None]:
-    """Return a closed form's estimated error at `t_end` (s), and the error amplification.
+    """Return a closed form's estimated error at `t_end` (s), and error amplification.
 
-    The error is the larger of the error of omega, relative to the largest |omega| so far, and the
-    error of the attitude (rad).
+    The error is relative (omega) or in rad (attitude).
     """
     growth: float | None = 1.0
     # A sphere does not amplify perturbations.

@@ -34,10 +34,9 @@ class SingularError(TimedError):
 def undefined_operation(
     tape: Tape, begin: Sequence[float], before: Sequence[float], end: Sequence[float]
 ) -> str | None:
-    """Return a text on the operation undefined at the end of an integration, and a remedy.
+    """Return a text on the operation undefined at `end`, and a remedy, or None.
 
-    `begin`, `before` and `end` are the tape's inputs at the beginning of the integration and of its
-    last step, and at the end. Return None if omega or a quotient becomes infinite.
+    `before` has the inputs before the last step.
     """
     first, last = (max(abs(inputs[slot]) for slot in OMEGA) for inputs in (begin, end))
     if last > _UNBOUNDED * (first or 1.0):

@@ -194,12 +194,12 @@ def solve(
 
 
 class _Call(NamedTuple):
-    """The checked arguments of `solve`; `scene` is integrated, about principal `axes` if any."""
+    """The checked arguments of `solve`; `scene` is integrated instead of `given`."""
 
     given: Scene
     scene: Scene
     moments: Any
-    axes: Array | None
+    axes: Array | None  # principal axes, if `given` has an inertia matrix
     method: str
     tolerance: float
     effort: float
@@ -309,15 +309,12 @@ def _states_of_changed(times: Array, effort: float, attitude: bool, scene: Scene
 
 
 def finest(method: str, scene: Scene, time: float) -> float:
-    """Return the smallest tolerance that a method can meet from 0 to `time` (s).
-
-    For SciPy's methods, with local errors of at least 2e-14, it grows with phase and error
-    amplification.
-    """
+    """Return the smallest tolerance that a method can meet from 0 to `time` (s)."""
     claimed = METHODS[method].finest
     if method not in SCIPY_METHODS or time == 0.0:
         return claimed
     factor = rescaling_factor(scene, time)
+    # It grows with phase and error amplification, because local errors are at least 2e-14.
     met = finest_tolerance(SCIPY_METHODS[method], scaled(scene, factor), time / factor)
     return max(claimed, met)
 

@@ -156,15 +156,13 @@ class Solver(BoundKernel[Result]):
         """Return the function that solves many initial states in one call.
 
         ``solver.many(omega, t_end, threads=1, out=None)`` takes `omega` (rad/s) of shape (n, 3),
-        and `t_end` (s), a number or of shape (n,). It returns omega (rad/s), shape (n, 3), in the
-        array `out` if given, and the statuses of `Ensemble`, int8, shape (n,). A row depends on no
-        other row, nor on `threads`, but may differ by rounding from a single call's result. Invalid
-        arguments raise an InputError; a body with a moment of inertia that reaches 0 before `t_end`
-        has the status `refused`.
+        and `t_end` (s), a number or of shape (n,). It returns omega (rad/s) at `t_end`, shape (n,
+        3), and the statuses of `Ensemble`, shape (n,). Rows do not depend on each other or on
+        `threads`.
 
         For a solver with attitude, it is ``solver.many(omega, t_end, attitude=None, threads=1,
         out=None)`` with quaternions of shape (n, 4) or (4,), and returns omega, attitudes and
-        statuses; `out` may be an Ensemble, or an array for omega.
+        statuses. `out` is an array for omega or, with attitude, an Ensemble.
         """
         if self.with_attitude:
             return partial(many_states, self)
@@ -196,7 +194,7 @@ class Solver(BoundKernel[Result]):
     def method(self) -> str:
         """Return the name of the method of the last call.
 
-        It is `plan.method`, unless the kernel chose `quick` or `taylor`, or used `plan.fallback`.
+        The kernel may choose `quick` or `taylor`, or use `plan.fallback`.
         """
         steps = 0 if self._ending is None else self._ending[1]  # negative if it chose `quick`
         if not steps:
@@ -209,9 +207,9 @@ class Solver(BoundKernel[Result]):
     def status(self) -> str:
         """Return how the last call ended; ``complete`` before the first call.
 
-        ``gave up`` means that the work limit was exceeded or the phase has no correct digit left;
-        ``refused``, that the method does not apply; ``sensitive``, that amplified rounding errors
-        exceed the tolerance.
+        ``gave up`` means that the work limit or the largest phase was exceeded; ``refused``, that
+        the method does not apply; ``sensitive``, that amplified rounding errors exceed the
+        tolerance.
         """
         return self._judge()[0]
 

@@ -18,10 +18,7 @@ _MOST_STEPS = 200_000
 def steps_to(
     scene: Scene, attitude: bool, end: float, tolerance: float, most: int = _MOST_STEPS
 ) -> Iterator[tuple[float, Stepper]]:
-    """Yield the beginning (s) of each step from 0 to `end` (s), and the stepper after it.
-
-    The steps end at a singularity, or after `most` steps.
-    """
+    """Yield the beginning (s) of each step from 0 to `end` (s), and the stepper after it."""
     stepper = Stepper(with_constant_body(scene), max(tolerance, FINEST), attitude=attitude)
     with suppress(SingularError):
         while abs(stepper.time) < abs(end) and stepper.steps < most:

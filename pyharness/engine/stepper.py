@@ -198,9 +198,9 @@ class Stepper:
     def step(self, longest: float = math.inf) -> float:
         """Take the longest step that the tolerance allows, and return the new time (s).
 
-        `longest` limits the step (s), negative for a step back in time. A step ends where a table
-        of the torque changes. Raise InputError if `longest` is no number or too small to change the
-        time, or if the motion or its torque is singular.
+        `longest` limits the step (s); if negative, the step leads back in time. Steps end where a
+        table of the torque changes. Raise InputError for an unsuitable `longest`, or at a
+        singularity.
         """
         longest = number("longest", longest)
         end = self._time + longest
@@ -289,8 +289,8 @@ class Stepper:
     def at(self, times: float | Sequence[float] | Array) -> Array:
         """Return the state at times (s) within the last step, without changes made after it.
 
-        The state is omega (rad/s), the quaternion if computed, and own states, with shape (m,), or
-        (m, n) for n times. Raise InputError for a time outside the step.
+        It is omega (rad/s), the quaternion if computed, and own states, of shape (m,), or (m, n)
+        for n times. Raise InputError for a time outside the step.
         """
         try:
             given: Array = np.asarray(times, dtype=float)

@@ -29,9 +29,7 @@ def taylor(
 ) -> Trajectory:
     """Return the trajectory of a scene at `times` (s) by Taylor series.
 
-    An inaccurate integration is repeated; `evaluations` counts all series. With `with_steps`, `sol`
-    has the steps up to the last time, unless there are over 20 000. Raise InputError for an opaque
-    torque, and at the work limit.
+    `evaluations` counts all series, also of repeated integrations.
     """
     # The kernel reads the initial attitude in the first column, and writes a column for each time.
     n_attitudes = 0 if scene.attitude is None else len(times)

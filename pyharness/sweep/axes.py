@@ -29,19 +29,14 @@ CHOICES = {
 
 @dataclass(frozen=True)
 class Field:
-    """A number of a scene or solver that an axis may vary.
-
-    `allowed` describes what `takes` accepts. If `looped`, all scenes of a batch (one call) share
-    the value, except step size and Lipschitz constant of the thesis's programs. If `whole`, values
-    are rounded to integers.
-    """
+    """A number of a scene or solver that an axis may vary."""
 
     units: str
     title: str
-    allowed: str = "a finite number"
-    takes: Callable[[float], bool] = lambda value: True
-    looped: bool = False
-    whole: bool = False
+    allowed: str = "a finite number"  # description of accepted values
+    takes: Callable[[float], bool] = lambda value: True  # whether a value is accepted
+    looped: bool = False  # whether all scenes of one call must share the value
+    whole: bool = False  # whether values are rounded to integers
 
 
 # Prefix of the constants of a torque's expressions, as in `torque.constants.k`.
@@ -144,19 +139,14 @@ _SAMPLE = "sample"
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis of a sweep's grid, which varies a `field` such as ``omega.1``.
-
-    Axes of the same `dimension` vary together. `values` has all values if `how` is `listed`, the
-    first and last for a spacing of `SPACINGS`, or the parameters of a distribution of `DRAWS` with
-    the `seed`.
-    """
+    """One axis of a sweep's grid, which varies a `field` such as ``omega.1``."""
 
     field: str
-    dimension: str
+    dimension: str  # axes of the same dimension vary together
     count: int
-    how: str
-    values: tuple[Any, ...]
-    seed: int = 0
+    how: str  # "listed", a spacing of SPACINGS, or a distribution of DRAWS
+    values: tuple[Any, ...]  # all values, the first and last, or the distribution's parameters
+    seed: int = 0  # of a distribution
 
     @property
     def is_choice(self) -> bool:

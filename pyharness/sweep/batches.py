@@ -30,9 +30,9 @@ Columns = dict[str, Array]
 
 
 def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
-    """Return an array for each reduction (stored quantity) of a chunk.
+    """Return an array for each reduction (stored quantity) of a chunk, in the chunk's shape.
 
-    An array has the shape of the chunk, with one more dimension for several components.
+    Several components are the last dimension.
     """
     box = sweep.box(chunk)
     shape = tuple(part.stop - part.start for part in box)
@@ -65,9 +65,7 @@ def first_batch(sweep: Sweep) -> Batch:
 def listing_of(program: str, listing: str, reading: str) -> Listing:
     """Return the version of a program that `listing` and `reading` describe.
 
-    `listing` is ``original``, ``corrected``, or ``fix:`` or ``keep:`` with the only defects to
-    correct or to keep. `reading` is ``adopted`` (our readings of doubtful cards), or the
-    alternatives to use. Names are joined by ``+``.
+    `listing` may be ``fix:`` or ``keep:`` with defects joined by ``+``.
     """
     how, _, names = listing.partition(":")
     readings = [] if reading == "adopted" else reading.split("+")
@@ -264,9 +262,9 @@ def follows_body(sweep: Sweep) -> bool:
 def with_numbers(
     sweep: Sweep, constants: Mapping[str, float], values: Sequence[Any] | None
 ) -> Scene:
-    """Return the scene with other `constants` in its torque's expressions, or with another body.
+    """Return the scene with other `constants` in torque expressions, and a body of other `values`.
 
-    `values` are the body's moments, inertia or coefficients; None keeps the body.
+    `values` are moments, inertia or coefficients.
     """
     tables = dict(sweep.tables)
     if constants:

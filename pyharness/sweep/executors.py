@@ -37,11 +37,7 @@ _ADDRESS = re.compile(r"(?:(?:tcp|tls)://)?(?P<host>[\w.-]+|\[[\da-fA-F:.]+\]):(
 
 
 class Engine(NamedTuple):
-    """A started executor.
-
-    `computed` takes a sweep and chunk numbers. It yields each chunk number with the chunk's arrays,
-    one for each stored quantity.
-    """
+    """A started executor; `computed` yields the number and the arrays of each chunk."""
 
     workers: int
     computed: Callable[[Sweep, list[int]], Results]
@@ -54,9 +50,7 @@ def engine(
 ) -> Iterator[Engine]:
     """Start the executor ``here``, ``processes`` or ``dask``, and yield it as an Engine.
 
-    ``dask`` uses the scheduler at `address`, as in ``tcp://host:8786``, or a local cluster. Raise
-    InputError if no scheduler with a worker answers; `computed` raises it if workers die
-    repeatedly.
+    ``dask`` uses the scheduler at `address`, or a local cluster.
     """
     if executor == "here":
         yield Engine(1, _solve_here, is_here=True)

@@ -26,25 +26,19 @@ RANKS = ("least", "middle", "largest")
 
 @dataclass(frozen=True)
 class Reduction:
-    """A quantity of each scene, and its computation.
-
-    `compute` takes a batch of n scenes and parameters (defaults: `parameters`). It returns n
-    values, or n rows with the components `labels` along `dimension`. `only` is `program` or
-    `method` if the other lacks the quantity. `needs` lists requirements: moments of
-    inertia (`moments`), `no torque`, a method that computes the `attitude`. If values are codes,
-    `flags` maps them to their meanings.
-    """
+    """A quantity of each scene, and its computation."""
 
     title: str
+    # Returns n values, or n rows of components, for a batch of n scenes and parameters.
     compute: Callable[[Batch, Mapping[str, Any]], Found]
     units: str = "1"
     dtype: str = "f8"
-    labels: tuple[str, ...] = ()
-    dimension: str = ""
-    only: str = ""
-    needs: tuple[str, ...] = ()
-    parameters: Mapping[str, Any] = field(default_factory=dict)
-    flags: Mapping[int, str] = field(default_factory=dict)
+    labels: tuple[str, ...] = ()  # names of the components
+    dimension: str = ""  # name of the components' dimension
+    only: str = ""  # `program` or `method` if the other lacks the quantity
+    needs: tuple[str, ...] = ()  # requirements: `moments`, `no torque` or `attitude`
+    parameters: Mapping[str, Any] = field(default_factory=dict)  # defaults
+    flags: Mapping[int, str] = field(default_factory=dict)  # meanings of values that are codes
 
     @property
     def fill(self) -> Any:

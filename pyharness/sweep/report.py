@@ -143,10 +143,7 @@ Scale = tuple[float, float, bool]
 
 
 def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
-    """Return the stored quantity `name`, by default the first whose values are numbers.
-
-    If all values are outcome codes, the default is the first quantity.
-    """
+    """Return the stored quantity `name`, by default the first whose values are numbers."""
     names = [asked.name for asked in sweep.reductions]
     if name is not None and name not in names:
         raise unknown("reduction", name, names, "--quantity")
@@ -155,16 +152,13 @@ def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
 
 
 def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
-    """Return the picture of a stored quantity over dimensions with several numbers.
-
-    It is a map over the last two dimensions that are not random. Over only one such dimension, it
-    is a line, or dots if the values are listed. If all are random, it is dots over the last one.
-    """
+    """Return a map of a stored quantity over two dimensions, or a line or dots over one."""
     from matplotlib.figure import Figure
 
     axis_of = {axis.dimension: axis for axis in reversed(store.sweep.axes)}
     dimensions = store.sweep.dimensions
     ordered = [d for d in dimensions if axis_of[d].count > 1 and not axis_of[d].is_choice]
+    # The last two dimensions that are not random, or the last one if all are.
     shown = [d for d in ordered if not _is_drawn(axis_of[d])][-2:] or ordered[-1:]
     most = _MOST_PLACES if len(shown) == 2 else _MOST_DOTS
     places = {d: _thinned(axis_of[d].count, most) for d in shown}

@@ -45,21 +45,16 @@ class Estimate(NamedTuple):
 
 
 def forecast(sweep: Sweep, path: str, n_missing: int, own: Engine) -> float:
-    """Return the time (s) to solve and write missing chunks, and to read all chunks.
-
-    If other processes solve, the longer of solving and writing counts.
-    """
+    """Return the time (s) to solve and write missing chunks, and to read all chunks."""
     write, read = seconds_of_files(sweep, path)
     solve = n_missing * seconds_per_chunk(sweep) / own.workers
+    # Other processes solve while this one writes.
     together = solve + n_missing * write if own.is_here else max(solve, n_missing * write)
     return together + sweep.n_chunks * read
 
 
 def seconds_of_files(sweep: Sweep, path: str) -> tuple[float, float]:
-    """Return the mean times (s) to write and to read a chunk's files beside `path`.
-
-    Both are 0 if files can't be written.
-    """
+    """Return the mean times (s) to write and to read a chunk's files beside `path`."""
     times = []
     try:
         with filled(sweep, Path(path)) as folder:
@@ -98,8 +93,7 @@ def _pattern(sweep: Sweep, chunk: int) -> Arrays:
 def seconds_per_chunk(sweep: Sweep) -> float:
     """Return the time (s) to solve a chunk in this process.
 
-    It is measured on whole chunks if one takes less than 0.2 s, or if three are less than 1 % of
-    the sweep and take at most a minute; otherwise on samples and on parts of three chunks.
+    If chunks take long, it is extrapolated from parts.
     """
     scenes = math.prod(sweep.chunk_shape)
     seconds = scenes * seconds_per_scene(sweep)
@@ -158,8 +152,7 @@ def seconds_per_scene(sweep: Sweep) -> float:
 def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
     """Return sample indices, changed so that many scenes share a batch (one call).
 
-    Along dimensions in which a batch has equal indices, five distinct indices remain, or more if a
-    chunk has small batches, so that batches are about as large as in a chunk.
+    Batches become about as large as in a chunk.
     """
     shared = {axis.dimension for axis in sweep.axes if axis.field in looped_fields(sweep)}
     found, scenes = [], math.prod(sweep.chunk_shape)
@@ -182,21 +175,17 @@ _MOST_CHUNKS = 1_000_000
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of one run of a sweep, whose computation took `seconds` (s).
+    """The outcome of one run of a sweep."""
 
-    `before` counts chunks of earlier runs, `computed` those of this run, `repaired` those that had
-    been damaged. `estimate` is None if no chunk was missing.
-    """
-
-    estimate: Estimate | None
-    before: int
-    computed: int
-    seconds: float
-    repaired: int = 0
+    estimate: Estimate | None  # None if no chunk was missing
+    before: int  # number of chunks from earlier runs
+    computed: int  # number of chunks from this run
+    seconds: float  # time of the computation
+    repaired: int = 0  # number of chunks that had been damaged
 
 
 def check_size(sweep: Sweep, path: str, workers: int, missing: int) -> tuple[int, int]:
-    """Return the bytes of disk that missing chunks need, and of memory that all workers need.
+    """Return the bytes of disk for missing chunks, and of memory for all workers.
 
     Raise InputError if too little is available.
     """
@@ -251,19 +240,13 @@ def swept(
     executor: str = "here",
     workers: int | None = None,
     address: str | None = None,
-    before: Callable[[Estimate], None] = lambda estimate: None,
-    progress: bool | Progress = False,
-    repair: bool = False,
+    before: Callable[[Estimate], None] = lambda estimate: None,  # receives the forecast
+    progress: bool | Progress = False,  # True for a bar, or a function called after each chunk
+    repair: bool = False,  # whether to make damaged chunks and metadata again
 ) -> Iterator[tuple[Store, Outcome]]:
     """Compute the chunks that a sweep's store lacks; yield the open store and the outcome.
 
-    The folder `path` is made if missing, and locked until the context ends. `executor`, `workers`
-    and `address` are as in `executors.engine`. `before` receives the forecast. `progress` is True
-    for a bar, or a function called after each chunk. With `repair`, damaged chunks and metadata are
-    made again.
-
-    Raise InputError if the store is damaged or another sweep's, no cluster answers, or disk or
-    memory is too small. Computed chunks remain.
+    The folder `path` is locked until the context ends.
     """
     is_there = check_store(sweep, path)
     check_size(sweep, path, workers or 1, 0 if is_there else sweep.n_chunks)

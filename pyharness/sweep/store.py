@@ -134,10 +134,9 @@ class Store:
 
 @contextlib.contextmanager
 def opened(sweep: Sweep, path: str, repair: bool = False) -> Iterator[Store]:
-    """Make or open a sweep's store, lock it, check it, and yield it.
+    """Make or open, lock and check a sweep's store, and yield it.
 
-    Raise InputError, without changing files, if `path` is locked, damaged, or another sweep's
-    store. With `repair`, remove damaged chunks and rewrite damaged metadata.
+    Raise InputError if it is locked or, without `repair`, damaged.
     """
     check_zarr()
     folder = Path(path)

@@ -47,10 +47,9 @@ class Label(NamedTuple):
 
 
 def checksum_text(label: Label, part: str, folder: Path, names: Sequence[str], limit: int) -> bytes:
-    """Return the content of a checksum file for the files `names`.
+    """Return a checksum file's content for the files `names` of `part`, such as "chunk 0/1".
 
-    `part` is their part of the store, such as "chunk 0/1". Raise DamageError for a file that is
-    unreadable or above `limit` bytes.
+    Raise DamageError for unreadable or too large files.
     """
     identity = f"schema {label.schema}, version {label.version}, sweep {label.fingerprint}"
     lines = [f"# pyharness sweep store, {identity}, {part}"]

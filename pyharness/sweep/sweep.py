@@ -22,35 +22,28 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class ReductionSpec:
-    """A requested reduction: its array's `name`, its key in `REDUCTIONS`, and its parameters.
-
-    For the reduction `claim`, `function` checks a claim for each scene of a batch.
-    """
+    """A requested reduction: its array's `name`, its key in `REDUCTIONS`, and its parameters."""
 
     name: str
     reduction: str
     parameters: tuple[tuple[str, Any], ...] = ()
+    # For the reduction `claim`: checks a claim for each scene of a batch.
     function: Callable[[Batch], NDArray[Any]] | None = None
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """A sweep as a sweep file describes it.
-
-    `scene`, read from `tables` unless it is a case, supplies what no axis varies. `chunk` is the
-    largest number of scenes in a chunk. `fingerprint` is the SHA-256 of the sweep file's `text` and
-    its scene file.
-    """
+    """A sweep as a sweep file describes it."""
 
     name: str
-    scene: Scene
-    tables: dict[str, Any]
+    scene: Scene  # supplies the values that no axis varies
+    tables: dict[str, Any]  # the scene's file, unless the scene is a case
     axes: tuple[Axis, ...]
     solver: Solver
     reductions: tuple[ReductionSpec, ...]
-    chunk: int
-    text: str
-    fingerprint: str
+    chunk: int  # largest number of scenes in a chunk
+    text: str  # the sweep file
+    fingerprint: str  # SHA-256 of the sweep file and its scene file
 
     @property
     def dimensions(self) -> dict[str, int]:
@@ -68,10 +61,9 @@ class Sweep:
     def chunk_shape(self) -> tuple[int, ...]:
         """Return the number of scenes of a chunk along each dimension.
 
-        A chunk covers as many of the last dimensions as fit, and part of the dimension before. It
-        has length 1 along programs, methods, listings and readings, so that its scenes share a
-        solver.
+        It is 1 along programs, methods, listings and readings.
         """
+        # All scenes of a chunk share a solver.
         single = {axis.dimension for axis in self.axes if axis.is_choice}
         room = self.chunk
         lengths = []
@@ -109,10 +101,7 @@ def points(box: tuple[slice, ...]) -> list[Indices]:
 
 
 def spread(sweep: Sweep, count: int) -> list[Indices]:
-    """Return the indices of `count` evenly spread scenes, an array for each dimension.
-
-    If `count` is at least 2, the first and the last scene are among them.
-    """
+    """Return the indices of up to `count` evenly spread scenes, an array for each dimension."""
     # A grid may have more scenes than 64 bits can count.
     total = sweep.n_scenes
     count = min(count, total)
@@ -131,9 +120,9 @@ def value_columns(sweep: Sweep, where: list[Indices]) -> dict[str, NDArray[Any]]
 
 
 def groups(columns: list[NDArray[Any]], n: int) -> list[tuple[Indices, tuple[Any, ...]]]:
-    """Return the groups of indices 0 to n - 1 with equal values in all columns.
+    """Return groups of indices 0 to n - 1 with equal values in all columns.
 
-    A group is a pair of its indices, ascending, and its values.
+    A group is a pair (indices, values).
     """
     if not columns:
         return [(np.arange(n), ())]

@@ -31,6 +31,7 @@ from pyharness.sweep.batches import check_state_axis, check_state_solver, listin
 from pyharness.sweep.reductions import RANKS, REDUCTIONS, needs_attitudes
 from pyharness.sweep.sweep import ReductionSpec, Sweep
 
+# Returns a code for each scene: 1 if the claim holds, 0 if not, 2 if it does not apply, 3 in part.
 Claim = Callable[[Batch], NDArray[Any]]
 _KEYS = ("schema", "name", "scene", "axis", "solve", "reductions", "chunk")
 _OF_METHODS = ("method", "tolerance", "t_end", "compiled")
@@ -45,9 +46,7 @@ _LONGEST_NAME = 240  # bytes; most file systems take 255
 def read_sweep(path: str | os.PathLike[str], claims: Mapping[str, Claim] | None = None) -> Sweep:
     """Return the sweep that a TOML file describes.
 
-    The path of a scene file is relative to the sweep file. `claims` has a function for each claim.
-    For a `Batch` of n scenes it returns n codes: 1 if the claim holds, 0 if it fails, 2 if it does
-    not apply, 3 if it holds in part.
+    `claims` has a function for each claim.
     """
     path = os.fsdecode(path)
     where = f"sweep file '{path}'"

@@ -14,7 +14,7 @@ def sections(text: Sequence[Section]) -> str:
 
 
 def table(given: Table, label: str = "table", links: Mapping[str, str] | None = None) -> str:
-    """Return a table as HTML, which scrolls if it is wider than the page.
+    """Return a table as HTML, scrollable if wide.
 
     `label` is for screen readers; `links` maps cells' texts to addresses.
     """

@@ -170,9 +170,9 @@ class _Slot(NamedTuple):
 
 
 def fastest_of(torque: TorqueLaw | StateTorque) -> float:
-    """Return the highest frequency (rad/s) of a torque's sines and cosines of time.
+    """Return the highest frequency (rad/s) of a torque's sines and cosines.
 
-    Raise InputError if a macro-step may miss its changes.
+    Raise InputError if a macro-step may miss the torque's changes.
     """
     if isinstance(torque, TorqueLaw):
         return max((abs(f) for a, f in torque.sines + torque.cosines if any(a)), default=0.0)

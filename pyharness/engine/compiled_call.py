@@ -56,9 +56,9 @@ def get_include() -> str:
 def check_call(
     scene: Scene, with_attitude: bool, omega0: object, t_end: object, third: object
 ) -> tuple[tuple[float, ...], float]:
-    """Return the initial state and `t_end` (s), checked, of a call that the C code refused.
+    """Return the checked initial state and `t_end` (s) of a call that the C code refused.
 
-    `third` is attitude or `out`.
+    `third` is the attitude or `out`.
     """
     start, time = three_floats("omega", omega0), number("t_end", t_end)
     if scene.changing is not None and math.isfinite(time):

@@ -72,7 +72,7 @@ def with_events(
 def _first_periods(
     found: Trajectory, rows: dense.Rows, tolerance: float, period: float
 ) -> Trajectory:
-    """Return `found`, cut to three periods on each side of time 0 that has over six."""
+    """Return `found`; a side of time 0 with over six periods is cut to three."""
     ends = found.time[[0, -1]]
     last = PERIODS * period
     # For little more than three periods, repetition would save nothing.

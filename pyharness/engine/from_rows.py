@@ -26,7 +26,7 @@ def attitude_from_rows(scene: Scene, time: Array, omega: Array) -> Array:
     slopes = np.array([slope(t, row) for t, row in zip(times, rows.tolist(), strict=True)])
     span = np.diff(times)[:, None]
     first, second = (_between(rows, slopes, span, part) for part in (_EARLY, 1.0 - _EARLY))
-    # A commutator-free step of order 4 (Celledoni, Marthinsen and Owren 2003) from time to time.
+    # Steps are commutator-free, of order 4 (Celledoni, Marthinsen and Owren 2003).
     turns = zip(
         _turn(span * (_MORE * first + _LESS * second)),
         _turn(span * (_LESS * first + _MORE * second)),

@@ -37,7 +37,7 @@ class VariedEquations(NamedTuple):
     """The equations of motion of a scene, and their parameter derivatives."""
 
     tape: Tape  # its outputs are the derivatives of the n rates, then the rates
-    # (n, m): number of the output, from 1, that is d(rate i)/d(value j), or 0 for a derivative 0
+    # (n, m): number, from 1, of the output d(rate i)/d(value j); 0 if this derivative is zero
     forcings: NDArray[np.int32]
     columns: dict[str, slice]  # the columns j of each parameter
 

@@ -210,7 +210,7 @@ def bounds_of(scene: Scene, end: float) -> list[float]:
 
 
 def series_beside(scene: Scene, times: Sequence[float], tolerance: float) -> Beside | None:
-    """Return states by Taylor series at `times` (s), and spans; None if the last is not reached."""
+    """Return states by Taylor series at `times` (s), and spans; None if the series ends early."""
     end, bounds = times[-1], bounds_of(scene, times[-1])
     attitude = scene.attitude is not None
     rows = [[*scene.omega, *(scene.attitude or ())]] if times[0] == 0.0 else []

@@ -156,9 +156,8 @@ class Solver(BoundKernel[Result]):
         """Return the function that solves many initial states in one call.
 
         ``solver.many(omega, t_end, threads=1, out=None)`` takes `omega` (rad/s) of shape (n, 3),
-        and `t_end` (s), a number or of shape (n,). It returns omega (rad/s) at `t_end`, shape (n,
-        3), and the statuses of `Ensemble`, shape (n,). Rows do not depend on each other or on
-        `threads`.
+        and `t_end` (s), a number or of shape (n,). It returns omega (rad/s), shape (n, 3), and the
+        statuses of `Ensemble`, shape (n,). Rows do not depend on each other or on `threads`.
 
         For a solver with attitude, it is ``solver.many(omega, t_end, attitude=None, threads=1,
         out=None)`` with quaternions of shape (n, 4) or (4,), and returns omega, attitudes and

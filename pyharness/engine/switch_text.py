@@ -21,7 +21,7 @@ _NUMBER = re.compile(r"\[switch (\d+)\]")
 
 
 def reason_of(ended: str, time: float, number: int) -> str | None:
-    """Return the reason if a switch caused an ending; its `number` counts from 1, 0 is unknown."""
+    """Return the reason if a switch (its `number` counts from 1; 0 is unknown) caused an ending."""
     if ended != "sliding" and not (ended == "sensitive" and number):
         return None
     message = str(TimedError(SLIDING if ended == "sliding" else _TOUCHED, time))

@@ -37,12 +37,12 @@ class Sweep:
 
     name: str
     scene: Scene  # supplies the values that no axis varies
-    tables: dict[str, Any]  # the scene's file, unless the scene is a case
+    tables: dict[str, Any]  # the scene's tables, none for a case
     axes: tuple[Axis, ...]
     solver: Solver
     reductions: tuple[ReductionSpec, ...]
     chunk: int  # largest number of scenes in a chunk
-    text: str  # the sweep file
+    text: str  # content of the sweep file
     fingerprint: str  # SHA-256 of the sweep file and its scene file
 
     @property

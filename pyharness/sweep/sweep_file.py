@@ -89,7 +89,7 @@ def _sweep(data: dict[str, Any], path: Path, text: str, claims: Mapping[str, Cla
 
 
 def _scene(table: object, path: Path) -> tuple[Scene, dict[str, Any], bytes]:
-    """Return the scene and its tables; for the digest, a null byte and the scene file, if any."""
+    """Return the scene, its tables, and a null byte and the scene file's content for the digest."""
     if not isinstance(table, dict):
         raise InputError(f"scene is {kind_of(table)}; it must be a table [scene]")
     given = [key for key in ("case", "file") if key in table]

@@ -37,34 +37,27 @@ for _a in "abcd":
 
 @dataclass(frozen=True)
 class Effect:
-    """The outcome of one program version (`listing`) on one scene.
-
-    `omega` (rad/s) and `velocity` (m/s) are the largest errors over the completed `steps`, `common`
-    the largest over the steps that all compared listings completed.
-    """
+    """The outcome of a program version (`listing`) on a scene."""
 
     listing: Listing
-    omega: float
-    velocity: float
+    omega: float  # largest error (rad/s) over the completed `steps`
+    velocity: float  # likewise, m/s
     steps: int
     ended: str
     stop: Stop | None
+    # Largest errors of omega and velocity over the steps that all compared listings completed.
     common: tuple[float, float] = (math.nan, math.nan)
 
 
 @dataclass(frozen=True)
 class CaseEffects:
-    """The outcomes of four program versions in one case, which show an apparatus entry's effect.
-
-    `corrected_alone` is the original listing without this entry (such as a defect), `kept_alone`
-    the corrected listing with it.
-    """
+    """The outcomes of four program versions in one case, which show an apparatus entry's effect."""
 
     program: str
     case: int
     original: Effect
-    corrected_alone: Effect
-    kept_alone: Effect
+    corrected_alone: Effect  # original, but without the entry
+    kept_alone: Effect  # corrected, but with the entry
     corrected: Effect
 
 
@@ -114,10 +107,9 @@ def effects_of(name: str) -> Iterator[CaseEffects]:
 def lattice(
     scene: Scene, program: str, readings: tuple[str, ...] = (), effort: float = 1.0
 ) -> list[Effect]:
-    """Return the outcomes with every subset of a program's defects, largest `common` error first.
+    """Return outcomes with every subset of defects and `readings`, largest `common` error first.
 
-    `readings` and, under varying torque, conjectures vary too. A reading has no effect if a defect
-    in the same statement is corrected.
+    Under varying torque, conjectures vary too.
     """
     check_steps(scene, program, "fortran", effort)
     truth = reference(scene, scene.times(), velocity=True, effort=effort)

@@ -66,11 +66,9 @@ def _contents(cards: Sequence[Card]) -> list[Section]:
 
 
 def card_record(card: Card) -> dict[str, Any]:
-    """Return a card as a JSON record.
-
-    `scan` is null if the scan agrees with our text, and empty if it lacks the card.
-    """
+    """Return a card as a JSON record."""
     found = deck(card.program)
+    # Null if the scan agrees with our text, empty if it lacks the card.
     scan = (card.scan or "") if card.deviates else None
     differences = [each._asdict() for each in card.differences]
     port, twin = ([x._asdict() for x in of.get(card.number, [])] for of in (found.port, found.twin))
@@ -83,10 +81,9 @@ def card_record(card: Card) -> dict[str, Any]:
 def scan_report(
     faults: Sequence[str], undeclared: Sequence[str], lines: int, digest: str
 ) -> Report:
-    """Return the report on whether our text explains every line of a scan.
+    """Return a report on the unexplained lines of a scan.
 
-    `faults` are unexplained lines, `undeclared` are disagreements between cards and apparatus,
-    `lines` counts the lines of the scan, and `digest` is its SHA-256.
+    `faults` and `undeclared` are sentences from `collation`; `digest` is the scan's SHA-256.
     """
     cards = [card for program in PROGRAMS for card in deck(program).cards.values()]
     deviating = sum(bool(each.differences or each.lost) for each in cards)

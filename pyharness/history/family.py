@@ -55,13 +55,12 @@ MOST_STEPS = 2_000
 class Member:
     """A weighted residual method of the thesis, with n = `terms` coefficients ci.
 
-    Least squares has the weight functions i t**(i-1), the derivatives of the residual by ci for
-    constant f (eq. 25). `points`, for collocation only, are fractions of the step: "thesis" for
-    k/(n+1), k = 1 to n; "gauss" for Gauss-Legendre; or n different numbers from 0 to 1.
+    The weight functions of least squares are i t**(i-1).
     """
 
     weighting: str = "collocation"
     terms: int = 2
+    # Fractions of the step: "thesis" (k/(n+1), k = 1 to n), "gauss" (Gauss-Legendre), or numbers.
     points: str | tuple[float, ...] | None = None
     corrections: int = 1
 
@@ -131,11 +130,7 @@ def predicted_order(member: Member) -> int:
 
 
 def run(scene: Scene, member: Member) -> Trajectory:
-    """Integrate a scene by a weighted residual method (Jacobs 1982, eq. 20-27, and IV.2).
-
-    The first estimate uses the torque at the beginning of the step; corrections use it at their
-    nodes. A step's rounding error is about one unit in the last place of omega.
-    """
+    """Integrate a scene by a weighted residual method (Jacobs 1982, eq. 20-27, and IV.2)."""
     omega = integrate(scene, [member])[0]
     rows = int(np.logical_and.accumulate(np.isfinite(omega).all(axis=1)).sum())
     time = np.array(scene.times()[:rows])
@@ -229,18 +224,13 @@ def _torque(scene: Scene, times: Array) -> Array:
 
 @dataclass(frozen=True)
 class OrderFinding:
-    """A method's predicted and measured order of convergence in a scene, and its error.
-
-    `measured` is None if too many errors are too large or only rounding. `settled` means that the
-    last two measurements differ by at most 0.1. `error` is the largest error of omega (rad/s) with
-    the scene's step size.
-    """
+    """A method's predicted and measured order of convergence in a scene, and its error."""
 
     member: Member
     predicted: int
-    measured: float | None
-    settled: bool
-    error: float
+    measured: float | None  # None if too many errors are too large or only rounding
+    settled: bool  # whether the last two measurements differ by at most 0.1
+    error: float  # largest error of omega (rad/s) with the scene's step size
 
     @property
     def deviation(self) -> float:
@@ -261,7 +251,7 @@ def order_table(
 ) -> list[OrderFinding]:
     """Return order of convergence and error of each method, by default of `family_members`.
 
-    The solution must be bounded, and the scene have at most `MOST_STEPS` steps.
+    The solution must be bounded.
     """
     if scene.steps > MOST_STEPS:
         raise InputError(f"steps is {scene.steps}; allowed for orders: 1 to {MOST_STEPS}")

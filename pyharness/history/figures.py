@@ -205,13 +205,10 @@ def figure_picture(finding: FigureFinding) -> Picture:
 
 
 def together_picture(first: FigureFinding, second: FigureFinding) -> Picture:
-    """Return one picture of omega1 in an original and a corrected figure.
-
-    The limit in `first` continues a run that ended early. Of `second`'s coincident curves, only the
-    last is drawn.
-    """
+    """Return one picture of omega1 in an original and a corrected figure."""
     from matplotlib.figure import Figure
 
+    # The curves of the corrected programs coincide.
     second = replace(second, curves=second.curves[-1:])
     figure = Figure(figsize=(7.2, 4.2), dpi=110, layout="constrained")
     axes = figure.subplots()
@@ -228,13 +225,11 @@ def together_picture(first: FigureFinding, second: FigureFinding) -> Picture:
 
 
 def points_picture() -> Picture:
-    """Return a picture of the original programs' collocation points in the first steps.
-
-    Each row is a step; times (s) are from its beginning, and the grey band is the step.
-    """
+    """Return a picture of the original programs' collocation points in the first steps."""
     from matplotlib.figure import Figure
 
     scene = case_scene(2)  # any case: the points are the same
+    # Each row is a step, and the grey band its length.
     figure = Figure(figsize=(7.2, 3.2), dpi=110, layout="constrained")
     both = figure.subplots(1, len(TERMS), sharex=True, sharey=True)
     rows: list[list[Any]] = []

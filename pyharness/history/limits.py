@@ -61,17 +61,13 @@ class Halving:
 
 @dataclass(frozen=True)
 class Limit:
-    """The convergence of an original program to its limit as the step size goes to zero.
-
-    `order`, from the last two step sizes, is None after an overflow, if only rounding errors are
-    left, without a limit, or if the limit is unbounded at the time `blow_up` (s).
-    """
+    """The convergence of an original program to its limit as the step size goes to zero."""
 
     program: str
     tends_to: str
     halvings: tuple[Halving, ...]
-    order: float | None
-    blow_up: float | None = None
+    order: float | None  # from the last two step sizes; None if not measurable
+    blow_up: float | None = None  # time (s) at which the limit is unbounded
 
     @property
     def approach(self) -> str:
@@ -84,9 +80,9 @@ class Limit:
 
 
 def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) -> Limit:
-    """Return the convergence of an original program, run without stop test, to its limit.
+    """Return the convergence of an original program, without stop test, to its limit.
 
-    Under varying torque only the Runge-Kutta program has a limit.
+    Under varying torque, only the Runge-Kutta program has one.
     """
     times = scene.times()
     truth = reference(scene, times, effort=effort)
@@ -118,7 +114,7 @@ def limit_solution(
 ) -> tuple[Array, str, float | None]:
     """Return an original program's limit: omega (rad/s), description, and blow-up time (s) or None.
 
-    The omega has the shape (times, 3); it is NaN without a limit.
+    The omega has the shape (times, 3).
     """
     scale = float(np.abs([scene.omega, *truth.omega]).max()) or 1.0
     start = list(scene.omega)

@@ -37,11 +37,7 @@ def fits(
     cases: Sequence[int],
     progress: Progress = no_progress,
 ) -> list[Fit]:
-    """Return the comparisons of a page with our pages of the same form, nearest first.
-
-    Pages of the same form agree in moments, torques and number of columns. Our runs have the number
-    of steps in the thesis's text or, if the page is longer, on the cards.
-    """
+    """Return comparisons of a page with our pages of equal heading and width, nearest first."""
     found: list[Fit] = []
     listings = {program: listings_of(program) for program in programs}
     every = len(cases) * len(WORD_NAMES) * sum(map(len, listings.values()))

@@ -1,12 +1,11 @@
 """The lost programs of section IV.2 of the thesis, and mistakes that may explain their failure.
 
 According to IV.2, the programs for the subdomain, Galerkin and least-squares methods, which the
-thesis does not print, gave no meaningful results in Cases 1 and 2, where the solution is known.
-`data/lost.toml` has our conjectures on their mistakes.
+thesis does not print, gave no meaningful results in Cases 1 and 2. `data/lost.toml` has our
+conjectures on their mistakes.
 
-As in IV.2, the trial function has two terms, and products of omegas are polynomials of time. One
-correction follows a first estimate with a constant right-hand side. A method fails if its error
-exceeds a tenth of the largest omega.
+The trial function has two terms. One correction follows a first estimate with a constant right-hand
+side. A method fails if its error exceeds a tenth of the largest omega.
 """
 
 from collections.abc import Sequence
@@ -89,7 +88,7 @@ def _share(scene: Scene, weighting: str, mistake: str, word: str = BINARY64) -> 
 def integrate(scene: Scene, weighting: str, mistake: str = "none") -> Array:
     """Return omega (rad/s) by a method with one mistake, under constant torque, shape (steps, 3).
 
-    Rows are NaN after an overflow. The scene's numbers determine the arithmetic.
+    Rows after an overflow are NaN.
     """
     h = scene.step_size
     coefficients = scene.euler_coefficients

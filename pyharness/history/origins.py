@@ -14,27 +14,22 @@ from pyharness.thesis.collation import names_a_card, rows
 
 
 class Disagreement(NamedTuple):
-    """A disagreement of the decks with each other or with the thesis, and its supposed origin.
-
-    `steps` are operations in `data/cards/collation.toml`, `where` is the place that `says` quotes.
-    `cards` quotes cards by program and number. `known` follows from the sources; `suggests` and
-    `origin` are our inferences. `unnoticed` tells why the test cases do not show the fault.
-    """
+    """A disagreement of the decks with each other or with the thesis, and its supposed origin."""
 
     id: str
     title: str
-    steps: Sequence[str]
+    steps: Sequence[str]  # operations in `data/cards/collation.toml`
     equations: Sequence[str]
-    where: str
-    says: str
-    cards: dict[str, dict[int, str]]
+    where: str  # place in the thesis
+    says: str  # words quoted from this place
+    cards: dict[str, dict[int, str]]  # texts by program and card number
     differs: str
-    known: str
-    suggests: str
-    origin: str
+    known: str  # facts in the sources
+    suggests: str  # our inference
+    origin: str  # kind of origin that we infer
     certainty: str
     entries: Sequence[str]
-    unnoticed: str
+    unnoticed: str  # why the test cases do not show the fault
 
 
 def disagreements() -> list[Disagreement]:

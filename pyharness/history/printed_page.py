@@ -35,17 +35,13 @@ class Difference:
 
 @dataclass(frozen=True)
 class Fit:
-    """The comparison of another machine's page with one of our pages.
-
-    `listing` is ``original``, ``corrected`` or ``original with`` a reading; `word` is the
-    arithmetic; `fields` counts the compared numbers.
-    """
+    """The comparison of another machine's page with one of our pages."""
 
     program: str
     case: int
-    listing: str
-    word: str
-    fields: int
+    listing: str  # "original", "corrected" or "original with" a reading
+    word: str  # arithmetic
+    fields: int  # number of compared numbers
     differences: tuple[Difference, ...]
 
     @property

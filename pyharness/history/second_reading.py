@@ -24,14 +24,11 @@ _COLUMNS = (
 
 
 class ReadCard(NamedTuple):
-    """A card of the sample: its text without blanks in the scan, in ours and in a second reading.
-
-    `first`, ours, has the names of variables as printed.
-    """
+    """A card of the sample: its text without blanks in the scan and in two readings."""
 
     card: Card
     scan: str
-    first: str
+    first: str  # our text, with names of variables as in the scan
     second: str
 
 
@@ -43,12 +40,12 @@ def chapman(first: int, second: int, both: int) -> float:
 def recapture_interval(first: int, second: int, both: int) -> tuple[int, int]:
     """Return the limits of the 95 % confidence interval of a population's size.
 
-    `first` and `second` are the sizes of two independent samples with `both` common members, at
-    least 1. A size is in the interval if the hypergeometric probabilities of at most and of at
-    least `both` common members are 0.025 or more.
+    The arguments are as in `chapman`.
     """
     if both < 1:
         raise ValueError("both must be positive")
+    # For sizes in the interval, the hypergeometric probabilities of at most and of at least `both`
+    # common members are 0.025 or more.
     least = first + second - both
     lower = least
     while _probability(lower, first, second, 0, both) < _TAIL:
@@ -81,7 +78,7 @@ def read_cards() -> Iterator[ReadCard]:
 def misread_places(scan: str, reading: str) -> dict[int, str]:
     """Return by index in `scan` the text of `reading` where the two differ.
 
-    Inserted characters belong to the previous index, or to -1 at the beginning.
+    Insertions belong to the previous index, or to -1.
     """
     found: dict[int, str] = {}
     matcher = SequenceMatcher(None, scan, reading, autojunk=False)
@@ -96,16 +93,14 @@ def misread_places(scan: str, reading: str) -> dict[int, str]:
 
 
 def recaptures() -> Table:
-    """Return the table of estimates, with characters and with whole cards as units.
-
-    Only cards are independent units, because a machine repeats its misreading of a letter.
-    """
+    """Return the table of estimates, with characters and with whole cards as units."""
     places: tuple[set[tuple[str, int]], ...] = (set(), set())
     for each in read_cards():
         for found, reading in zip(places, (each.first, each.second), strict=True):
             found |= {(each.card.name, place) for place in misread_places(each.scan, reading)}
     cards = tuple({name for name, _ in found} for found in places)
     rows = []
+    # Only cards are independent: a machine repeats its misreading of a letter.
     for unit, (one, other) in (("places", places), ("cards", cards)):
         counts = len(one), len(other), len(one & other)
         lower, upper = recapture_interval(*counts)

@@ -11,21 +11,17 @@ CHANGES = {"added": "new entries", "changed": "altered entries", "removed": "rem
 
 
 class Event(NamedTuple):
-    """An event in the history of the thesis, with its date and source.
-
-    `first` and `last` are months, as in ``1979-01``, or empty; `why` explains an uncertain date.
-    `certainty` is ``certain`` if the source names the date, ``probable`` if the date follows from
-    another entry, and ``unknown`` without a source.
-    """
+    """An event in the history of the thesis, with its date and source."""
 
     id: str
     what: str
     where: str
+    # "certain" if the source names the date, "probable" if another entry implies it, or "unknown".
     certainty: str
-    first: str = ""
+    first: str = ""  # month, as in 1979-01
     last: str = ""
     quote: str = ""
-    why: str = ""
+    why: str = ""  # reason for a date that is not certain
 
     @property
     def date(self) -> str:
@@ -54,19 +50,15 @@ def _in_words(month: str) -> str:
 
 
 class Revision(NamedTuple):
-    """A change of the edition's text (cards and apparatus).
-
-    `digest` identifies the text after the change, and is empty before the cards were data files.
-    `cards` has the changed cards by program, as in ``750-770, 800``.
-    """
+    """A change of the edition's text (cards and apparatus)."""
 
     date: str
     what: str
-    digest: str = ""
+    digest: str = ""  # of the text after the change, if cards were data files
     added: tuple[str, ...] = ()
     changed: tuple[str, ...] = ()
     removed: tuple[str, ...] = ()
-    cards: Mapping[str, str] = {}
+    cards: Mapping[str, str] = {}  # changed cards by program, as in 750-770, 800
 
 
 def revisions() -> tuple[Revision, ...]:

@@ -56,24 +56,18 @@ _STYLES: dict[str, dict[str, Any]] = {
 
 
 class WordRun(NamedTuple):
-    """A run in one arithmetic, compared with binary64.
-
-    `rule` is ``nearest-even``, ``chop`` (towards zero), or the CDC 6600's ``FX`` (truncating) or
-    ``RX`` (rounding). `stop` has reason and step of an early end, as in ``V2 at 25``. `different`
-    of the `fields` numbers on the longer page differ. `error` is the largest error of omega
-    (rad/s). `singular` counts the steps with a singular matrix (IER = 129).
-    """
+    """A run in one arithmetic, compared with binary64."""
 
     case: int
     program: str
     listing: str
-    p: int
-    rule: str
-    stop: str
-    fields: int
-    different: int
-    error: float
-    singular: int
+    p: int  # significand bits
+    rule: str  # nearest-even, chop (towards zero), or the CDC's FX (truncating) or RX (rounding)
+    stop: str  # reason and step of an early end, as in V2 at 25
+    fields: int  # numbers on the longer page
+    different: int  # numbers that differ
+    error: float  # largest error of omega, rad/s
+    singular: int  # steps with a singular matrix (IER = 129)
 
 
 @dataclass(frozen=True)

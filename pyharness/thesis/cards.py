@@ -1,9 +1,9 @@
 """The cards of the three programs, in our text and in the scan of the thesis.
 
 A card is a line of a printed program, a deck the cards of one program. `data/cards` has the decks,
-the scan's pages, and each card's lines in the Python port (the twin); comments in the Fortran port
-name the cards of each line. A line of the scan has card number, dash and text; blanks are ignored.
-`data/apparatus.toml`, the critical apparatus, explains deviations of the scan.
+the scan's pages, and each card's lines in the Python port (the twin). A line of the scan has card
+number, dash and text; blanks are ignored. `data/apparatus.toml`, the critical apparatus, explains
+deviations of the scan.
 """
 
 import re
@@ -43,19 +43,14 @@ class Place(NamedTuple):
 
 
 class Card(NamedTuple):
-    """A card of a printed program, and its appearance in the scan.
-
-    `text` is our text of columns 1 to 72. `differences` are ordered from left to right. `printed`
-    is the scan's card number if it differs, with its apparatus entry; `lost` is the entry of a card
-    that the scan lacks.
-    """
+    """A card of a printed program, and its appearance in the scan."""
 
     program: str
     number: int
-    text: str
-    differences: tuple[Difference, ...] = ()
-    printed: tuple[str, str] | None = None
-    lost: str | None = None
+    text: str  # our text of columns 1 to 72
+    differences: tuple[Difference, ...] = ()  # from left to right
+    printed: tuple[str, str] | None = None  # other number in the scan, and its apparatus entry
+    lost: str | None = None  # apparatus entry, if the scan lacks the card
 
     @property
     def name(self) -> str:
@@ -84,14 +79,12 @@ class Card(NamedTuple):
         return f"{number}-{''.join(shown)}"
 
     def passages(self) -> Iterator[tuple[str, Difference | None]]:
-        """Yield each passage of the text, with its difference from the scan or None.
-
-        A difference begins where its characters first occur after the previous one.
-        """
+        """Yield each passage of the text, with its difference from the scan or None."""
         places = [n for n, letter in enumerate(self.text) if not letter.isspace()]
         letters = tight(self.text)
         done = at = 0
         for each in self.differences:
+            # A difference begins where its characters first occur after the previous one.
             first = letters.find(each.ours, at)
             if first < 0:
                 raise ValueError(f"{each.ours!r} does not stand in {self.text!r} where it should")
@@ -209,10 +202,9 @@ def numbers(ranges: str) -> list[int]:
 
 
 def chosen(asked: Iterable[str]) -> list[Card]:
-    """Return the cards that `asked` names, or all if it is empty.
+    """Return the cards that `asked` names, by default all.
 
-    An item is a program (``two-term``), a card (``two-term:1660``), or a number or range in any
-    program (``1660``, ``1040-1090``).
+    Items are as in ``two-term``, ``two-term:1660``, ``1660`` or ``1040-1090``.
     """
     every = (card for each in list(asked) or PROGRAMS for card in _cards_of(each))
     return list(dict.fromkeys(every))
@@ -278,11 +270,8 @@ def port_file(program: str) -> str:
 
 
 def switch_at(place: Place) -> tuple[str, bool] | None:
-    """Return the switch on which a Fortran line depends, and whether the line needs it active.
-
-    A switch is the flag of a defect or reading. The innermost ``if`` around the line that tests
-    a switch alone decides.
-    """
+    """Return the defect or reading on which a Fortran line depends, and if it must be active."""
+    # The innermost `if` around the line that tests a defect or reading alone decides.
     lines = _lines(shipped(PORT) / place.file)
     depth = _indentation(lines[place.line - 1])
     beyond_else = False

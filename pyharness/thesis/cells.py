@@ -23,11 +23,7 @@ def all_listings(program: str) -> Iterator[Listing]:
 
 
 def all_cells() -> Iterator[tuple[Listing, int]]:
-    """Yield every pair of a listing and a case number.
-
-    In a case with an initial torque, each listing also occurs with the conjecture
-    `initial-torque`.
-    """
+    """Yield every pair of a listing and a case number."""
     cases = {case: initial_torque(case_scene(case)) is not None for case in case_numbers()}
     for program in PROGRAMS:
         for listing in all_listings(program):

@@ -21,10 +21,9 @@ _OF_THE_SCAN = ("misreading", "missing text", "normalization")
 
 
 def expected_lines() -> list[tuple[str, str]]:
-    """Return the expected lines of the scanned appendix: text without blanks, and name.
+    """Return text without blanks and name of each expected line of the scanned appendix.
 
-    The name is a card's, such as ``two-term:1660``; ``furniture`` for a heading of the editor; or
-    ``phantom`` for text that belongs to no card at this place.
+    The name is a card's, ``furniture`` or ``phantom``.
     """
     found = []
     for page in facts("cards/scan")["page"]:
@@ -34,6 +33,7 @@ def expected_lines() -> list[tuple[str, str]]:
                     assert card.scan is not None
                     found.append((card.scan, card.name))
             else:
+                # A heading of the editor, or text that belongs to no card at this place.
                 kind = "furniture" if "furniture" in item else "phantom"
                 found.append((tight(item[kind]), kind))
     return found
@@ -84,11 +84,7 @@ def unexplained(scan: str) -> list[str]:
 
 
 def undeclared() -> list[str]:
-    """Return a sentence for each disagreement between the cards and the apparatus.
-
-    An entry must declare each deviation of the scan; each declared deviation must occur. A lost
-    card needs an entry of the kind ``missing text``.
-    """
+    """Return a sentence for each deviation of the scan on which cards and apparatus disagree."""
     used: set[tuple[Any, ...]] = set()
     for card in chosen(()):
         place = card.program, card.number
@@ -123,23 +119,17 @@ def undeclared() -> list[str]:
 
 
 class Row(NamedTuple):
-    """A comparison of the decks and the thesis in one operation of the programs, `what`.
-
-    `cards` has the card numbers by program, as in ``750-770, 800``. `decks` is ``agree`` if all
-    decks with the operation have the same statements, ``names`` if only names differ, ``order`` if
-    only names and order differ, ``-`` if no deck has it, else ``differ``. `thesis` is ``agrees``,
-    ``differs`` or ``silent``; `text` is the place in the thesis, `says` its statement. `entries` of
-    the apparatus, or `reason`, explain a disagreement.
-    """
+    """A comparison of the decks and the thesis in one operation (`what`) of the programs."""
 
     what: str
-    cards: dict[str, str]
+    cards: dict[str, str]  # numbers by program, as in 750-770, 800
+    # "agree"; "names" if only names differ; "order" if order, too; "differ"; "-" without cards.
     decks: str
-    thesis: str
-    text: str
-    says: str
-    entries: tuple[str, ...]
-    reason: str
+    thesis: str  # "agrees" with the decks, "differs" or "silent"
+    text: str  # place in the thesis
+    says: str  # statement at this place
+    entries: tuple[str, ...]  # apparatus entries that explain a disagreement
+    reason: str  # another explanation
 
     @property
     def is_explained(self) -> bool:
@@ -161,12 +151,7 @@ def rows() -> list[Row]:
 
 
 def faults(found: list[Row]) -> list[str]:
-    """Return a sentence for each mistake or unexplained disagreement in the rows `found`.
-
-    Each entry in a row must be in the apparatus, and name a card of the row. Each card except
-    comments must be in one row. Each apparatus entry with cards must be in a row, unless it
-    concerns only the scan.
-    """
+    """Return a sentence for each mistake or unexplained disagreement in the rows `found`."""
     told = [f"{row.what}: no entry or reason" for row in found if not row.is_explained]
     known = {entry["id"]: entry for entry in facts("apparatus")["entry"]}
     for row in found:

@@ -27,11 +27,9 @@ def integrate(
     points_of: Callable[[float], list[float]],
     rates: Callable[[Sequence[Vector], int, Vector], list[float]],
 ) -> Trajectory:
-    """Run a collocation program on a scene, and return its trajectory.
+    """Run a collocation program, whose points (s) are `points_of(DT)`.
 
-    `points_of` returns the collocation points (s) for the program's step size DT (s). `rates`
-    returns the right-hand sides at point k (0 for the start) from all points' torques over moments
-    (rad/s2), k, and the six unknowns.
+    `rates` takes the torques over moments (rad/s2), and then the arguments of `Rates`.
     """
     h = scene.step_size
     dt = h
@@ -65,8 +63,7 @@ def interval(
 ) -> tuple[list[float], int]:
     """Return all unknowns after one step, and the correction's error code IER.
 
-    `points` and `end` are times (s) after the start. `rates` takes the point's number (0 for the
-    start) and the unknowns.
+    `points` and `end` are times (s) after the start.
     """
     constant = rates(0, start)
     estimate, _ = fit(points, [constant] * len(points))

@@ -20,10 +20,7 @@ def run(
     may_stop: bool = True,
     velocity: bool = True,
 ) -> Trajectory:
-    """Run the compiled program of a listing on a scene, and return its trajectory.
-
-    The arguments are as in `programs.run_program`, but not checked.
-    """
+    """Run a listing's compiled program; arguments are as in `run_program`, but not checked."""
     given = program_arguments(scene, listing, lipschitz, may_stop, velocity)
     rows, ier, n_rows, *ended = extension().run_program(*given)
     found = read_rows(listing, rows.T[:n_rows], ier, *ended)
@@ -36,10 +33,7 @@ def read_rows(
 ) -> Trajectory:  # fmt: skip
     """Return the output of a compiled program as a trajectory.
 
-    `rows` has shape (n, 8): true time (s), the program's variable TIME (s), omega (rad/s) and
-    velocity (m/s).
-    `stop_variable` is the number in `STOP_VARIABLES`, from 1, of the variable that failed the stop
-    test, or 0; `stop_quotient` (1/s) is its quotient.
+    `rows` is as in `trajectory_of`; `stop_quotient` is in 1/s.
     """
     n = len(rows)
     return trajectory_of(
@@ -54,12 +48,7 @@ def read_rows(
 def program_arguments(
     scene: Scene, listing: Listing, lipschitz: float, may_stop: bool, velocity: bool
 ) -> tuple[Any, ...]:
-    """Return the arguments of the compiled function `run_program`.
-
-    They include a bit mask of defects, readings and conjectures. Seven triples are moments (kg m2),
-    or A, B and C; omega (rad/s); masses (kg); forces (N); constant (N m) and rate (N m/s) of the
-    torque; initial torque over moments (rad/s2), or zeros.
-    """
+    """Return the arguments of the compiled function `run_program`."""
     first = initial_torque(scene) if listing.has("initial-torque") else None
     if first is None and listing.has("initial-torque"):
         conjectures = listing.conjectures - {"initial-torque"}
@@ -67,7 +56,7 @@ def program_arguments(
     law = scene.body_torque
     return (
         PROGRAMS.index(listing.program) + 1,
-        listing.flags,
+        listing.flags,  # bit mask of defects, readings and conjectures
         scene.moments is not None,
         scene.moments or scene.coefficients,
         scene.omega,
@@ -75,7 +64,7 @@ def program_arguments(
         scene.forces,
         law.constant,
         law.rate,
-        first or (0.0, 0.0, 0.0),
+        first or (0.0, 0.0, 0.0),  # initial torque over moments, rad/s2
         law.varies,
         columns(law.sines),
         columns(law.cosines),

@@ -22,6 +22,7 @@ from pyharness.thesis.cards import deck, numbers
 from pyharness.thesis.equations import card_torque
 from pyharness.thesis.printer import TAPE5
 
+# As printed; adapted to a modern compiler; for CDC's FTN. The last two add the torque of Case 7.
 DIALECTS = ("1982", "gfortran", "ftn")
 SYSTEMS = ("nos", "nosbe")
 # Numbers of terms of two more collocation programs, which V.2 of the thesis uses for Case 6, but
@@ -38,26 +39,18 @@ _MARK = "+"
 
 
 class Run(NamedTuple):
-    """The output of a compiled deck.
+    """The output of a compiled deck."""
 
-    `tape5` has shape (n, 7): TIME (s), U1 to U3 (rad/s), V1 to V3 (m/s). `page` is TAPE6 without
-    carriage control and trailing blanks.
-    """
-
-    tape5: np.ndarray
-    page: str
+    tape5: np.ndarray  # shape (n, 7): TIME (s), U1 to U3 (rad/s), V1 to V3 (m/s)
+    page: str  # TAPE6 without carriage control and trailing blanks
 
 
 def deck_text(
     listing: Listing, scene: Scene | None = None, dialect: str = "1982", terms: int | None = None
 ) -> str:
-    """Return a program as fixed-form FORTRAN, with card numbers in columns 74 to 80.
+    """Return a deck as fixed-form FORTRAN, with the printed data or those of `scene`.
 
-    The published cards have the data of Case 2 with 300 steps (collocation) or Case 5 with 100
-    steps (Runge-Kutta); a `scene` of Table 1 replaces these data. The `dialect` "1982" adds
-    nothing; "ftn" adds cards for the torque of Case 7; "gfortran" also adapts cards to a modern
-    compiler. Column 73 marks added and adapted cards. `terms`, 3 or 5, requests the deck of
-    `model_cards`.
+    `terms`, 3 or 5, requests `model_cards`.
     """
     if dialect not in DIALECTS:
         raise unknown("dialect", dialect, DIALECTS, "--dialect")
@@ -83,6 +76,7 @@ def deck_text(
             cards |= new
             if "dialect" in each:
                 marked |= set(new)
+    # Column 73 marks cards of the dialect; columns 74 to 80 have the card number.
     return "".join(f"{cards[n]:72}{_MARK if n in marked else '':1}{n:7d}\n" for n in sorted(cards))
 
 
@@ -112,8 +106,7 @@ def corrections(program: str) -> dict[int, list[str]]:
 def job_text(deck: str, system: str = "nos", rounds: bool = False) -> str:
     """Return a batch job that compiles and runs a deck of the dialect `ftn` with CDC's FTN.
 
-    The job includes our LEQT1F if the deck calls it. `rounds` sets FTN's option ROUND for sums,
-    products and quotients. The operating `system` is "nos" or "nosbe".
+    `rounds` sets FTN's option ROUND.
     """
     if system not in SYSTEMS:
         raise unknown("system", system, SYSTEMS, "--system")
@@ -154,11 +147,7 @@ def _model(terms: int, listing: Listing, scene: Scene | None) -> dict[int, str]:
 
 
 def model_cards(terms: int) -> dict[int, str]:
-    """Return the cards of a collocation deck with `terms` terms, by their new numbers.
-
-    The deck is our conjecture: section V.2 of the thesis uses three and five terms in Case 6, but
-    prints no cards. Collocation points are at k/(terms + 1) of the step.
-    """
+    """Return by number the cards of our conjectural collocation deck with `terms` terms."""
     text = [card.text for card in deck("four-term").cards.values()]
     terms_range = range(1, terms + 1)
     end = f"T{terms + 1}"

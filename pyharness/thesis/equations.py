@@ -57,11 +57,7 @@ def all_finite(values: Vector) -> bool:
 
 
 def trajectory_of(rows: NDArray[np.float64], **others: Any) -> Trajectory:
-    """Return a trajectory from its rows.
-
-    Their columns are the true time (s), the program's variable TIME (s), omega (rad/s) and velocity
-    (m/s).
-    """
+    """Return a trajectory from rows of true time (s), TIME, omega (rad/s) and velocity (m/s)."""
     return Trajectory(rows[:, 0], rows[:, 1], rows[:, 2:5], rows[:, 5:], len(rows), **others)
 
 
@@ -83,14 +79,12 @@ class Record:
     def trajectory(
         self, ended: str = "complete", stop: Stop | None = None, prints_ier: bool = True
     ) -> Trajectory:
-        """Return the trajectory of all rows, with the solver's IER if `prints_ier`.
-
-        A step that overflows has no row, but its evaluations count.
-        """
+        """Return the trajectory of all rows, with the solver's IER if `prints_ier`."""
         given = np.array(self._rows).reshape(-1, 8)
         rows = given.astype(np.float64)
         return trajectory_of(
             rows,
+            # A step that overflows has no row, but its evaluations count.
             evaluations=self._per_step * (len(rows) + (ended == "overflow")),
             ended=ended,
             stop=stop,

@@ -35,9 +35,9 @@ _BITS = {24: 32, 53: 64, 113: 128}
 def run(
     scene: Scene, listing: Listing, word: Word, lipschitz: float = 500.0, may_stop: bool = True
 ) -> Trajectory:
-    """Run the Python port of a listing in the arithmetic `word`, without checks of the arguments.
+    """Run a listing's Python port in the arithmetic `word`, without checks.
 
-    The results are rounded to floats; `exact` has them unrounded.
+    Results are floats; the trajectory's `exact` has them unrounded.
     """
     twin = importlib.import_module(f"pyharness.thesis.{listing.program.replace('-', '_')}")
     found: Trajectory = twin.run(scene_in(scene, word), listing, lipschitz, may_stop)
@@ -71,10 +71,9 @@ def scene_in(scene: Scene, word: Word) -> Scene:
 def run_compiled(
     scene: Scene, listing: Listing, word: Word, lipschitz: float = 500.0, may_stop: bool = True
 ) -> Trajectory:
-    """Run a listing's compiled program in the arithmetic `word`, with the same result as `run`.
+    """Run a compiled program in the arithmetic `word`, with the same result as `run`.
 
-    Raise InputError if the compiler lacks this arithmetic, or an angle in the torque is too large
-    for its sine.
+    Raise InputError if the compiler lacks this arithmetic.
     """
     if word.p > 53:
         _check_angles(scene)

@@ -9,10 +9,7 @@ SINGULAR = 129
 def leqt1f(
     matrix: list[list[float]], right_hand_sides: list[list[float]]
 ) -> tuple[list[list[float]], int]:
-    """Return the solution of A x = b for each right-hand side b, and the error code IER.
-
-    If A is singular within rounding, IER is 129 and each b is returned unsolved; else IER is 0.
-    """
+    """Return the solutions of A x = b, and the error code IER: 129 if A is singular, else 0."""
     factors = [list(row) for row in matrix]
     pivots = _factor(factors)
     if pivots is None:

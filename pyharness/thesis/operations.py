@@ -28,13 +28,10 @@ ALIKE = dict.fromkeys(_OPERATIONS, 1)
 
 
 class Count(NamedTuple):
-    """The number, or total time, of arithmetic operations in a step.
+    """The number, or total time, of arithmetic operations in a step."""
 
-    `written` counts every operation on the cards; `once` counts repeated ones once.
-    """
-
-    written: int
-    once: int
+    written: int  # every operation on the cards
+    once: int  # repeated operations count once
 
 
 class _Counter:
@@ -86,10 +83,7 @@ class _Array(defaultdict[tuple[int, ...], Any]):
 
 
 def operations_per_step(listing: Listing, times: Mapping[str, int] = ALIKE) -> Count:
-    """Return the operations in a listing's first step, for the data on the published cards.
-
-    `times` has each operation's weight, such as its time.
-    """
+    """Return the operations in a listing's first step; `times` weights each kind of operation."""
     statements = statements_of(deck_text(listing).splitlines())
     begin = next(n for n, (_, text) in enumerate(statements) if _DO.match(text))
     label = _DO.match(statements[begin][1])

@@ -29,11 +29,7 @@ _PLACES = re.compile(r"F\d+\.(\d+)")
 
 
 def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
-    """Return the text that `program` prints for its run.
-
-    The moments and torques of `scene`, which must have moments, precede a line for each step. The
-    last step may have failed the stop test. Lines have no trailing blanks.
-    """
+    """Return the text that `program` prints for its run; `scene` must have moments."""
     formats = formats_of(program)
     assert scene.moments is not None
     pairs = zip(scene.moments, card_torque(scene) or scene.law.constant, strict=True)
@@ -89,17 +85,13 @@ def _writer(text: str) -> Any:
 
 
 TAPE5 = np.dtype([("head", "<i4"), ("items", "<f8", (7,)), ("tail", "<i4")])
-"""The data type of a record of TAPE5."""
+"""A record of TAPE5: its length in bytes, seven numbers, and the length again."""
 
 
 def tape5(trajectory: Trajectory) -> bytes:
-    """Return the bytes of the file TAPE5 for a trajectory with translational velocity.
-
-    Each WRITE(5)TIME,U1,U2,U3,V1,V2,V3 makes a record: its length in bytes, seven binary64 numbers,
-    and the length again, all little-endian, as with today's compilers and `scipy.io.FortranFile`.
-    The author's tape had other record marks and, we infer, 60-bit words.
-    """
+    """Return the bytes of TAPE5 for a trajectory with velocity, in records of today's compilers."""
     assert trajectory.velocity is not None
+    # The author's tape had other record marks and, we infer, 60-bit words.
     result = np.empty(len(trajectory.time), dtype=TAPE5)
     result["head"] = result["tail"] = TAPE5["items"].itemsize
     result["items"][:, 0] = trajectory.recorded_time

@@ -20,15 +20,11 @@ WORD_NAMES = (*COMPILED_WORDS, "cdc48", "cdc48-rounded")
 
 @dataclass(frozen=True)
 class Program:
-    """One of the three programs of the appendix.
-
-    With step size h, the corrected version has a global error of O(h**order). `source` is where the
-    thesis describes the program.
-    """
+    """One of the three programs of the appendix."""
 
     name: str
-    order: int
-    source: str
+    order: int  # of the corrected version's global error
+    source: str  # where the thesis describes the program
 
     def run(
         self,

@@ -101,12 +101,9 @@ def run(
 def lipschitz_test(
     listing: Listing, change_k: Vector, change_u: Vector, lipschitz: float
 ) -> tuple[str, float] | None:
-    """Return a variable that violates eq. 19, and its quotient of changes (1/s), or None.
+    """Return a variable that violates eq. 19, and its quotient (1/s), or None.
 
-    `change_k` and `change_u` are absolute changes of the six right-hand sides and unknowns in a
-    step. Norms or, with the defect `lipschitz-per-component`, components are compared. The velocity
-    counts only with the defect `lipschitz-tests-velocity`. The quotient is infinite if the unknown
-    does not change.
+    `change_k` belongs to right-hand sides, `change_u` to unknowns.
     """
     velocity_counts = listing.has("lipschitz-tests-velocity")
     last = 6 if velocity_counts else 3

@@ -5,8 +5,7 @@ negative number are complemented. The exponent is the field minus 2000 (octal), 
 field is below 2000.
 
 The test vectors in `data/words/cdc.json` follow from the CYBER 170 hardware reference, CDC
-60463560; a public emulator agrees. A file of vectors is a JSON object with `schema` and `vectors`,
-each with `name`, `op` (an instruction of `operated`), and `x`, `y` and `result` in octal.
+60463560; a public emulator agrees.
 """
 
 import json
@@ -87,10 +86,9 @@ def _answer(where: str, entry: Any) -> Answer:
 
 
 def from_octal(text: str) -> Pair:
-    """Return the pair (m, e) of the number m 2**e in a CDC word of 20 octal digits.
+    """Return (m, e) of the number m 2**e in a CDC word of 20 octal digits.
 
-    For zero (all bits 0 or all 1), infinity and nan, m is 0 and e is the value as a float. The
-    coefficient must be normalised.
+    The coefficient must be normalised.
     """
     digits = "".join(text.split()) if isinstance(text, str) else ""
     if not _WORD.fullmatch(digits):
@@ -124,10 +122,9 @@ def to_octal(number: Pair) -> str:
 
 
 def operated(name: str, x: str, y: str) -> str:
-    """Return the result of a CDC instruction on the words `x` and `y`, all in octal.
+    """Return the result of a CDC instruction on two operands, in octal.
 
-    `name` is FX (truncating) or RX (rounding) with +, -, * or /. A sum or difference is normalised
-    only if NX follows, as in ``RX+ NX``.
+    Sums are normalised only with NX, as in ``RX+ NX``.
     """
     if name not in _INSTRUCTIONS:
         raise unknown("instruction", name, _INSTRUCTIONS)

@@ -1,11 +1,10 @@
 """Floating-point formats of p bits with a rounding rule (words), for runs of the Python ports.
 
-A number has the operators of a float. The other operand may be an integer, a number of the same
-format, or a float, converted from its shortest decimal representation, like a literal.
+A number has the operators of a float. A float operand is converted from its shortest decimal
+representation, like a literal.
 
 Arithmetic functions take integers m, e for a number m 2**e; m has p bits, fewer if subnormal. In
-results, m may be 0; then e is the value as a float: 0.0, -0.0, inf, -inf or nan. No library has the
-CDC's rules.
+results, m may be 0; then e is the value as a float: 0.0, -0.0, inf, -inf or nan.
 """
 
 import math
@@ -17,6 +16,7 @@ from typing import Any, ClassVar, NamedTuple
 
 from pyharness.model.errors import InputError, unknown
 
+# To nearest, ties to even; towards zero; the CDC's, truncating and rounding.
 RULES = ("nearest-even", "chop", "FX", "RX")
 # Additional bits of a sine or cosine before rounding.
 _GUARD_BITS = 40
@@ -28,27 +28,19 @@ _LEAST, _MOST = -1023, 1022
 
 
 class Rules(NamedTuple):
-    """The arithmetic of a format, as functions of integers m and e.
+    """The arithmetic of a format, as functions of integers m and e."""
 
-    `nearest` (ties to even) rounds square roots, sines, cosines and literals; `cut` (towards zero)
-    rounds literals if the format truncates them. `difference` serves only tests of equality.
-    """
-
-    nearest: Rounding
-    cut: Rounding
+    nearest: Rounding  # ties to even; for square roots, sines, cosines and literals
+    cut: Rounding  # towards zero; for literals if the format truncates them
     add: Operation
     multiply: Operation
     divide: Operation
-    difference: Operation
+    difference: Operation  # only for tests of equality
     signed_zero: bool
 
 
 def rounding(p: int, least: int, most: int, cut: bool, gradual: bool) -> Rounding:
-    """Return a function that rounds m 2**e to a p-bit integer times 2**k, `least` <= k <= `most`.
-
-    Rounding is towards zero if `cut`, else to nearest, ties to even. A result above the range is
-    infinite; one below it is zero or, if `gradual`, a multiple of 2**`least` as in IEEE 754.
-    """
+    """Return a function that rounds m 2**e to a p-bit integer times 2**k, k `least` to `most`."""
     shortened = _cut if cut else _to_even
 
     def rounded(m: int, e: int) -> Pair:
@@ -70,6 +62,7 @@ def rounding(p: int, least: int, most: int, cut: bool, gradual: bool) -> Roundin
     def small(m: int, e: int) -> Pair:
         if not gradual:
             return 0, 0.0
+        # A multiple of 2**least, as the subnormal numbers of IEEE 754.
         short = shortened(m, least - e) if e < least else m << (e - least)
         return (short, least) if short else (0, math.copysign(0.0, m))
 
@@ -87,9 +80,9 @@ def _to_even(m: int, shift: int) -> int:
 def ieee(p: int, largest: int, cut: bool) -> Rules:
     """Return the rules of IEEE 754 for p-bit coefficients and numbers below 2**(largest + 1).
 
-    If `cut`, sums, products and quotients are truncated towards zero; too large results are then
-    infinite, though IEEE 754 requires the largest number.
+    If `cut`, operations truncate towards zero.
     """
+    # Too large truncated results are infinite, though IEEE 754 requires the largest number.
     least, most = 2 - largest - p, largest - p + 1
     fit = rounding(p, least, most, cut, gradual=True)
 
@@ -116,16 +109,11 @@ def ieee(p: int, largest: int, cut: bool) -> Rules:
 
 
 def cdc(p: int, rounds: bool) -> Rules:
-    """Return the arithmetic of the CDC 6600 and CYBER 70 for p-bit coefficients.
+    """Return the arithmetic of CDC 6600 and CYBER 70 for p-bit coefficients.
 
-    The source is the CYBER 170 hardware reference, CDC 60463560. A number is an integer coefficient
-    of p = 48 bits and an exponent. Without `rounds`, the instructions FX (octal 30, 31, 40 and 44)
-    truncate sums, differences, products and quotients; else RX (34, 35, 41 and 45) round them. Sums
-    have no guard bit: bits below the unit of the larger operand are truncated before NX (24)
-    normalises a sum.
-
-    Literals are rounded to nearest, an assumption: no source states the rule of CDC's FTN.
+    `rounds` selects rounding instructions (RX), not truncating ones (FX).
     """
+    # By the CYBER 170 hardware reference, CDC 60463560.
     settled = rounding(p, _LEAST, _MOST, cut=True, gradual=False)
     quarter = 1 << p - 2 if rounds else 0
     third = (1 << p) // 3 if rounds else 0
@@ -140,25 +128,25 @@ def cdc(p: int, rounds: bool) -> Rules:
 
     def add(rounds: bool, xm: int, xe: int, ym: int, ye: int) -> Pair:
         frame, e = framed(p, rounds, xm, xe, ym, ye)
+        # There is no guard bit: bits below the unit of the larger operand are truncated.
         return settled(_cut(frame, p), e)
 
+    # For literals, an assumption: no source states the rule of CDC's FTN.
     nearest = rounding(p, _LEAST, _MOST, cut=False, gradual=False)
     total, plain = partial(add, rounds), partial(add, False)
     return Rules(nearest, settled, total, multiply, divide, plain, signed_zero=False)
 
 
 def framed(p: int, rounds: bool, xm: int, xe: int, ym: int, ye: int) -> tuple[int, int]:
-    """Return the sum of xm 2**xe and ym 2**ye before normalisation, as a pair (frame, e).
+    """Return (frame, e) of a CDC sum before normalisation, as frame 2**(e - p).
 
-    The frame, a register of 2 p bits, is in units of 2**(e - p), where e is the larger exponent.
-    The operand with the smaller exponent is shifted and truncated. If `rounds`, RX first adds half
-    a unit in the last place to each operand.
+    The frame has 2 p bits.
     """
     if xe <= ye:
         xm, xe, ym, ye = ym, ye, xm, xe
     apart = xe - ye
     large, small = abs(xm) << p, abs(ym) << p >> apart
-    if rounds:
+    if rounds:  # RX first adds half a unit in the last place to each operand
         half = 1 << p - 1
         large += half
         small += half >> apart
@@ -195,8 +183,7 @@ def _comparison(compare: Callable[[float, float], bool]) -> Callable[["Number", 
 class Number:
     """A number of a floating-point format, the integer `m` times 2**`e`.
 
-    If `m` is 0, `e` is the value as a float. `Word` makes a subclass for each format. Operators
-    round; x/0 is infinite, 0/0 is nan.
+    If `m` is 0, `e` is the value as a float.
     """
 
     __slots__ = ("e", "m")
@@ -321,12 +308,9 @@ class Number:
 
 
 class Word:
-    """A floating-point format of p bits with a rounding rule, and its arithmetic.
+    """A floating-point format of p bits with a rounding rule.
 
-    `rule` is "nearest-even", "chop" (towards zero), or the CDC's "FX" (truncating) or "RX"
-    (rounding). Except for FX and RX, numbers are below 2**(largest + 1), and the smallest exponent
-    is that of IEEE 754. By default `largest` is that of binary64 if p is at most 53, else of
-    binary128. `cut_literals` truncates converted values towards zero. p is at least 4.
+    IEEE formats have numbers below 2**(largest + 1); `cut_literals` truncates converted values.
     """
 
     def __init__(
@@ -344,6 +328,7 @@ class Word:
         if rule in ("FX", "RX"):
             rules = cdc(p, rounds=rule == "RX")
         else:
+            # By default the largest exponent of binary64 or binary128.
             exponent = largest or (1023 if p <= 53 else 16383)
             rules = ieee(p, exponent, cut=rule == "chop")
         self.rules = rules
@@ -356,10 +341,7 @@ class Word:
         return f"Word({self.p}, {self.rule!r})"
 
     def __call__(self, value: Any) -> Number:
-        """Return a float, integer, fraction, decimal text or `Number` as a number of this format.
-
-        Raise TypeError for any other type or format.
-        """
+        """Return a float, integer, fraction or decimal text as a number of this format."""
         if isinstance(value, Number) and value.word is self:
             return value
         if isinstance(value, float):

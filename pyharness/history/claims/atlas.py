@@ -45,20 +45,15 @@ _OMEGA = tuple(Column(f"omega{k}", digits(".3g"), unit="rad/s") for k in (1, 2, 
 
 @dataclass(frozen=True, eq=False)
 class Atlas:
-    """The verdict codes of claims over a grid.
+    """The verdict codes of claims over readings, numbers of steps and initial omegas."""
 
-    The axes of `codes` are reading, number of steps, magnitude of omega(0) (rad/s), height (omega3
-    over the magnitude) and longitude (rad). `first` has scenes of the first reading and number of
-    steps.
-    """
-
-    codes: Mapping[str, Codes]
+    codes: Mapping[str, Codes]  # by claim; axes: reading, steps, magnitude, height, longitude
     readings: Sequence[str]
     steps: Sequence[int]
-    first: Batch
-    magnitudes: Array
-    heights: Array
-    longitudes: Array
+    first: Batch  # scenes of the first reading and number of steps
+    magnitudes: Array  # of omega(0), rad/s
+    heights: Array  # omega3 over the magnitude
+    longitudes: Array  # rad
 
     def score(self, reading: int = 0, steps: int = 0) -> Array:
         """Return the points of each initial omega, for indices of reading and number of steps."""

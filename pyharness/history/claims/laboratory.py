@@ -23,35 +23,23 @@ from pyharness.truth.reference import Reference, reference
 
 @dataclass(frozen=True)
 class Assumptions:
-    """One value for each choice that the thesis leaves open.
+    """One value for each choice that the thesis leaves open."""
 
-    `start` is omega(0) (rad/s) in the cases for which the thesis gives none; None selects the
-    values in `cases.toml`. `readings` are alternatives to those that we adopt. `conjectures` are by
-    default those of the original listing. `word` is the arithmetic.
-    """
-
+    # omega(0) (rad/s) in the cases for which the thesis gives none; None: our values in cases.toml.
     start: Triple | None = None
-    readings: frozenset[str] = frozenset()
+    readings: frozenset[str] = frozenset()  # alternatives to those that we adopt
     steps: int = 100
-    conjectures: frozenset[str] | None = None
-    word: str = BINARY64
+    conjectures: frozenset[str] | None = None  # None: those of the original listing
+    word: str = BINARY64  # arithmetic
 
 
 @dataclass(frozen=True)
 class Laboratory:
-    """The three programs, original or corrected, run on the cases under assumptions.
-
-    `parts` divides the step size of a run; `runs` and `error` have results only at the undivided
-    steps. `may_stop` switches the Runge-Kutta program's stop test. Original programs lack the
-    defects in `fixed`. Errors are differences from the reference solution.
-
-    The collocation model (`models`) has n points at k DT/(n+1) in the step, k = 1 ... n. In the
-    original programs DT grows by the step size in every step; the torque must then be constant.
-    """
+    """The three programs, run on the cases of Table 1; `parts` divides a run's step size."""
 
     is_original: bool
     assumptions: Assumptions = field(default_factory=Assumptions)
-    fixed: frozenset[str] = frozenset()
+    fixed: frozenset[str] = frozenset()  # defects that the original programs lack
 
     def listing(self, program: str) -> Listing:
         if not self.is_original:
@@ -82,7 +70,7 @@ class Laboratory:
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
         run = self.run(program, case, may_stop, parts)
-        reached = run.omega[parts - 1 :: parts]
+        reached = run.omega[parts - 1 :: parts]  # only the undivided steps
         omega = np.full((self.assumptions.steps, 3), np.nan)
         omega[: len(reached)] = reached
         complete, overflow = (np.bool_(run.ended == each) for each in ("complete", "overflow"))
@@ -97,12 +85,15 @@ class Laboratory:
         return float(largest_error(self, program, case, may_stop, parts))
 
     def models(self, case: int, terms: int) -> Array:
-        """Return omega (rad/s) of the collocation model with `terms` terms, shape (steps, 3)."""
+        """Return omega (rad/s) by collocation at `terms` evenly spaced points, shape (steps, 3).
+
+        For original programs, the torque must be constant.
+        """
         accumulates = self.is_original and "dt-accumulates" not in self.fixed
         return _model(self.scene(case), terms, accumulates, self.assumptions.word)
 
     def required_constant(self, case: int) -> float:
-        """Return the least Lipschitz constant (1/s) that does not stop a case, or infinity."""
+        """Return the least Lipschitz constant (1/s) with which a run does not stop, or infinity."""
         scene, listing = self.scene(case), self.listing("runge-kutta")
         constant = 0.0
         for _ in range(6 * scene.steps):
@@ -158,6 +149,7 @@ def _model(scene: Scene, terms: int, accumulates: bool, word: str) -> Array:
     state = list(scene.omega)
     rows = []
     for step in range(scene.steps):
+        # In the original programs, DT grows by the step size in every step.
         dt = h * (step + 1) if accumulates else h
         points = [dt * k / (terms + 1) for k in range(1, terms + 1)]
         begin = step * h
@@ -183,11 +175,9 @@ LITERALS = ("DT=", "T=", "DT+")
 def by_literals(
     scenes: tuple[Scene, ...], terms: int, changed: frozenset[str], parts: int
 ) -> Array:
-    """Return omega (rad/s) of an original collocation program with changed step sizes.
+    """Return an original collocation program's omega (rad/s), shape (scenes, steps, 3).
 
-    The literals in `changed`, elements of `LITERALS`, are divided by `parts`. The torque must be
-    constant. The result, shape (scenes, steps, 3), is at the undivided steps, and not finite after
-    an overflow.
+    `parts` divides the literals in `changed`; the torque must be constant.
     """
     h, steps = scenes[0].step_size, scenes[0].steps
     dt, end, growth = (h / parts if name in changed else h for name in LITERALS)
@@ -195,7 +185,7 @@ def by_literals(
     bodies = np.array([each.euler_coefficients for each in scenes])
     torque = np.array([each.normalized_torque(0.0) for each in scenes])
     rows = integrate_models(omega, bodies, torque, terms, dt, end, growth, round(steps * h / end))
-    every = round(h / end)
+    every = round(h / end)  # to return only the undivided steps
     return rows[:, every - 1 :: every]
 
 
@@ -203,12 +193,9 @@ def integrate_models(
     omega: Array, coefficients: Array, torque: Array, terms: int,
     dt: float, end: float, growth: float, steps: int,
 ) -> Array:  # fmt: skip
-    """Return omega (rad/s) of the collocation model for n bodies at once, shape (n, steps, 3).
+    """Return omega (rad/s) of n bodies by collocation, shape (n, steps, 3).
 
-    `omega` (rad/s) has the shape (n, 3); the last axis of `coefficients` is A, B and C. `torque` is
-    constant, over the moments (rad/s2). The points divide (0, dt) evenly; `dt` (s) grows by
-    `growth` (s) in every step of length `end` (s). Results equal the programs' except for rounding,
-    and are not finite after an overflow.
+    `torque` is over moments (rad/s2), and times are in s.
     """
     a, b, c = coefficients.T
 
@@ -224,6 +211,7 @@ def integrate_models(
     with np.errstate(all="ignore"):
         for step in range(steps):
             first = rates(state)
+            # The points divide (0, dt) evenly; the step has the length `end`.
             points = dt * inside
             at_points = np.array([rates(state + t * first) for t in points])
             matrix = powers * points[:, None] ** (powers - 1)

@@ -32,10 +32,7 @@ class Survival:
 
 @dataclass(frozen=True)
 class Judgement:
-    """The verdicts on a claim, from runs of the original and of the corrected program.
-
-    `survivals` has the verdicts with one assumption changed at a time.
-    """
+    """The verdicts on a claim, from runs of the original and of the corrected programs."""
 
     claim: dict[str, Any]
     original: Judged
@@ -45,15 +42,12 @@ class Judgement:
 
 @dataclass(frozen=True)
 class Assignment:
-    """An initial omega (rad/s) for a case without one in the thesis, with verdicts by claim.
-
-    It `holds` if the original programs reproduce, at least in part, all claims about this case
-    whose verdicts depend on it.
-    """
+    """An initial omega for a case without one in the thesis, with verdicts by claim."""
 
     case: int
-    start: Triple
+    start: Triple  # rad/s
     verdicts: dict[str, str]
+    # Whether the claims whose verdicts depend on `start` are reproduced, at least in part.
     holds: bool
 
 

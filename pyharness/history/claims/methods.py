@@ -27,10 +27,7 @@ _OTHERS = WEIGHTINGS[1:]
 
 
 def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Judged:
-    """Judge whether collocation is superior to Runge-Kutta.
-
-    Errors are compared over the steps that all programs ran. Cases in `shown` are only reported.
-    """
+    """Judge whether collocation is superior to Runge-Kutta; cases in `shown` are only reported."""
     numbers, wins = {}, 0
     for case in (*cases, *shown):
         runs = [lab.run(program, case) for program in PROGRAMS]
@@ -45,11 +42,9 @@ def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Jud
 
 
 def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Judge whether eq. 19 of the thesis, the Lipschitz condition, ends unbounded runs.
+    """Judge whether the stop test applies eq. 19, the Lipschitz condition.
 
-    The quotient in eq. 19 is the change of a derivative over the change of its variable. For the
-    differential equations, it is at most the largest norm of the Jacobian matrix. The stop test
-    applies eq. 19 only if its quotients do not exceed this norm along reference solution and run.
+    No quotient may exceed the largest norm of the Jacobian.
     """
     numbers: dict[str, float] = {}
     for case in cases:
@@ -57,6 +52,7 @@ def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
         run = lab.run("runge-kutta", case)
         points = np.vstack([lab.truth(case).omega, run.omega])
         matrices = ([[0, a * z, a * y], [b * z, 0, b * x], [c * y, c * x, 0]] for x, y, z in points)
+        # For the differential equations, no quotient of eq. 19 exceeds this norm.
         norm = max(float(np.linalg.norm(matrix, 2)) for matrix in matrices)
         if lab.listing("runge-kutta").has("lipschitz-tests-velocity"):
             # The equations of V are bilinear in V and omega; these are the norms of their
@@ -91,10 +87,9 @@ def larger_constant(lab: Laboratory, cases: Sequence[int]) -> Judged:
 
 
 def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
-    """Judge whether the stop test ends all unbounded runs, and no other runs.
+    """Judge whether the stop test ends all unbounded runs, and no others.
 
-    Without the test, an unbounded run overflows or exceeds `bounded` times the largest reference
-    omega.
+    Unbounded runs exceed `bounded` times the largest reference omega.
     """
     alarms = unbounded = caught = 0
     for case in cases:
@@ -123,9 +118,7 @@ def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
 def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
     """Judge whether collocation improves if the step size is divided by ten.
 
-    The two-term program must not improve in case `exception`. For the original programs, the
-    numbers count the cases of constant torque that improve if only some of the cards with the step
-    size change.
+    The two-term program must not improve in case `exception`.
     """
     found = judged(rules.small_step(lab, cases, exception))
     if lab.is_original:
@@ -154,15 +147,15 @@ def _by_literals(lab: Laboratory, cases: Sequence[int]) -> dict[str, float]:
 def suffices(
     lab: Laboratory, cases: Sequence[int], terms: Sequence[int], share: float, enough: int
 ) -> Judged:
-    """Judge whether three- or four-term collocation is "probably sufficient for most problems".
+    """Judge whether three or four terms suffice for most problems.
 
-    In `enough` cases, the errors of both must be at most `share` of the largest omega. For original
-    programs, the three-term model is omitted if the torque varies.
+    Errors must not exceed `share` of the largest omega in `enough` cases.
     """
     numbers, good = {}, 0
     for case in cases:
         truth = lab.truth(case)
         errors = [lab.error("four-term", case)]
+        # The three-term model of an original program needs a constant torque.
         if not (lab.is_original and lab.scene(case).torque.varies):
             errors.append(distance(lab.models(case, terms[0]), truth.omega))
         error = max(errors) / largest(truth)
@@ -177,8 +170,7 @@ def execution_time(
 ) -> Judged:
     """Judge whether collocation takes about twice the time of Runge-Kutta.
 
-    The operations in a step, on the cards and in our LEQT1F, are weighted by `unit_times`. They are
-    counted as written, and with each repeated term once.
+    `unit_times` weights operations; `low` and `high` limit the ratio of times.
     """
     listings = {program: lab.listing(program) for program in PROGRAMS}
     counts = {name: operations_per_step(each) for name, each in listings.items()}
@@ -208,8 +200,7 @@ def seconds(lab: Laboratory) -> Judged:
 def complexity(lab: Laboratory, factors: Sequence[float]) -> Judged:
     """Judge whether the three programs have about the same number of cards.
 
-    The verdict is "undecided" if it depends on the threshold in `factors`, or on counting our
-    LEQT1F.
+    `factors` are alternative limits on the ratio to Runge-Kutta's number.
     """
     cards = {each: deck_text(lab.listing(each)).count("\n") for each in PROGRAMS}
     numbers = {f"{program}: cards": float(n) for program, n in cards.items()}
@@ -249,13 +240,12 @@ def computer_error(
 ) -> Judged:
     """Judge whether rounding error makes the weightings other than collocation fail.
 
-    Rounding error (rad/s) is measured with decreasing steps in Case 1, where it is the only error.
-    Another measure is the difference of the methods of section IV.2 between binary64 and the
-    arithmetics `words`.
+    The claim holds if a rounding error (rad/s) reaches `limit`.
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
     numbers = {}
+    # In Case 1, rounding error is the only error.
     for parts in (1, 10, 100):
         scene = lab.scene(1, parts)
         for weighting in _OTHERS:
@@ -304,10 +294,7 @@ def all_succeed(
 
 
 def predict_correct(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Return "not testable" for the predict-correct technique, which the thesis only recommends.
-
-    The numbers compare the corrected programs with collocation that makes one correction.
-    """
+    """Return "not testable" for the predict-correct technique, which the thesis only recommends."""
     best = Laboratory(False, lab.assumptions)
     numbers = {}
     for case in cases:

@@ -33,8 +33,7 @@ _EFFORT = 1e9  # so large that there is no limit; a sweep reports its expected t
 class Starts:
     """Runs for `rules` from n initial omegas `omega0` (rad/s), shape (n, 3).
 
-    The reference solution is a Taylor series of relative tolerance 1e-12. Arrays have the shape (n,
-    steps, 3), or (steps, 3) in cases for which the thesis gives omega(0).
+    Results have no axis n where the thesis gives omega(0).
     """
 
     def __init__(self, one: Laboratory, omega0: Array) -> None:
@@ -91,10 +90,7 @@ JUDGED = tuple(entry["id"] for entry in claims() if entry["test"] in vars(rules)
 
 
 def codes(identity: str, batch: Batch) -> NDArray[np.int8]:
-    """Return the verdict codes of a claim for the scenes of a batch, shape (n,).
-
-    All are SILENT if the claims do not apply to the sweep.
-    """
+    """Return a claim's verdict codes for a batch, shape (n,); all SILENT if no claim applies."""
     bench = _bench(batch)
     if bench is None:
         return np.full(len(batch.omega0), SILENT, np.int8)

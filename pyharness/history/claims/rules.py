@@ -2,8 +2,8 @@
 
 A bench supplies runs and solutions: a `Laboratory` for one start, `Starts` for n starts. `parts`
 divides the step size; rows are at the undivided steps. Arrays of omega have the shape (steps, 3) or
-(n, steps, 3); values of a `Grade` have the shape () or (n,). A claim's `rule` in `data/claims.toml`
-says when it holds, and when in part.
+(n, steps, 3); values of a `Grade` have the shape () or (n,). `data/claims.toml` has each `rule` in
+words.
 
 An error is the largest deviation of any omega component from the reference solution, over the
 completed steps.
@@ -61,8 +61,7 @@ def no_deviation(bench: Bench, case: int, limit: float) -> Grade:
 def concur(bench: Bench, case: int, share: float) -> Grade:
     """Test whether the two-term and the four-term program agree in a case.
 
-    Omegas may differ by `share` times the largest omega and, in each component, by a tenth of its
-    range. The first condition alone gives a grade in part.
+    Omegas may differ by `share` times the largest omega.
     """
     truth = bench.solution(case)
     two, four = (bench.runs(program, case) for program in COLLOCATION)
@@ -82,11 +81,7 @@ def concur(bench: Bench, case: int, share: float) -> Grade:
 
 
 def fails(bench: Bench, case: int, share: float) -> Grade:
-    """Test whether the Runge-Kutta program ends early and is wrong in a case.
-
-    Omega must deviate by over `share` of a component's range. Either condition alone gives a grade
-    in part.
-    """
+    """Test whether Runge-Kutta ends early with an error above `share` of a component's range."""
     runs = bench.runs("runge-kutta", case)
     error = share_of_range(runs.omega, bench.solution(case))
     ended, far = ~runs.complete, error > share
@@ -128,10 +123,9 @@ def dynamic(bench: Bench, case: int, factor: float) -> Grade:
 
 
 def small_step(bench: Bench, cases: Sequence[int], exception: int) -> Grade:
-    """Test whether a tenth of the step size improves collocation, except for one run.
+    """Test whether a tenth of the step size improves collocation.
 
-    The exception is the two-term program in case `exception`. In four fifths of the other runs,
-    errors must be finite and at least halve; half of them suffice for a grade in part.
+    The two-term program must not improve in case `exception`.
     """
     numbers, improved, excepted = {}, [], np.False_
     for program in COLLOCATION:

@@ -60,20 +60,15 @@ def power_of_ten(exponent: int) -> str:
 
 
 class Sentence(NamedTuple):
-    """A sentence of the thesis with its claims.
+    """A sentence of the thesis with its claims."""
 
-    `text` has formulas in LaTeX; `quote` is a few words of the sentence, `where` its place. `why`
-    explains a sentence without claims. `laboratory` names the run that shows the sentence best, as
-    in ``case=2&program=two-term``. `command` shows more than `claims --explain`.
-    """
-
-    where: str
-    quote: str
-    text: str
+    where: str  # place in the thesis
+    quote: str  # a few words of the sentence
+    text: str  # with formulas in LaTeX
     claims: tuple[str, ...] = ()
-    why: str = ""
-    laboratory: str = ""
-    command: str = ""
+    why: str = ""  # explanation of a sentence without claims
+    laboratory: str = ""  # the run that shows it best, as in case=2&program=two-term
+    command: str = ""  # command that shows more than `claims --explain`
 
 
 def sentences() -> tuple[Sentence, ...]:

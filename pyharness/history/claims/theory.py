@@ -45,10 +45,9 @@ def by_sources(lab: Laboratory, holds: bool) -> Judged:
 
 
 def hamilton_ordinary(lab: Laboratory, cases: list[int], limit: float) -> Judged:
-    """Judge whether Hamilton's equations of a rigid body are partial differential equations.
+    """Judge whether Hamilton's equations are partial differential equations.
 
-    The claim is false if six ordinary equations, in Euler angles and momenta, reproduce omega
-    within `limit`.
+    The claim is false if ordinary equations reproduce omega within `limit`.
     """
     from scipy.integrate import solve_ivp
 
@@ -102,8 +101,7 @@ def _hamilton(moments: Triple, state: Array) -> Array:
 def bounded_not_lipschitz(lab: Laboratory, decades: float, above: float) -> Judged:
     """Judge whether every bounded function satisfies a Lipschitz condition.
 
-    The claim is false if a quotient of the square root between x and 2 x exceeds `above`, for x
-    from .01 to 10**-decades.
+    The claim is false if a quotient of the square root exceeds `above`.
     """
     points = 10.0 ** -np.arange(2.0, decades + 1.0, 2.0)
     quotients = (np.sqrt(2.0 * points) - np.sqrt(points)) / points
@@ -122,10 +120,7 @@ def local_error(
 
 
 def same_as_taylor(lab: Laboratory, cases: list[int], within: float) -> Judged:
-    """Judge whether Runge-Kutta and the Taylor series up to h**4 are the same method.
-
-    The claim is reproduced in part if the results of one step differ by O(h**5).
-    """
+    """Judge whether Runge-Kutta and the Taylor series up to h**4 are the same method."""
     numbers, same, near = {}, True, True
     for case in cases:
         scene = lab.scene(case)
@@ -138,6 +133,7 @@ def same_as_taylor(lab: Laboratory, cases: list[int], within: float) -> Judged:
         numbers[f"case {case}: distance over the error of the series"] = apart / error
         numbers[f"case {case}: power of the step of the distance"] = power
         same &= apart <= 1e-14 * float(np.abs(truth).max())
+        # Reproduced in part if the results of one step differ by O(h**5).
         near &= abs(power - 5.0) <= within
     return graded(numbers, same, near)
 
@@ -176,8 +172,9 @@ def _taylor_step(scene: Scene, order: int) -> Array:
 def crandall_example(lab: Laboratory, best: list[str], rate: float) -> Judged:
     """Judge whether four weightings beat the Taylor series in Crandall's example.
 
-    The example is dx/dt = `rate` x, x(0) = 1 on (0, 1), with trial function 1 + c1 t + c2 t**2.
+    `best` names the two that must be most accurate.
     """
+    # The example is dx/dt = rate x, x(0) = 1 on (0, 1), with the trial function 1 + c1 t + c2 t**2.
     t, weight = np.polynomial.legendre.leggauss(12)
     t, weight = (t + 1.0) / 2.0, weight / 2.0
     # The residual is R = -rate + c1 r1 + c2 r2; the columns are for r1, r2 and rate.
@@ -219,11 +216,7 @@ def _weighted(t: Array, weight: Array, factors: Weights, rate: float, by: Weight
 
 
 def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judged:
-    """Judge whether the rates Q of eq. 32 of the thesis determine stability.
-
-    A relative perturbation of 1e-8 should grow at the rate Re Q (1/s) or, if Re Q is 0, remain
-    within ten times its initial size for ten periods.
-    """
+    """Judge whether perturbations of steady rotations grow at the rates Re Q (1/s) of eq. 32."""
     numbers, told = {}, True
     for case in cases:
         scene = lab.scene(case)
@@ -242,6 +235,7 @@ def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judge
                 numbers[f"{name}: growth over Re Q"] = measured
                 told &= abs(measured - 1.0) <= within
             else:
+                # Without growth, the perturbation may become ten times as large in ten periods.
                 largest_size = float(sizes.max() / np.linalg.norm(disturbance))
                 numbers[f"{name}: largest disturbance over the first"] = largest_size
                 told &= largest_size <= 10.0
@@ -249,13 +243,11 @@ def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judge
 
 
 def trial_form_solves(lab: Laboratory, cases: list[int], limit: float) -> Judged:
-    """Judge whether a trial solution of eq. 32 of the thesis solves some case exactly.
-
-    The trial solution is a steady rotation about axis 3 plus exponentials of time.
-    """
+    """Judge whether the trial solution of eq. 32 of the thesis solves some case exactly."""
     numbers = {}
     for case in cases:
         scene, truth = lab.scene(case), lab.truth(case)
+        # The trial solution is a steady rotation about axis 3 plus exponentials of time.
         steady = np.array([0.0, 0.0, scene.omega[2]])
         rates, amplitudes = np.linalg.eig(jacobians(scene, steady[None])[0])
         shares = np.linalg.solve(amplitudes, scene.omega - steady)

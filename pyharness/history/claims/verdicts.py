@@ -2,10 +2,7 @@
 
 Each function is the `test` of claims in `data/claims.toml`, where a claim's `rule` describes the
 decision, and `parameters` are the keyword arguments. `lab` runs the programs, original or
-corrected; `case` is a number of Table 1.
-
-Errors are defined in `rules`. The amplitude is half the largest range of a component of the
-reference omega. A claim that fails is "not reproduced" or, if the test passes `otherwise`, "false".
+corrected; `case` is a number of Table 1. Errors are defined in `rules`.
 """
 
 from dataclasses import dataclass, replace
@@ -65,10 +62,7 @@ def omega3_varies(lab: Laboratory, case: int, limit: float) -> Judged:
 
 
 def no_deviation(lab: Laboratory, case: int, limit: float) -> Judged:
-    """Judge whether all three programs coincide with the known solution of a case.
-
-    The numbers include the count of Runge-Kutta steps from each of `starts`.
-    """
+    """Judge whether all three programs coincide with the known solution of a case."""
     found = judged(rules.no_deviation(lab, case, limit))
     for start in starts():
         other = replace(lab, assumptions=replace(lab.assumptions, start=start))
@@ -103,6 +97,7 @@ def poor(lab: Laboratory, case: int, share: float) -> Judged:
 
 
 def _amplitude(lab: Laboratory, case: int) -> float:
+    # Half the largest range of a component of the reference omega.
     return float(rules.spread_of(lab.truth(case).omega).max()) / 2.0
 
 
@@ -118,11 +113,9 @@ def error_constant(lab: Laboratory, case: int) -> Judged:
 
 
 def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
-    """Judge whether the stop test ended the Runge-Kutta run at step `step`.
-
-    The numbers describe the subsets of defects with which the run stops there.
-    """
+    """Judge whether the stop test ended the Runge-Kutta run at step `step`."""
     stop = lab.run("runge-kutta", case).stop
+    # Subsets of defects with which the run also stops at `step`.
     name, readings = "runge-kutta", lab.listing("runge-kutta").readings
     every = [Listing(name, each, readings) for each in subsets(names_of("defect", name))]
     there = []
@@ -148,10 +141,7 @@ def growing(lab: Laboratory, case: int) -> Judged:
 
 
 def search(lab: Laboratory, case: int) -> Judged:
-    """Return "not testable" for the claim that the author searched Runge-Kutta for a fault.
-
-    The number is the Runge-Kutta error divided by that of the corrected program.
-    """
+    """Return "not testable" for the claim that the author searched Runge-Kutta for a fault."""
     run = lab.run("runge-kutta", case)
     best = Laboratory(False, lab.assumptions).run("runge-kutta", case)
     truth = lab.truth(case).omega[: run.steps]

@@ -36,7 +36,10 @@ def checked_path(where: str, path: object) -> str:
 
 
 def checked_file(where: str, path: object) -> str:
-    """Return `checked_path`; raise InputError for a text file's ending or an unwritable file."""
+    """Return the checked path of a file to write.
+
+    Raise InputError for a text file's ending or an unwritable file.
+    """
     name = checked_path(where, path)
     ending = os.path.splitext(name)[1].lower()
     if ending in _OTHERS:
@@ -72,9 +75,10 @@ def read_archive(
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return the arrays and the header of an archive; raise InputError if it is damaged.
 
-    `kinds` names the kind of content, first as in the header, then as in messages; `known` has the
-    allowed arrays; `written` describes a valid file in messages.
+    Only arrays named in `known` are allowed.
     """
+    # `kinds` names the kind of content, first as in the header, then as in messages, which describe
+    # a valid file by `written`.
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     content = read_input(name, where, memory // 4, written)
     damaged = InputError(f"{where}: no {kinds[1]}, or damaged; give {written}")

@@ -25,7 +25,7 @@ FROM_ZERO: Rule = (lambda x: x >= 0.0, "a number from 0")
 def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = None) -> Array:
     """Return a user's array, of `shape` or (n, *shape), as floats of shape (n, *shape).
 
-    A letter in `shape`, such as "k", means any length. `rule` checks each number.
+    A letter in `shape` means any length.
     """
     if type(values) is float and not shape and rule is None:
         return np.array([values])

@@ -28,10 +28,7 @@ def open_starts() -> dict[int, str]:
 
 
 def assumed(scene: Scene, listings: Iterable[Listing] = ()) -> list[dict[str, Any]]:
-    """Return the assumptions that a scene and its runs of `listings` (program versions) need.
-
-    Scenes outside the thesis, and values that a user changed, need none.
-    """
+    """Return the assumptions that a scene and its runs of `listings` (program versions) need."""
     among = list(listings)
     return [each for each in assumptions() if _is_made(each, scene, among)]
 

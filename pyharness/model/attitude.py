@@ -92,11 +92,7 @@ def quaternion_rates(omega: Iterable[Any], q: Iterable[Any]) -> list[Any]:
 
 
 def angles(attitude: Array, sequence: str) -> Array:
-    """Return n attitudes, (n, 4), as angles (degrees) of three successive rotations, (n, 3).
-
-    If the first and last axes are parallel, only the sum or difference of their angles is
-    determined, and the last angle is set to 0.
-    """
+    """Return n attitudes, (n, 4), as angles (degrees) of three successive rotations, (n, 3)."""
     q0, q1, q2, q3 = attitude.T
     if sequence == "3-1-3":
         tilt = 2.0 * np.arctan2(np.hypot(q1, q2), np.hypot(q0, q3))
@@ -107,6 +103,8 @@ def angles(attitude: Array, sequence: str) -> Array:
     (a, b), (c, d) = pairs
     total, rest = np.arctan2(b, a), np.arctan2(d, c)
     first, last = total + rest, total - rest
+    # If the first and last axes are parallel, only the sum or difference of their angles is
+    # determined.
     no_total, no_rest = np.hypot(a, b) <= _PARALLEL, np.hypot(c, d) <= _PARALLEL
     first = np.where(no_rest, 2.0 * total, np.where(no_total, 2.0 * rest, first))
     last = np.where(no_rest | no_total, 0.0, last)

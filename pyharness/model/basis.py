@@ -12,15 +12,11 @@ MARKS = {
 
 @dataclass(frozen=True)
 class Basis:
-    """The reason for a check's limit: proof, derivation or measurement.
+    """The reason for a check's limit: proof, derivation or measurement."""
 
-    `mark`, a key of `MARKS`, classifies the weakest part of the reason; `source`, in Markdown,
-    names a theorem, derivation or command.
-    """
-
-    mark: str
+    mark: str  # a key of `MARKS`, for the weakest part of the reason
     limit: str
-    source: str
+    source: str  # a theorem, derivation or command, in Markdown
 
     def __post_init__(self) -> None:
         if self.mark not in MARKS or not self.limit or not self.source:

@@ -71,10 +71,7 @@ def build() -> Build:
 
 
 def installation() -> dict[str, Any]:
-    """Return data on installation and machine for a bug report; unknown values are None.
-
-    "arithmetic" names the option or library that changes the kernels' arithmetic.
-    """
+    """Return data on installation and machine for a bug report; unknown values are None."""
     has_affinity = hasattr(os, "sched_getaffinity")
     return {
         "folder": os.path.dirname(os.path.dirname(os.path.abspath(__file__))),

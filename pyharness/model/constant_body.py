@@ -17,14 +17,14 @@ from pyharness.model.values import Matrix
 
 
 def integrated(scene: Scene) -> Scene:
-    """Return the scene about the axes for its integration.
+    """Return the scene about the axes of its integration.
 
-    These are the principal axes or, under a torque with switches, the body axes, because rounding
-    in a rotation might move the initial state off a switch's threshold.
+    These are principal axes or, under a torque with switches, body axes.
     """
     torque = scene.torque
     if scene.inertia is None or uses_principal_axes(scene):
         return principal(scene)[0]
+    # Rounding in a rotation might move the initial state off a switch's threshold.
     assert isinstance(torque, StateTorque)
     assert torque.tape is not None
     rates = _rates(torque.tape, torque.own, scene.inertia)
@@ -45,25 +45,21 @@ def _rates(tape: Tape, own: tuple[str, ...], inertia: Matrix) -> StateTorque:
 
 
 def rates_about_body_axes(inertia: Matrix, omega: Any, torque: Any) -> Any:
-    """Return omega' (rad/s2) for a full inertia matrix; vectors are arrays about the body axes.
-
-    Products are formed about principal axes; about the body axes, large terms would cancel.
-    """
+    """Return omega' (rad/s2) for a full inertia matrix; vectors are arrays about the body axes."""
     about, axes = principal(Scene("", (0.0, 0.0, 0.0), inertia=inertia))
     x, y, z = omega @ axes
+    # About the body axes, large terms would cancel.
     products = np.array(about.euler_coefficients) * np.array([y * z, z * x, x * y])
     return axes @ (products + torque @ axes / np.array(about.moments))
 
 
 def with_constant_body(scene: Scene) -> Scene:
-    """Return a scene of the same solution, with constant inertia and a torque about the body axes.
-
-    For a changing inertia I and torque N, its coefficients are 0, and its torque is omega' from I
-    omega' = N - I' omega - omega x (I omega).
-    """
+    """Return a scene of the same solution, with constant inertia and torque about the body axes."""
     changing, torque = scene.changing, scene.torque
     if changing is None:
         return replace(scene, torque=of_law(scene.law)) if torque.in_space else scene
+    # The coefficients become 0, and the torque omega' from I omega' = N - I' omega - omega x
+    # (I omega), with inertia I and torque N.
     if isinstance(torque, TorqueLaw):
         torque = of_law(torque)
     tape = torque.tape

@@ -52,13 +52,10 @@ _ROUNDED = 4.0  # units in the last place by which a time such as n*dt may excee
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """A function of time: polynomials on p intervals between ascending `edges` (s).
+    """A function of time with m components: polynomials on p intervals."""
 
-    `values`, (p, NODES, m), are its m components at the Chebyshev points of the intervals.
-    """
-
-    edges: Array
-    values: Array
+    edges: Array  # shape (p + 1,), s; the ends of the intervals, ascending
+    values: Array  # shape (p, NODES, m), at the Chebyshev points of the intervals
 
     def __call__(self, times: Array) -> Array:
         """Return the values at `times` (s), shape (n, m)."""
@@ -79,9 +76,9 @@ class Pieces:
 def sizes_of(largest: Array, n_own: int) -> Array:
     """Return the sizes, (..., m), relative to which errors of m unknowns are measured.
 
-    `largest` has the largest value of each unknown. The size is the largest of three values for
-    omega, 1 for the quaternion, and the value itself for each of the `n_own` own states.
+    `largest` has the unknowns' largest absolute values.
     """
+    # The size is 1 for the quaternion. The last `n_own` unknowns are own states.
     sizes = np.ones_like(largest)
     sizes[..., :3] = largest[..., :3].max(axis=-1, keepdims=True)
     own = largest.shape[-1] - n_own

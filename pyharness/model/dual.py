@@ -76,9 +76,9 @@ def with_derivatives(tape: Tape, slots: Sequence[int]) -> Tape:
 
 
 def with_parameters(tape: Tape, values: Sequence[float]) -> Tape:
-    """Return a tape of the outputs' derivatives with respect to parameters, then of the outputs.
+    """Return a tape of derivatives with respect to the last inputs, then of the outputs.
 
-    The parameters, the last inputs of `tape`, become the constants `values`.
+    The constants `values` replace these inputs.
     """
     count = len(values)
     most, n_inputs = _FEWER * MOST_OPERATIONS, tape.n_inputs - count
@@ -96,9 +96,9 @@ def of_duals(
     slope: Callable[[Any, Any], Any],
     symbolic: Callable[[Any], Any] | None = None,
 ) -> Callable[[Any], Any]:
-    """Return `function` for numbers and dual numbers; its derivative is ``slope(argument, value)``.
+    """Return `function` for numbers and dual numbers.
 
-    `symbolic`, if given, replaces `function` for the values of dual numbers.
+    The derivative is ``slope(argument, value)``; `symbolic` computes the values of dual numbers.
     """
 
     def called(x: Any) -> Any:

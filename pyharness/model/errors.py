@@ -112,9 +112,9 @@ def known(what: str, name: object, allowed: Iterable[str]) -> str:
 
 
 def unknown(what: str, name: object, allowed: Iterable[str], where: str = "") -> InputError:
-    """Return an InputError for a `name` that is not `allowed`; it suggests a similar name.
+    """Return an InputError for a `name` that is not `allowed`.
 
-    `what` is the kind of name, such as "case"; `where` begins the message.
+    `what` is the kind of name, such as "case".
     """
     import difflib
 

@@ -28,9 +28,9 @@ def determinant(elements: Sequence[Sequence[Sequence[float]]]) -> list[Fraction]
 
 
 def first_zeros(polynomial: Iterable[float | Fraction]) -> tuple[float, float]:
-    """Return a polynomial's zeros (s) nearest to time 0, before and after it.
+    """Return a polynomial's zeros (s) nearest before and after 0; -inf or inf if missing.
 
-    The polynomial must be above 0 at time 0. A missing zero is -inf or inf.
+    At 0, the polynomial must be positive.
     """
     exact = [Fraction(c) for c in polynomial]
     backward = [-c if n % 2 else c for n, c in enumerate(exact)]

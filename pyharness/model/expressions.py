@@ -59,12 +59,11 @@ _COMPARISONS: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
 def parsed(
     expressions: object, constants: object, rates: Mapping[str, object] = MappingProxyType({})
 ) -> StateTorque | TorqueLaw:
-    """Return the torque of three expressions about the body axes, as a TorqueLaw if possible.
+    """Return the torque of three expressions about the body axes, if possible as a TorqueLaw.
 
-    They may contain t (s), w1 to w3 (rad/s), the quaternion q0 to q3, pi, names in `constants`, and
-    own states (`Scene.states`) with the time derivatives `rates`. Units are N m, or rad/s2 for a
-    body with coefficients.
+    `rates` has the derivatives of `Scene.states`.
     """
+    # Units are N m, or rad/s2 for a body with coefficients.
     values = _checked_constants(constants)
     texts = _three_texts(expressions)
     for name, text in rates.items():

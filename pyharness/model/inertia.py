@@ -31,15 +31,11 @@ _MOST_ROTATIONS = 500  # about ten suffice, because the convergence is quadratic
 
 @dataclass(frozen=True, eq=False)
 class PrincipalFrame:
-    """Principal moments (kg m2) and axes, as floats and as fractions of 30 or more digits.
-
-    The columns of `axes` form a right-handed frame, each nearest to its body axis. `moments_low` is
-    `exact_moments` minus `moments`.
-    """
+    """Principal moments (kg m2) and axes, as floats and as fractions of 30 or more digits."""
 
     moments: Triple
-    moments_low: Triple
-    axes: Array
+    moments_low: Triple  # `exact_moments` minus `moments`
+    axes: Array  # columns of a right-handed frame, each nearest to its body axis
     exact_moments: Exact
     exact_axes: tuple[Exact, Exact, Exact]
 
@@ -124,10 +120,9 @@ def _round_off(value: Fraction, rounded: float) -> float:
 def diagonalised(
     matrix: tuple[tuple[float, float, float], ...],
 ) -> tuple[Exact, tuple[Exact, Exact, Exact]]:
-    """Return the eigenvalues and orthonormal eigenvectors by Jacobi's method in integers.
+    """Return eigenvalues and orthonormal eigenvectors of a symmetric matrix.
 
-    Relative errors of eigenvalues are at most 2**-100; zero eigenvalues are exact. For a diagonal
-    matrix, the eigenvalues are in the order of its elements.
+    Relative errors of eigenvalues are at most 2**-100; zero eigenvalues are exact.
     """
     exponent = min((_last_bit(x) for row in matrix for x in row if x), default=0)
     whole = [[int(Fraction(x) / Fraction(2) ** exponent) for x in row] for row in matrix]

@@ -27,14 +27,11 @@ _CONTINUOUS = 1e-9  # largest relative jump of an element that counts as roundin
 
 @dataclass(frozen=True)
 class InertiaFunction(Changing):
-    """An inertia that is a continuous function of time.
-
-    `tape` gives three moments, or nine matrix elements by rows. `written` has a scene file's
-    expressions and numbers, or the items of a table.
-    """
+    """An inertia that is a continuous function of time."""
 
     place: str
-    tape: Tape
+    tape: Tape  # of three moments, or of nine matrix elements by rows
+    # The expressions and numbers of a scene file, or the items of a table.
     written: tuple[Any, ...] = field(default=(), compare=False)
 
     def __repr__(self) -> str:
@@ -114,7 +111,7 @@ def _outputs(tape: Tape, time: Any) -> list[Any]:
 
 
 def inertia_function(place: str, function: Callable[[Any], Any]) -> InertiaFunction:
-    """Return the inertia, as moments or a matrix, that a user's function of time computes.
+    """Return the inertia that a user's function computes.
 
     The function must be recordable, continuous, and depend on time alone.
     """
@@ -158,9 +155,9 @@ def inertia_of_tables(
 
 
 def checked_function(found: InertiaFunction) -> InertiaFunction:
-    """Return `found` if it is a valid inertia.
+    """Return `found`, a valid inertia.
 
-    Raise InputError if it may jump, is asymmetric, or not positive definite at time 0.
+    Raise InputError if it may jump, is asymmetric, or is not positive definite at time 0.
     """
     # Imported only here, because most scenes need no exact numbers.
     from pyharness.model.inertia import checked_inertia

@@ -302,7 +302,7 @@ def called_once(
 ) -> list[Any]:
     """Return the components that a user's function returns for symbols.
 
-    Raise InputError, with the text `allowed`, if the call fails or returns another result.
+    Raise InputError if the call fails or returns one number.
     """
     for with_targets in (False, True):
         try:

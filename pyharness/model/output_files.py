@@ -46,14 +46,14 @@ def check_writable(path: str, option: str) -> None:
 
 
 def write_files(contents: dict[str, bytes], option: str) -> None:
-    """Write all files or none; raise InputError, naming `option`, on failure.
+    """Write all files or, after a failure or Ctrl-C, none.
 
-    Files are written under temporary names, then renamed; after a failure or Ctrl-C, the old ones
-    are restored. Devices and pipes are written first.
+    A failure raises InputError, which names `option`.
     """
     path = ""
     try:
         for path, content in contents.items():
+            # Devices and pipes cannot be restored.
             if _is_special(path):
                 write_waiting(path, content)
         with DeferredInterrupt() as patience:

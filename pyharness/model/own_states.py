@@ -17,13 +17,11 @@ _TAKEN = (
 
 
 class OwnState(NamedTuple):
-    """An own state: its name, and its value at time 0 in any unit.
-
-    Its error is relative to its largest absolute value so far, or to `scale` if larger.
-    """
+    """An own state: its name, and its value at time 0 in any unit."""
 
     name: str
     start: float
+    # Errors are relative to the largest absolute value so far, or to this if larger.
     scale: float = 0.0
 
 

@@ -13,11 +13,7 @@ _PIECE = 1 << 20
 
 
 def read_input(path: str | os.PathLike[str], where: str, limit: int, what: str) -> bytes:
-    """Return the content of a user's file or pipe.
-
-    Raise InputError for an unreadable path, a folder, a device, more than `limit` bytes, or a pipe
-    without data for 10 s. Messages begin with `where`; `what` names the expected content.
-    """
+    """Return a user's file or pipe; raise InputError if unreadable or larger than `limit` bytes."""
     try:
         content = _read(os.fspath(path), limit)
     except (OSError, ValueError) as error:

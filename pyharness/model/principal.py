@@ -20,7 +20,7 @@ from pyharness.model.waves import exact_law
 class PrincipalScene(Scene):
     """A scene about principal axes, with moments in double-double precision.
 
-    In double precision, differences of nearly equal moments would have large relative errors.
+    In double precision, differences of nearly equal moments would lose digits.
     """
 
     moments_low: Triple = (0.0, 0.0, 0.0)

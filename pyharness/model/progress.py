@@ -79,9 +79,9 @@ def for_each_piece(
     threads: int,
     pieces: Sequence[slice] | None = None,
 ) -> None:
-    """Call ``work(piece, given_up)`` in threads for each of `pieces`, by default equal slices of n.
+    """Call ``work(piece, given_up)`` in threads for each of `pieces`, by default slices of n.
 
-    With several threads, an exception (such as Ctrl-C) sets `given_up[0]` to 1, which ends kernels.
+    After an exception, `given_up[0]` is 1.
     """
     if not n:
         return

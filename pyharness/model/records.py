@@ -16,7 +16,7 @@ from pyharness.model.trajectory import Trajectory
 def scene_record(scene: Scene) -> dict[str, Any]:
     """Return a scene for JSON, with the keys of a scene file and "case".
 
-    For a function, "torque" has only the number of recorded operations, or "opaque".
+    Python functions are only mentioned.
     """
     body, values = body_of(scene)
     return {

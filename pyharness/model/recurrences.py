@@ -9,21 +9,20 @@ from pyharness.model.codes import Operations
 
 
 class Operation(NamedTuple):
-    """An operation's recurrence for Taylor series, and its partial derivatives (slopes), as C.
+    """An operation's recurrence for Taylor series, and its partial derivatives (slopes), as C."""
 
-    Letters o, p and q are results, x and y operands. For o, for example, t_o is term k of the
-    series (l_o for a table), b_o term k - 1, z_o term 0, f_o term 1, and m_o the value at a node. i
-    is 1/k. s0 and s1 sum products of terms 1 to k - 1 of the series in `pairs`. The rounding
-    error of a result is `rounding`, plus the errors of the operands times the absolute slopes.
-    """
-
+    # Letters o, p and q are results, x and y operands. For o, for example, t_o is term k of the
+    # series (l_o for a table), b_o term k - 1, z_o term 0, f_o term 1, and m_o the value at a node.
+    # i is 1/k. s0 and s1 sum products of terms 1 to k - 1 of the series in `pairs`.
     series: tuple[str, ...]
     pairs: tuple[str, ...] = ()
     value: str = ""  # of o at a node; if empty, the series is summed
     slopes: tuple[str, ...] = ()  # of o by x and by y
     second: str = ""  # slope of p by x, if another operation may read p
     first: str = ""  # z_o, if `value` does not give it; without both, the interpreter computes it
-    rounding: str = "2.0*size(z_o)"  # of the operation alone, in units of 2**-53
+    # Rounding error of the operation alone, in units of 2**-53. The errors of the operands, times
+    # the absolute slopes, are added.
+    rounding: str = "2.0*size(z_o)"
 
 
 _OF_ANGLE = Operation(("t_p = k*t_x", "t_o = i*(s0 + t_p*z_y)"), ("py",), slopes=("m_y",))

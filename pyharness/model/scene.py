@@ -291,9 +291,9 @@ class Scene:
 
     @property
     def euler_coefficients(self) -> Triple:
-        """The coefficients A = (I2 - I3)/I1, B, C of Euler's equations (13-15 of Jacobs 1982).
+        """The coefficients A = (I2 - I3)/I1, B, C of Euler's equations.
 
-        Raise InputError for a full inertia matrix or a changing inertia.
+        Raise InputError for a full inertia matrix or changing inertia.
         """
         if self.coefficients is not None:
             return self.coefficients
@@ -304,9 +304,9 @@ class Scene:
 
     @property
     def exact_moments(self) -> "Exact | None":
-        """The principal moments (kg m2) as exact fractions; None for a body with coefficients.
+        """The principal moments (kg m2) as exact fractions; None with coefficients.
 
-        Raise InputError for a full inertia matrix or a changing inertia.
+        Raise InputError for a full inertia matrix or changing inertia.
         """
         if self.coefficients is not None:
             return None
@@ -326,8 +326,7 @@ class Scene:
     def is_impossible(self) -> bool:
         """Whether no rigid body has the moments of inertia at time 0.
 
-        True if the largest moment exceeds the sum of the others by more than 2**-50 of itself,
-        which rounding errors can't explain.
+        The largest then exceeds the others' sum beyond rounding errors.
         """
         moments, inertia = self.moments, self.inertia
         if self.changing is not None:
@@ -424,11 +423,7 @@ def checked_scene(
     changing: bool = False,
     states: bool = False,
 ) -> Scene:
-    """Return `scene`; raise InputError unless it is a Scene that the flags allow.
-
-    The flags allow a full inertia matrix (`any_axes`), a torque about space axes (`any_torque`) or
-    dependent on the state (`any_state`), a `changing` inertia, and own `states`.
-    """
+    """Return `scene`; raise InputError unless it is a Scene that the flags allow."""
     if isinstance(scene, Scene):
         if scene.states and not states:
             raise InputError(OWN_STATES)

@@ -98,10 +98,9 @@ def toml_of(content: bytes, where: str) -> dict[str, Any]:
 
 
 def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
-    """Return the text of a scene file, from which `read_scene` restores the scene bit for bit.
+    """Return the text of a scene file, without masses, forces and case.
 
-    Masses, forces and case are not written. Raise InputError for a Python function, more than 50
-    [[torque.terms]], or more than 1 000 000 bytes.
+    Raise InputError for Python functions and too long a text.
     """
     import json
 

@@ -103,8 +103,7 @@ class StateTorque:
     ) -> Triple:
         """Return the torque at `time` (s), omega (rad/s), attitude and own states; NaN if singular.
 
-        Raise InputError for a wrong number of components, or if an opaque function does not return
-        three numbers.
+        Raise InputError for wrong numbers of components.
         """
         if len(omega) != 3 or len(attitude) != 4:
             raise InputError(
@@ -161,7 +160,7 @@ def torque_of(tape: Tape, time: Any, omega: Any, attitude: Any, *own: Any) -> Ar
 
 
 def replayed(function: Function, own: tuple[str, ...] = ()) -> StateTorque:
-    """Return the recorded torque of an internal function, without checks."""
+    """Return the recorded torque of an internal function, without checks; `own` are own states."""
     tape = _recorded_with(Recorder(_MOST_REPLAYED, N_INPUTS + len(own)), function)
     return StateTorque(tape, None, tape.needs_attitude, own=own)
 
@@ -180,14 +179,12 @@ def of_law(law: TorqueLaw) -> StateTorque:
 
 
 def turned_law(law: TorqueLaw, time: Symbol, attitude: Any) -> Array:
-    """Return the body components of a law about the axes of space.
-
-    Each component has the terms of all waves, some with factor 0, so that laws with equally many
-    waves share compiled code.
-    """
+    """Return the body components of a torque law about the axes of space."""
     angles = [frequency * time for _, frequency in (*law.sines, *law.cosines)]
     terms = [time, *(wave(each) for each in angles for wave in (np.sin, np.cos))]
     value = law_value(law, time)
+    # Each component has the terms of all waves, some with factor 0, so that laws with equally many
+    # waves share compiled code.
     return to_body([x.with_terms_of(terms) for x in value] if law.varies else value, attitude)
 
 

@@ -38,14 +38,13 @@ class Linear(NamedTuple):
 
 
 class Table:
-    """A piecewise cubic function of time.
+    """A piecewise cubic function of time (s).
 
-    Row k of `pieces`, shape (n, 4), has the coefficients of a cubic in the time (s) after
-    breaks[k], constant first. The cubic applies until the next break; the first cubic also before
-    its break.
+    Row k of `pieces`, (n, 4), has coefficients, constant first, in the time after breaks[k].
     """
 
     def __init__(self, breaks: Any, pieces: Any) -> None:
+        # The first cubic applies also before its break.
         self.breaks: Array = np.asarray(breaks, dtype=float)
         self.pieces: Array = np.asarray(pieces, dtype=float).reshape(-1, 4)
 
@@ -61,15 +60,12 @@ class Table:
 
 
 class Operation(NamedTuple):
-    """An operation of a tape: "linear", "table", or another kind with up to three operands (slots).
+    """An operation of a tape: "linear", "table", or another kind with up to three operands."""
 
-    The second operand of "log", "atan" and "asin" is the derivative. "switch" is 1 where its
-    operand is positive, else 0; "select" is its second operand where the first is 1, else its
-    third.
-    """
-
+    # "switch" is 1 where its operand is positive, else 0; "select" is its second operand where the
+    # first is 1, else its third.
     kind: str
-    operands: tuple[int, ...]
+    operands: tuple[int, ...]  # slots
     linear: Linear | None = None
     table: Table | None = None
 
@@ -193,11 +189,9 @@ def live_slots(
     tape: Tape, compute: Callable[[int], object], is_true: Callable[[int], bool],
     for_series: bool = True,
 ) -> list[int]:  # fmt: skip
-    """Compute the operations that the outputs need, operands first, and return their slots.
+    """Call `compute` for the slots that the outputs need, operands first; return these slots.
 
-    Of a "select" only the chosen operand is computed; the other may be singular. `compute` is
-    called for each slot, `is_true` for each condition. Derivatives (`WITH_DERIVATIVE`) are computed
-    only if `for_series`.
+    `is_true` evaluates conditions.
     """
     known = set(range(tape.n_inputs))
     wanted = [slot for output in tape.outputs for slot, _ in output.terms]
@@ -210,6 +204,7 @@ def live_slots(
             if operation.kind in WITH_DERIVATIVE and not for_series:
                 operands = operands[:1]
             elif operation.kind == "select":
+                # The other operand may be singular.
                 condition, first, second = operands
                 operands = (condition,)
                 if condition in known:
@@ -278,11 +273,7 @@ _UNSEEN = 2.0**-150
 
 
 def float_outputs(tape: Tape, inputs: Sequence[float]) -> list[float]:
-    """Return the outputs of a tape in floats; division by 0 raises ZeroDivisionError.
-
-    If an exponential overflows, as in sinh(x)/cosh(x), a large number replaces it, unless the
-    outputs depend on the choice of this number.
-    """
+    """Return the outputs of a tape in floats; division by 0 raises ZeroDivisionError."""
     found: list[float] = []
     try:
         found = evaluate(tape, inputs, FLOATS)
@@ -297,6 +288,8 @@ def float_outputs(tape: Tape, inputs: Sequence[float]) -> list[float]:
         found = evaluate(tape, inputs, FLOATS)
     if all(map(math.isfinite, found)) or all(each.kind != "exp" for each in tape.operations):
         return found
+    # A large number replaces an exponential that overflows, as in sinh(x)/cosh(x), unless outputs
+    # depend on the choice of this number.
     own, other, large, moderate = (
         evaluate(tape, inputs, replace(FLOATS, exp=partial(_saturated, kind)))
         for kind in ("own", "other", "large", "moderate")

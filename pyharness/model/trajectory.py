@@ -181,7 +181,7 @@ class Trajectory(Conversions):
     def y(self) -> Array:
         """The state at each time in columns, shape (m, n).
 
-        It is omega (rad/s), the quaternion if requested, and the own states (`Scene.states`).
+        The rows are omega (rad/s), the quaternion if requested, and own states.
         """
         parts = [each.T for each in (self.omega, self.attitude, self.own) if each is not None]
         return np.concatenate(parts) if len(parts) > 1 else parts[0]
@@ -292,14 +292,10 @@ def digits_left(error: float | None) -> float | None:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BatchResult:
-    """The angular velocities of n bodies, and how the computation of each ended.
+    """The angular velocities of n bodies, and how the computation of each ended."""
 
-    `omega` (rad/s), shape (n, ..., 3), is NaN without a result. `status`, shape (n, ...), has codes
-    of `pyharness.model.codes.Statuses`.
-    """
-
-    omega: Array
-    status: NDArray[np.int8]
+    omega: Array  # shape (n, ..., 3), rad/s; NaN without a result
+    status: NDArray[np.int8]  # shape (n, ...); codes of `pyharness.model.codes.Statuses`
 
     __repr__ = short_repr
 

@@ -85,11 +85,12 @@ def with_merged_waves(scene: Scene) -> Scene:
 
 
 def with_merged_rows(constant: Array, sines: Array, cosines: Array) -> tuple[Array, Array, Array]:
-    """Return constants, sines and cosines of m torque laws, summed by frequency if finite.
+    """Return constants, (m, 3), sines, (m, k, 4), and cosines, (m, l, 4), of torque laws.
 
-    Shapes are (m, 3), (m, k, 4) and (m, l, 4), or one row for all. A wave is three amplitudes and a
-    frequency (rad/s); waves are padded with zeros.
+    Waves are summed by frequency if finite.
     """
+    # A wave is three amplitudes and a frequency (rad/s); waves are padded with zeros. One row may
+    # apply to all m laws.
     concerned = _mergeable_rows(sines, cosines)
     if not concerned.any():
         return constant, sines, cosines

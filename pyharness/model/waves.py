@@ -87,7 +87,7 @@ def with_merged_waves(scene: Scene) -> Scene:
 def with_merged_rows(constant: Array, sines: Array, cosines: Array) -> tuple[Array, Array, Array]:
     """Return constants, (m, 3), sines, (m, k, 4), and cosines, (m, l, 4), of torque laws.
 
-    Waves are summed by frequency if finite.
+    Waves of equal frequency are summed.
     """
     # A wave is three amplitudes and a frequency (rad/s); waves are padded with zeros. One row may
     # apply to all m laws.

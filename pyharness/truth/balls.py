@@ -59,10 +59,7 @@ def _refuse(*_: Any) -> Any:
 
 
 def functions_at(time: Fraction, forward: bool) -> Functions[Any]:
-    """Return the functions that evaluate tapes (recorded operations) in a step from `time` (s).
-
-    A table is evaluated by its piece after `time` if `forward`, else by the piece before it.
-    """
+    """Return the functions that evaluate tapes (recorded operations) in a step from `time` (s)."""
 
     def table(each: Table, at: Any) -> Any:
         # The comparison of a fraction with a binary64 number is exact.

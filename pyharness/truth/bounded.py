@@ -33,17 +33,13 @@ Row = Sequence[float | Fraction]
 
 
 class ErrorBound(NamedTuple):
-    """Bounds on the error of the reference at all its times.
+    """Bounds on the error of the reference at all its times, each "proved" or "estimated"."""
 
-    `value` is for any component of omega (rad/s), `angle` for the attitude (rad). Each has a basis,
-    "proved" or "estimated". `warning` is not empty if the proof shows an error above the estimate.
-    """
-
-    value: float
+    value: float  # for any component of omega, rad/s
     basis: str
-    angle: float | None = None
+    angle: float | None = None  # for the attitude, rad
     angle_basis: str | None = None
-    warning: str = ""
+    warning: str = ""  # not empty if the proof shows an error above the estimate
 
     def text(self, unit: str = "rad/s") -> str:
         return f"{' '.join(filter(None, (at_most(self.value), unit)))} ({self.basis})"
@@ -88,10 +84,9 @@ def bound_of(
     any_torque: bool = False,
     effort: float | None = None,
 ) -> ErrorBound:
-    """Return the error bound of a scene's reference, `known`.
+    """Return the error bound of a scene's reference, `known`; options are as in `error_bound`.
 
-    With `before_rounding`, the bound is for the sum of omega and `known.remainder`, if any. The
-    other options are as in `error_bound`.
+    With `before_rounding`, omega includes `known.remainder`.
     """
     exact = before_rounding and known.remainder is not None
     largest = float(np.abs(known.omega).max(initial=0.0))
@@ -111,23 +106,18 @@ def bound_of(
 def error_bound(
     scene: Scene,
     times: Array,
-    omega: Array,
+    omega: Array,  # shape (n, 3), rad/s
     claimed: float,
-    attitude: Array | None = None,
+    attitude: Array | None = None,  # shape (n, 4)
     claimed_angle: float = 0.0,
     *,
-    remainder: Array | None = None,
-    any_torque: bool = False,
-    effort: float = 1.0,
+    remainder: Array | None = None,  # added to omega
+    any_torque: bool = False,  # prove bounds also under recorded torques of any kind
+    effort: float = 1.0,  # factor on the work limit of a proof, about half a second
 ) -> ErrorBound:
-    """Return the error bound of the reference at `times` (s).
+    """Return the error bound of a reference at `times` (s).
 
-    `omega` (rad/s) and `remainder`, which is added to it, have shape (n, 3), `attitude` (n, 4).
-    `claimed` (rad/s) and `claimed_angle` (rad) are estimates, returned where nothing is proved.
-
-    The bound of omega is proved in scenes that satisfy `has_certificate`. With python-flint, both
-    bounds are proved in torque-free motion and, with `any_torque`, under any recorded torque at up
-    to 30 times on one side of 0. The work limit of a proof is about half a second times `effort`.
+    Estimates `claimed` (rad/s) and `claimed_angle` (rad) are returned where nothing is proved.
     """
     rows = _exact(omega, remainder)
     order = sorted(range(len(times)), key=lambda k: abs(times[k]))

@@ -67,14 +67,12 @@ def prove(
     scene: Scene,
     times: Sequence[float],
     digits: int = 30,
-    effort: float = 1.0,
+    effort: float = 1.0,  # factor on the work limit
     progress: Progress = no_progress,
 ) -> Proof:
-    """Return balls that contain omega at `times` (s), and their certificate.
+    """Return balls that contain omega at `times` (s) to `digits` digits, and a certificate.
 
-    A radius is at most 10**-digits times the larger of 1 rad/s and the largest component of omega.
-    `effort` is a factor on the work limit. Raise InputError if the scene is unsuitable, omega
-    grows without bound, or the limit is exceeded.
+    Raise InputError if no proof is found.
     """
     if not has_certificate(scene):
         raise InputError(

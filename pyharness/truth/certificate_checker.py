@@ -46,13 +46,11 @@ def over(numerator: int, denominator: int) -> int:
 
 
 class System:
-    """Euler's equations of a scene, with integer coefficients: equations 13-15 of the thesis.
+    """Euler's equations of a scene, with integer coefficients: equations 13-15 of the thesis."""
 
-    They are D y_i' = P y_j y_k + C + R t + sum over f of (S s_f + G c_f), with i, j, k in cyclic
-    order. Each frequency f of the torque adds the unknowns s_f (sine) and c_f (cosine), with s_f' =
-    f c_f and c_f' = -f s_f. An entry of `rows` is D and a list: P, C, R, and each frequency's S and
-    G.
-    """
+    # They are D y_i' = P y_j y_k + C + R t + sum over f of (S s_f + G c_f), with i, j, k in cyclic
+    # order. Each frequency f of the torque adds the unknowns s_f (sine) and c_f (cosine), with
+    # s_f' = f c_f and c_f' = -f s_f. An entry of `rows` is D and a list: P, C, R, each S and G.
 
     def __init__(self, scene: dict[str, Any], bits: int, clock: int, scales: Sequence[int]) -> None:
         self.bits, self.clock, self.scales = bits, clock, scales

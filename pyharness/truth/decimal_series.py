@@ -36,21 +36,17 @@ _LEAST = Decimal("1e-330")  # s, below all floats
 
 def taylor_series(
     scene: Scene,
-    coefficients: Row,
+    coefficients: Row,  # A, B and C
     times: Sequence[Decimal],
     velocity: bool,
     order: int,
-    tolerance: Decimal,
-    effort: float | None,
+    tolerance: Decimal,  # local and relative
+    effort: float | None,  # factor on a limit of some ten seconds; None: 100 000 steps or fewer
     start: Row | None = None,
 ) -> list[Row]:
     """Return a row of omega (rad/s), velocity (m/s) and attitude at each of `times` (s).
 
-    The rows end where omega grows without bound or the torque is singular. Quaternions keep the
-    scene's norm. `coefficients` are A, B and C; high powers in the torque may increase the `order`
-    of the series; `tolerance` is local and relative. `effort` is a factor on a work limit of some
-    ten seconds; None means 100 000 steps, fewer if the torque depends on the state. `start`
-    replaces the initial state.
+    The rows end at a singularity.
     """
     equations, limit = _Equations(scene, coefficients, velocity), _Limit(scene, effort)
     tape = equations.tape
@@ -270,15 +266,13 @@ def divisors(scene: Scene) -> tuple[Fraction, Fraction, Fraction]:
 class _Equations:
     """The equations of one scene as recurrences of Taylor coefficients.
 
-    `velocity` adds dV/dt = F/m - omega x V, with force F and mass m; an attitude adds dq/dt = q (0,
-    omega)/2. With a changing inertia I and torque N, (I omega)' = N - omega x (I omega); otherwise
-    `coefficients` are A, B, C. `TapeSeries` explains `change` and `results`.
+    `TapeSeries` explains `change` and `results`.
     """
 
     def __init__(
         self,
         scene: Scene,
-        coefficients: Row,
+        coefficients: Row,  # A, B and C; unused if the inertia changes
         velocity: bool,
         change: Decimal = Decimal(0),
         results: dict[int, Decimal] | None = None,
@@ -319,6 +313,7 @@ class _Equations:
                     for i, push in enumerate(torque(k))
                 ]
             if self._velocity:
+                # dV/dt = F/m - omega x V, with force F and mass m.
                 for i in range(3):
                     j, m = (i + 1) % 3, (i + 2) % 3
                     rate = product(series[3 + j], backward[m])

@@ -21,14 +21,14 @@ _TOGETHER = Decimal("1e-15")  # relative difference of roots that count as one
 
 
 class Switches:
-    """The switches of a tape, with their `results` by slot.
+    """The switches of a tape.
 
-    The result of a switch jumps where its operand crosses a level: 0, or an integer for a floor. At
-    a level, `_levels` maps the slot to -1 if the result is the one above the level, else to 1.
+    `results`, by slot, jump where an operand crosses a level: 0, or an integer for a floor.
     """
 
     def __init__(self, tape: TapeSeries) -> None:
         self._tape, self.results = tape, tape.results
+        # By slot with its operand at a level: -1 if the result is the one above the level, else 1.
         self._levels: dict[int, int] = {}
         self._turned: set[int] = set()
         self._next: dict[int, int] = {}
@@ -55,9 +55,9 @@ class Switches:
         return False
 
     def turns(self, time: Decimal, length: Decimal) -> bool:
-        """Change the first result whose operand moves to the other side of its level.
+        """Change the first result whose operand leaves its level to the other side.
 
-        Return whether there was one. Raise TimedError if the operand moves so with both results.
+        Return whether one did; raise TimedError for sliding.
         """
         for slot, is_floor, x in self._tape.operands_of_switches():
             level = self._levels.get(slot)
@@ -68,6 +68,7 @@ class Switches:
             first = next((each for each in terms if abs(each) > _ZERO * total), Decimal(0))
             if (is_floor if first == 0 else first > 0) == (level < 0):
                 continue
+            # Sliding: with both results the operand moves to the other side.
             if slot in self._turned:
                 raise TimedError(f"reference: {SLIDING}", float(time))
             self._turned.add(slot)

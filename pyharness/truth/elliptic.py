@@ -21,11 +21,11 @@ _DIGITS = 90
 def torque_free(scene: Scene, time: float | Decimal, rounded: bool = False) -> Row:
     """Return omega (rad/s) of a scene without torque at `time` (s).
 
-    If `rounded`, A, B and C are rounded to binary64. Raise InputError if an unsteady motion may be
-    unbounded: without moments, at least one of A, B, C must be above 0 and one below.
+    Raise InputError if an unsteady motion may be unbounded.
     """
     i = checked_scene(scene).exact_moments
     a, w = [Fraction(x) for x in scene.euler_coefficients], [Fraction(x) for x in scene.omega]
+    # Unless `rounded` to binary64, A, B and C are exact.
     if i is not None and not rounded:
         a = [(i[k - 2] - i[k - 1]) / i[k] for k in range(3)]
     with decimal.localcontext(
@@ -121,14 +121,12 @@ def _normal(start: Row, p: Fraction, q: Fraction, time: Decimal) -> Row:
 
 
 def jacobi(u: Decimal, comodulus: Decimal) -> tuple[Decimal, Decimal, Decimal]:
-    """Return sn, cn and dn of `u` with the modulus k; `comodulus` is 1 - k**2.
-
-    The method is the descending Landen transformation (Abramowitz and Stegun 16.12).
-    """
+    """Return sn, cn and dn of `u` with the modulus k; `comodulus` is 1 - k**2."""
     if not comodulus:
         e = (-abs(u)).exp()
         cn = 2 * e / (1 + e * e)
         return ((1 - e * e) / (1 + e * e)).copy_sign(u), cn, cn
+    # Descending Landen transformation (Abramowitz and Stegun 16.12).
     levels = []
     complement = comodulus.sqrt()
     least = Decimal(1).scaleb(-decimal.getcontext().prec - 5)

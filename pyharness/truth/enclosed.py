@@ -20,18 +20,16 @@ class Balls(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Enclosure:
-    """Balls that contain the solution of one scene; quantities not requested are None.
-
-    The attitude is a unit quaternion, scalar first. The state-transition matrix has, row by row,
-    the derivatives of omega and of the unnormalised quaternion with respect to omega at time 0.
-    """
+    """Balls that contain the solution of one scene; quantities not requested are None."""
 
     time: tuple[float, ...]  # s
     omega: tuple[Balls, ...]  # rad/s
     how: str  # names the method of the proof
     steps: int = 0  # 0 for a solution in closed form
-    attitude: tuple[Balls, ...] | None = None
+    attitude: tuple[Balls, ...] | None = None  # unit quaternion, scalar first
     velocity: tuple[Balls, ...] | None = None  # m/s
+    # State-transition matrix: by rows, derivatives of omega and of the unnormalised quaternion with
+    # respect to omega at time 0.
     transition: tuple[Balls, ...] | None = None
     energy: tuple[Balls, ...] | None = None  # rotational energy, J
 
@@ -87,10 +85,7 @@ def rounded_up(x: Fraction) -> float:
 
 
 def largest_radius(omega: Sequence[Balls], digits: int) -> Fraction:
-    """Return the largest ratio of a ball's radius to the allowed radius.
-
-    The allowed radius is 10**-digits times the larger of 1 rad/s and the ball's largest component.
-    """
+    """Return the largest ratio of a ball's radius to the radius allowed for `digits` digits."""
     largest = Fraction(0)
     for middle, radius in omega:
         largest = max(largest, radius * 10**digits / max(Fraction(1), *map(abs, middle)))
@@ -113,12 +108,12 @@ def _decimal(x: Fraction, digits: int) -> str:
 
 
 def scales_of(coefficients: Sequence[Fraction]) -> list[float]:
-    """Return the units in which proofs measure errors of the components of omega.
+    """Return the units in which proofs measure errors of omega's components.
 
-    They are the square roots of abs(A), abs(B), abs(C) over the largest of these, but at least
-    0.01. If all are above 0.01, the Jacobian's logarithmic norm is 0 for rotations about the axes
-    of largest and smallest moment.
+    They are roots of coefficients over the largest, at least 0.01.
     """
+    # If all are above 0.01, the Jacobian's logarithmic norm is 0 for rotations about the axes of
+    # largest and smallest moment.
     sizes = [abs(x) for x in coefficients]
     largest = max(sizes) or Fraction(1)
     return [math.sqrt(max(float(x / largest), _LEAST)) for x in sizes]

@@ -29,23 +29,18 @@ def can_enclose(scene: Scene) -> bool:
 def enclose(
     scene: Scene,
     times: Sequence[float],
+    # A radius of omega is at most 10**-digits times the larger of 1 rad/s and the largest component
+    # of omega (in closed form, of initial omega).
     digits: int = 30,
     *,
-    velocity: bool = False,
-    transition: bool = False,
-    effort: float = 1.0,
+    velocity: bool = False,  # add the translational velocity (m/s)
+    transition: bool = False,  # add the state-transition matrix
+    effort: float = 1.0,  # factor on the work limit
     progress: Progress = no_progress,
 ) -> Enclosure:
-    """Return balls that contain the solution of a scene at requested times.
+    """Return balls that contain a scene's solution at `times` (s), in order away from 0.
 
-    `times` (s) lead away from 0 on one side. A radius of omega is at most 10**-digits times the
-    larger of 1 rad/s and the largest component of omega (in closed form, of initial omega).
-    `velocity` adds the translational velocity (m/s), `transition` the state-transition matrix. The
-    attitude, and the energy of a body with moments, are included. `progress` receives the
-    percentage, 100, and the time as text. `effort` is a factor on the work limit.
-
-    Raise InputError if `digits` is not from 1 to 1000, times are not in order, python-flint is
-    missing, the torque isn't recorded, or the work limit is exceeded.
+    Raise InputError if no proof is found.
     """
     checked_scene(scene, True, True, True, True)
     if not 1 <= integer("digits", digits) <= MOST_DIGITS:

@@ -26,18 +26,16 @@ _MOST_BITS = 20_000
 def enclose_free(
     scene: Scene, times: Sequence[float], digits: int, attitude: bool = False
 ) -> list[Balls]:
-    """Return balls that contain the torque-free omega (rad/s) at each of `times` (s).
+    """Return balls that contain omega (rad/s) in bounded torque-free motion at each of `times` (s).
 
-    With `attitude`, four more balls contain the unit quaternion from body to space, scalar first
-    and continuous in time; the scene must then have moments of inertia. The radii of the
-    quaternion are at most 10**-`digits`; the radii of omega are at most 10**-`digits` times the
-    larger of 1 rad/s and the largest initial component. The motion must be bounded.
+    With `attitude`, unit quaternions follow.
     """
     scale = max(Fraction(1), *(abs(Fraction(w)) for w in scene.omega))
     bits = min(64 + math.ceil(digits * math.log2(10)), _MOST_BITS)
     while True:
         with ctx.workprec(bits):
             least = arb(10) ** -digits
+            # Quaternions are from body to space, scalar first and continuous in time.
             limits = [ball(scale) * least] * 3 + [least] * 4 * attitude
             solution = _solution(scene, attitude)
             rows = [solution(Fraction(time)) for time in times]
@@ -76,10 +74,8 @@ def _solution(scene: Scene, attitude: bool) -> Callable[[Fraction], Balls]:
 
 
 def omega_on_ellipse(axis: int, a: list[Fraction], w: list[Fraction], t: Fraction) -> Balls:
-    """Return omega (rad/s) at `t` (s), initially `w`, if the coefficient of `axis` is 0.
-
-    The component about `axis` is constant; the others move on an ellipse.
-    """
+    """Return omega (rad/s) at `t` (s), initially `w`, if the coefficient of `axis` is 0."""
+    # The component about `axis` is constant; the others move on an ellipse.
     j, k = axis - 2, axis - 1
     angle = ball(-a[j] * a[k] * (w[axis] * t) ** 2).sqrt()
     cosine, sine = angle.cos(), angle.sinc() * ball(w[axis] * t)
@@ -90,13 +86,15 @@ def omega_on_ellipse(axis: int, a: list[Fraction], w: list[Fraction], t: Fractio
 
 
 class Orbit:
-    """An unsteady torque-free motion with nonzero coefficients `a` and initial omega `w` (rad/s).
+    """An unsteady torque-free motion, initially with omega `w` (rad/s).
 
-    Omega about the three `axes` is `sizes` (rad/s) times cn(u), sn(u) and dn(u), with u = `start` +
-    `rate` t and `rate` in 1/s (DLMF Table 22.13.1). `m` is k**2, with the modulus k; `square` is
-    the square of the size that multiplies dn. On the separatrix m = 1, cn = dn = sech and sn =
-    tanh.
+    The coefficients `a` of Euler's equations are not 0.
     """
+
+    # Omega about the three `axes` is `sizes` (signed amplitudes, rad/s) times cn(u), sn(u) and
+    # dn(u), with u = `start` + `rate` t and `rate` in 1/s (DLMF Table 22.13.1). `m` is k**2, with
+    # the modulus k; `square` is the square of the amplitude of dn. On the separatrix m = 1, cn = dn
+    # = sech and sn = tanh.
 
     def __init__(self, a: list[Fraction], w: list[Fraction]) -> None:
         s = [abs(x) for x in a]
@@ -159,18 +157,17 @@ def carlson(x: Fraction, y: Fraction, z: Fraction) -> arb:
 
 
 class _Attitude:
-    """The attitude along an orbit.
+    """The attitude along an orbit."""
 
-    In the body, let n be the direction of the angular momentum L, and e the axis of dn. Then n e =
-    c dn(u) with c > 0. The attitude is the product of a constant rotation, the rotation by psi
-    about e, and the smallest rotation from n to e.
-
-    Euler's equations give psi' = (2 T/|L| + omega e)/(1 + n e), with the kinetic energy T. Like dn,
-    psi' has the periods 2K and 4iK' in complex u. Its poles, where dn(u) = -1/c, are at u = 2iK' +
-    iy and 2iK' - iy; the residues of psi'/(2 rate) are 1/2i and -1/2i, or opposite. The derivative
-    of the phase of theta4((u - iy)/2K | 2 tau), or of its conjugate, has the same periods, poles
-    and residues. The two therefore differ by a constant.
-    """
+    # In the body, let n be the direction of the angular momentum L, and e the axis of dn. Then
+    # n e = c dn(u) with c > 0. The attitude is the product of a constant rotation, the rotation by
+    # psi about e, and the smallest rotation from n to e.
+    #
+    # Euler's equations give psi' = (2 T/|L| + omega e)/(1 + n e), with the kinetic energy T. Like
+    # dn, psi' has the periods 2K and 4iK' in complex u. Its poles, where dn(u) = -1/c, are at u =
+    # 2iK' + iy and 2iK' - iy; the residues of psi'/(2 rate) are 1/2i and -1/2i, or opposite. The
+    # derivative of the phase of theta4((u - iy)/2K | 2 tau), or of its conjugate, has the same
+    # periods, poles and residues. The two therefore differ by a constant.
 
     def __init__(
         self, orbit: Orbit, moments: Sequence[Fraction], w: list[Fraction], begin: Balls

@@ -68,8 +68,7 @@ def _lines(row: dict[str, Any]) -> list[list[Any]]:
 def certificates_report(found: Sequence[tuple[str, dict[str, Any] | None, str]]) -> Report:
     """Return the report of checked certificates.
 
-    An entry of `found` has the file's name, the certificate (None if the check failed), and the
-    reason of a failure.
+    An entry has the file's name, its certificate or None, and the reason of a failure.
     """
     verdicts = []
     for name, proved, why in found:

@@ -62,8 +62,7 @@ def enclose_steps(
 ) -> Enclosure:
     """Return balls that contain the solution of a scene at `times` (s).
 
-    The arguments are as in `enclosure.enclose`. Raise InputError if the torque isn't recorded,
-    or too many steps are needed.
+    The arguments, and the errors raised, are as in `enclosure.enclose`.
     """
     limit = _MOST_STEPS * checked_effort(effort)
     wanted = float(digits + 2)
@@ -99,10 +98,11 @@ def enclose_steps(
 class Equations:
     """The equations of motion of a scene, with exact coefficients.
 
-    The unknowns are omega (rad/s), the scene's quaternion, the velocity (m/s) and, with
-    `transition`, the derivatives of omega and quaternion with respect to omega at time 0, row by
-    row. `blocks` are the slices of these groups, `scales` the units of errors.
+    `blocks` are slices of the unknowns, `scales` units of errors.
     """
+
+    # The unknowns are omega (rad/s), the scene's quaternion, the velocity (m/s) and, by rows, the
+    # derivatives of omega and quaternion with respect to omega at time 0.
 
     def __init__(self, scene: Scene, velocity: bool, transition: bool) -> None:
         tapes = _tapes(scene)

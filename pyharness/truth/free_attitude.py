@@ -28,11 +28,9 @@ _MOST_RADIANS = 1e5  # work limit of the integration; some three minutes
 
 
 def free_attitude(scene: Scene, time: float) -> Row:
-    """Return the attitude of a scene without torque at `time` (s), as a unit quaternion.
+    """Return the torque-free attitude at `time` (s), a unit quaternion that is continuous in time.
 
-    Its sign is continuous in time. The scene must have moments and an attitude. On the separatrix,
-    without a period, the motion is integrated until omega is constant to all digits. Raise
-    InputError if this takes too long.
+    Raise InputError if this takes too long.
     """
     checked_scene(scene)
     assert scene.attitude is not None
@@ -43,6 +41,7 @@ def free_attitude(scene: Scene, time: float) -> Row:
             return _rotated(begin, [Decimal(w) for w in scene.omega], end)
         rate, period = _rate_and_period(scene)
         if period is None:
+            # On the separatrix, integrate until omega is constant to all digits.
             settled = min(abs(end), _settling_time(scene, rate)).copy_sign(end)
             after = _followed(scene, [settled], rate)[0]
             return _rotated(after, torque_free(scene, settled), end - settled)

@@ -45,9 +45,9 @@ class _OtherUnitError(Exception):
 
 
 def integer_series(scene: Scene, times: Sequence[float]) -> Path:
-    """Return the solution of a scene at `times` (s).
+    """Return a scene's solution at `times` (s).
 
-    Before rounding, the error is some 1e-29 of the largest omega, times the error amplification.
+    Before rounding, errors are some 1e-29 of the largest omega, times the error amplification.
     """
     size = _guess(scene, abs(Fraction(times[-1])))
     power = size.numerator.bit_length() - size.denominator.bit_length() if size else 0
@@ -141,9 +141,9 @@ def exact_body(scene: Scene) -> tuple[list[Fraction], list[Fraction]]:
 
 
 class _Equations:
-    """Equations 13-15 of the thesis for one scene, as recurrences of Taylor terms.
+    """Equations 13-15 of the thesis as recurrences of Taylor terms.
 
-    Time is in units of `span`, the last time (s), omega in units of `unit` (rad/s).
+    The units of time and omega are `span` (s) and `unit` (rad/s).
     """
 
     def __init__(self, scene: Scene, span: Fraction, unit: Fraction) -> None:

@@ -65,19 +65,12 @@ def reference(
     scene: Scene,
     times: Sequence[float],
     velocity: bool = False,
-    precise: bool = False,
-    effort: float | None = None,
+    precise: bool = False,  # errors of at most 1e-25 before rounding, unless amplified
+    effort: float | None = None,  # factor on a limit of some ten seconds; None: up to 100 000 steps
 ) -> Reference:
-    """Return the reference solution of `scene` at `times` (s), which lead away from 0 on one side.
+    """Return the reference solution of a scene at `times` (s), in order away from 0.
 
-    The estimated error is the largest difference of two integrations with different orders and
-    steps, times four if `precise`. A `precise` series has an error of at most 1e-25 before
-    rounding, unless errors are amplified too much. Attitudes always come from the series.
-
-    `effort` is a factor on a work limit of some ten seconds; None means 100 000 steps. A torque
-    that depends on the state must be recorded on a tape; the rows end before it becomes singular.
-    Raise InputError if the times are not in order, a changing moment of inertia reaches 0, or the
-    series is impossible or too long.
+    Raise InputError if none is found.
     """
     if scene.changing is not None:
         scene.changing.check(times)
@@ -119,9 +112,9 @@ def reference(
 
 
 def check_order(times: Sequence[float], who: str) -> None:
-    """Raise InputError unless times are finite, of one sign, and lead away from 0.
+    """Raise InputError unless times are finite, on one side, and lead away from 0.
 
-    The first may be 0. `who` names the computation.
+    `who` names the computation.
     """
     if not all(map(math.isfinite, times)):
         raise InputError(f"{who}: a time is not finite; allowed: finite numbers, in seconds")
@@ -151,7 +144,7 @@ def _check_torque(scene: Scene) -> None:
 def known_solution(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
     """Return omega (rad/s) of a sphere or torque-free symmetric body in closed form, else None.
 
-    The result has all digits of the decimal context.
+    The result has all decimal digits.
     """
     if isinstance(scene.torque, StateTorque) or scene.changing is not None:
         return None

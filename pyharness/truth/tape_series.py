@@ -44,10 +44,8 @@ _Sum = tuple[Decimal, list[tuple[Decimal, int]]]
 
 
 def series_products(tape: Tape) -> int:
-    """Return how many products of two series each order of a tape (recorded torque) needs.
-
-    A sine with its cosine, or a tanh with its derivative, takes two; a table takes none.
-    """
+    """Return how many products of two series each order of a tape (recorded torque) needs."""
+    # A sine with its cosine, or a tanh with its derivative, takes two; a table takes none.
     waves = ("sine", "cosine")
     angles = {each.operands for each in tape.operations if each.kind in waves}
     others = [each for each in tape.operations if each.kind not in ("linear", "table", *waves)]
@@ -55,20 +53,19 @@ def series_products(tape: Tape) -> int:
 
 
 class TapeSeries:
-    """The Taylor series of the operations on a tape (recorded torque) around a time.
+    """The Taylor series of the operations on a tape (recorded torque).
 
-    `begin` starts an expansion, and each `next` adds a coefficient to all series. Terms of sums are
-    multiplied by 1 plus or minus `change`, which shows the effect of rounding. The caller sets
-    `results`, the results of switches by slot. `least_order` is the lowest order that loses no
-    product whose factors are 0 at that time.
+    `begin` starts the series, and each `next` adds a coefficient.
     """
 
     def __init__(
         self, tape: Tape, change: Decimal = Decimal(0), results: dict[int, Decimal] | None = None
     ) -> None:
+        # The caller sets the results of switches, by slot.
         self.results = {} if results is None else results
         self._tape = tape
         self.has_switches = tape.n_switches > 0
+        # Terms of sums are multiplied by 1 plus or minus `change`, to show the effect of rounding.
         self._operations = [(each, _sum(each.linear, change)) for each in tape.operations]
         self._outputs = [_sum(each, change) for each in tape.outputs]
         # By slot: the table, and the exact times at which its pieces begin.
@@ -80,6 +77,7 @@ class TapeSeries:
         changes = {time for _, breaks in self._breaks.values() for time in breaks[1:]}
         self._changes = sorted(changes)
         self._powers, largest = _powers(tape)
+        # The lowest order that loses no product whose factors are 0 at the beginning.
         self.least_order = min(_MOST_ORDER, _ORDER_A_FACTOR * largest)
         self._slots: list[Row] = []
         self._live: list[int] = []
@@ -87,11 +85,9 @@ class TapeSeries:
     def begin(
         self, time: Decimal, omega: list[Row], attitude: list[Row], forward: bool = True
     ) -> None:
-        """Begin an expansion around `time` (s).
+        """Begin an expansion around `time` (s), forward or backward in time.
 
-        `omega` and `attitude`, which may be empty, are lists of Taylor coefficients, which the
-        caller extends. At a break of a table, the later piece is expanded if `forward`, else the
-        earlier.
+        The caller extends the lists `omega` and `attitude` (perhaps empty).
         """
         self._order = 0
         self._tables = {
@@ -109,8 +105,9 @@ class TapeSeries:
     def next(self) -> Row:
         """Return the next Taylor coefficient, from number 0, of each of the three outputs.
 
-        The unknowns must already have this coefficient. Raise ArithmeticError at a singularity.
+        Raise ArithmeticError at a singularity.
         """
+        # The unknowns already have this coefficient.
         k = self._order
         if k > 0:
             self._slots[0].append(Decimal(k == 1))
@@ -210,10 +207,7 @@ class TapeSeries:
     def reach(self, length: Decimal) -> Decimal:
         """Return the step (s), reduced so that the series of every operation converges.
 
-        An exponential, or the derivative of a hyperbolic tangent, may be negligible at the
-        beginning of a step and large a little later. Its argument may therefore change by at most
-        half the order, unless the function remains negligible. The mean order of a product's terms,
-        weighted by magnitude, has the same limit. The step does not reach any zero of a divisor.
+        The step reaches no zero of a divisor.
         """
         for _, operation in self._live_operations():
             most = self._largest_change(operation)
@@ -249,6 +243,9 @@ class TapeSeries:
         """Return how much an operation's last operand may change; None if there is no limit."""
         if operation.kind not in ("exp", "tanh", "quotient"):
             return None
+        # An exponential, or the derivative of a tanh, may be negligible at the beginning of a step
+        # and large a little later. The argument may change by half the order, or by more if the
+        # function remains negligible.
         x = self._slots[operation.operands[-1]][0]
         if operation.kind == "quotient":
             return _WITHIN_CIRCLE * abs(x)
@@ -263,10 +260,8 @@ class TapeSeries:
         return self._changes[place] if 0 <= place < len(self._changes) else None
 
     def crosses_a_branch(self, offset: Decimal) -> bool:
-        """Return whether a square root reaches 0 within `offset` (s) of the expansion's time.
-
-        Beyond it the series may be the root's negative, as for sqrt(x**2).
-        """
+        """Return whether a square root reaches 0 within `offset` (s) of the expansion's time."""
+        # Beyond a zero, the series may be the root's negative, as for sqrt(x**2).
         for slot, operation in self._live_operations():
             if operation.kind == "sqrt":
                 root = value_at(self._slots[slot], offset)

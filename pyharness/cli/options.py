@@ -27,16 +27,16 @@ FORMATS = ("table", "json", "csv", "markdown")
 ONE_SCENE = "(--case N | --scene FILE)"
 # A placeholder after an option's name, as N in "--case N", means that the option takes a value.
 BODY = {
-    "--case N": "Use this case of Table 1 of the thesis, 1 to 7, as the scene: body, initial "
-    "state, torque and steps.",
-    "--scene FILE": "Read the scene from this TOML file (`pyharness scene new` writes a sample).",
+    "--case N": "Use Case N of Table 1 of the thesis, 1 to 7: body, initial state, torque and "
+    "steps.",
+    "--scene FILE": "Read the scene from a TOML file (sample: `pyharness scene new`).",
     "--omega A,B,C": "Initial angular velocity (omega) about the body axes, in rad/s (default: "
     "the scene's).",
 }
 SCENE = {
     **BODY,
-    "--step-size H": "Step size in s, above 0 (default: the scene's).",
-    "--steps N": "Number of steps, at least 1 (default: the scene's).",
+    "--step-size H": "Step size in s (default: the scene's).",
+    "--steps N": "Number of steps (default: the scene's).",
 }
 LISTING = {
     "--listing L": "Version of the program: original (default), or corrected (without the "
@@ -47,30 +47,26 @@ LISTING = {
     "--reading NAME,...": "For these doubtful lines, use the reading that we did not adopt (names: "
     "`pyharness defects --kind reading`).",
     "--conjecture NAME,...": "Make these assumptions about missing statements (names: `pyharness "
-    "defects --kind conjecture`; none: no assumption). Default: torque-held, which evaluates a "
-    "varying torque once in each step.",
+    "defects --kind conjecture`; none: no assumption; default: torque-held, which evaluates a "
+    "varying torque once in each step).",
     "--lipschitz L": "Stop the Runge-Kutta program when, within a step, a derivative changes by "
-    "more than L times the change of its variable; L in 1/s, above 0 (default 500, as in the "
-    "thesis).",
+    "more than L times the change of its variable; L in 1/s (default 500).",
     "--no-stop": "Omit the stop test of --lipschitz.",
 }
 _EFFORT = (
-    "Multiply the work limit of each computation by F, above 0. The default, 1, allows about {} "
-    "seconds{}. A computation that exceeds its limit ends with an error."
+    "Multiply the work limit of each computation by F. A computation beyond its limit ends with an "
+    "error, by default after about {} seconds{}."
 )
 EFFORT = {"--effort F": _EFFORT.format(10, " (30 for a program of the thesis)")}
 EFFORT_WITHOUT_PROGRAMS = {"--effort F": _EFFORT.format(10, "")}
 EFFORT_OF_PROGRAMS = {"--effort F": _EFFORT.format(30, "")}
 STRICT = {
     "--strict": "Exit with status 1 also if a method ends before the last requested time, or if "
-    "its amplified rounding errors may exceed its tolerance. Without --strict, the exit status is "
-    "1 only if the Fortran and Python versions of a program differ, a corrected program misses its "
-    "order of convergence, or a method of --method misses its tolerance or ends although the true "
-    "solution continues."
+    "its amplified rounding errors may exceed its tolerance."
 }
 ALSO = {
-    "--also FILE,...": "Write the result to these files too, each in the format of its ending: "
-    ".md (Markdown), .xml (JUnit) or .json."
+    "--also FILE,...": "Write the result also to these files: .md (Markdown), .xml (JUnit) or "
+    ".json."
 }
 _BY_SUFFIX = {".md": "markdown", ".xml": "junit", ".json": "json"}
 # Options and arguments that name a file to read; --check names several.
@@ -102,8 +98,8 @@ def outputs(formats: Sequence[str] = FORMATS, plot: str = "the results") -> dict
     first, *others = formats
     form = {"--format F": f"Output format: {first} (default), {', '.join(others)}."}
     picture = {
-        "--plot FILE": f"Write a picture of {plot} to this file (.png, .svg or .pdf), and the "
-        "plotted numbers to a .csv file of the same name."
+        "--plot FILE": f"Write a picture of {plot} to this file (.png, .svg or .pdf), and its "
+        "numbers to a .csv file of the same name."
     }
     out = {"--out FILE": "File for the result (default: standard output)."}
     return {**form, **(picture if plot else {}), **out}

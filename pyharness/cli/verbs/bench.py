@@ -24,31 +24,29 @@ _BODIES, _MOST_BODIES, _MOST_GROWN = 100_000, 1_000_000, 10_000_000
 _TERM_BODIES = 1000
 _OPTION_OF = {"method": "--method", "peer": "--peers"}
 OPTIONS = {
-    "--case N": "Measure only this case of Table 1 of the thesis, 1 to 7 (default: 2 to 7, or "
-    "all with --attitude).",
-    "--horizon T": "End time of each integration, in s, above 0, up to 1000 (default: 3; also "
-    "100 in Cases 3 and 4, or with --attitude in all cases but 6).",
-    "--draws N": "Instead of the cases, measure N random scenes, 1 to 10000, of several kinds of "
-    "torque and body.",
+    "--case N": "Only this case of Table 1 of the thesis, 1 to 7 (default: 2 to 7; with "
+    "--attitude, all).",
+    "--horizon T": "End time of each integration, in s, up to 1000 (default: 3, and 100 too in "
+    "Cases 3 and 4; with --attitude, 100 too in all cases but 6).",
+    "--draws N": "Instead of the cases, measure N random scenes, up to 10000.",
     "--ensemble": "Instead of single trajectories, measure calls that solve many bodies at once: "
-    "bodies per second, time per body as a function of the number of bodies, and memory.",
+    "run times and memory.",
     "--terms": "Instead of the cases, measure scenes whose torques depend on omega (angular "
-    "velocity), time and attitude, for one body and for many at once. The torques are ready-made "
-    "(pyharness.torques) or Python functions.",
-    "--bodies N": f"Number of bodies of --ensemble or --terms, 1 to {_MOST_BODIES} (default "
-    f"{_BODIES} with --ensemble, {_TERM_BODIES} with --terms).",
-    "--seed S": "Seed, any text, of the random scenes of --draws or the bodies of --ensemble or "
-    "--terms (default: the present year and week, as in 2026-W47).",
+    "velocity), time and attitude, for one body and for many at once.",
+    "--bodies N": f"Number of bodies, up to {_MOST_BODIES} (default {_BODIES} with --ensemble, "
+    f"{_TERM_BODIES} with --terms).",
+    "--seed S": "Seed, any text, of random scenes or bodies (default: the present year and week, "
+    "as in 2026-W47).",
     "--attitude": "Measure the attitude (orientation) of the body together with omega.",
-    "--method M,...": "Measure only these of our methods and programs (names: first column of the "
-    "result; none: no method; default: all).",
-    "--peers NAME,...": "Measure only these third-party solvers (names: first column of the "
-    "result, or packages: heyoka, numba, scipy; none: no solver; default: all installed).",
+    "--method M,...": "Only these of our methods and programs (names: first column of the result; "
+    "none: no method; default: all).",
+    "--peers NAME,...": "Only these third-party solvers (names: first column of the result, or "
+    "packages: heyoka, numba, scipy; none: no solver; default: all installed).",
     "--compiled": "With --terms, compile all torques with the C compiler first.",
     "--plan": "Instead of comparing solvers, measure run times with and without each computation "
-    "that may be omitted (see `pyharness plan`), such as the translational velocity.",
+    "that may be omitted (see `pyharness plan`).",
     "--growth": "Instead of comparing solvers, measure how the error of the Taylor method grows "
-    "with the integration time, up to 1e5 s, in Cases 3 and 4.",
+    "with time, up to 1e5 s, in Cases 3 and 4.",
     **shared.outputs(),
 }
 GROUPS = {

@@ -19,23 +19,21 @@ OPTIONS = {
     **shared.LISTING,
     "--listing L": "Version of the programs: original, or corrected (without the author's faults, "
     "called defects); default: both.",
-    "--program P": f"Compare only this program: {', '.join(PROGRAMS)} (default: all three). The "
-    "first two use collocation.",
-    "--method M,...": "Compare these methods instead of the programs, such as auto,taylor,dop853 "
-    "(all names: docs/reference/methods.md). The torque may then depend on omega or attitude.",
+    "--program P": f"Only this program: {', '.join(PROGRAMS)} (default: all three). The first two "
+    "use collocation.",
+    "--method M,...": "Compare these methods instead of the programs, as in auto,taylor,dop853 "
+    "(names: docs/reference/methods.md).",
     "--word W": f"Floating-point arithmetic of the programs: {', '.join(WORD_NAMES)} (default "
-    f"{WORD_NAMES[0]}). cdc48 is the arithmetic of CDC computers, which truncates results; "
-    "cdc48-rounded rounds them.",
-    "--tolerance E": "Largest allowed error of omega, relative to its largest component, at most 1 "
-    "(default: each method's own). Without --method, it applies to SciPy's solve_ivp (see "
-    "--numerics).",
-    "--attitude": "Compare the attitude (orientation) of the body too; its error is an angle in "
-    "rad.",
+    f"{WORD_NAMES[0]}). cdc48 truncates results, as CDC computers did; cdc48-rounded rounds "
+    "them.",
+    "--tolerance E": "Largest allowed error of omega, relative to its largest component, for "
+    "--method or SciPy's solve_ivp (default: each method's own).",
+    "--attitude": "Compare the attitude (orientation) of the body too, by an angle in rad.",
     "--ablate": "Run each program with every subset of its defects, and list the subsets, largest "
-    "error first. Errors are compared up to the last step that all runs reached.",
+    "error first.",
     "--numerics": "Show also drifts of energy and momentum, differences between the Fortran and "
-    "the Python programs (in units in the last place), error amplification, errors of SciPy's "
-    "solve_ivp, and run times. JSON and CSV always have them.",
+    "the Python programs, error amplification, errors of SciPy's solve_ivp, and run times (always "
+    "in JSON and CSV).",
     **shared.STRICT,
     **shared.EFFORT,
     **shared.outputs(),

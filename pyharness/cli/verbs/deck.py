@@ -14,16 +14,15 @@ FORMATS = ("table", "json")
 OPTIONS = {
     "--program P": f"Write the deck of this program: {', '.join(PROGRAMS)}.",
     "--case N": "Put the data of this case of Table 1 of the thesis, 1 to 7, on the cards "
-    "(default: the published data, Case 5 for runge-kutta and Case 2 for the others).",
+    "(default: as published, Case 5 for runge-kutta and Case 2 for the others).",
     **{each: shared.LISTING[each] for each in list(shared.LISTING)[:5]},
     "--dialect D": f"Form of the deck: {', '.join(DIALECTS)} (default {DIALECTS[0]}, as printed). "
-    "gfortran is adapted to this compiler; ftn is a batch job for FTN, the compiler of CDC "
-    "computers.",
-    "--system S": "With --dialect ftn, operating system of the CDC computer that runs the job: "
+    "gfortran is for this compiler, ftn a batch job for the compiler of CDC computers.",
+    "--system S": "With --dialect ftn, operating system of the CDC computer: "
     f"{' or '.join(SYSTEMS)} (default nos).",
-    "--round": "With --dialect ftn, let FTN round results instead of truncating them.",
-    "--terms N": "With --program four-term, write a deck for collocation with N terms, 3 or 5. The "
-    "thesis prints neither deck; ours are conjectures derived from the four-term deck.",
+    "--round": "With --dialect ftn, round results instead of truncating them.",
+    "--terms N": "With --program four-term, write our conjecture of the unprinted deck for N "
+    "terms, 3 or 5.",
     **shared.outputs(FORMATS, plot=""),
 }
 USAGE = "--program P"

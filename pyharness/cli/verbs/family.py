@@ -11,7 +11,7 @@ _OF_A_MEMBER = ("weighting", "terms", "points", "corrections")
 _DEFAULT_CASE = "5"
 OPTIONS = {
     **shared.SCENE,
-    "--case N": "Use this case of Table 1 of the thesis, 1 to 7, as the scene (default: "
+    "--case N": "Use Case N of Table 1 of the thesis, 1 to 7 (default: "
     f"{_DEFAULT_CASE}, without --scene).",
     "--weighting W": "Measure one method, with this weighting of its residual: "
     f"{', '.join(WEIGHTINGS)} (default: several methods; collocation alone if --terms, --points or "
@@ -22,11 +22,10 @@ OPTIONS = {
     "--corrections K": "Number of times that each step corrects its first estimate, 0 to 100 "
     "(default 1).",
     "--lost": "Instead of measuring orders, look for programming mistakes that explain why three "
-    "unprinted programs of the thesis failed (section IV.2). The mistakes that explain the most "
-    "failures come first.",
+    "unprinted programs of the thesis failed (section IV.2).",
     "--word W": "Floating-point arithmetic of the programs of --lost: "
-    f"{', '.join(WORD_NAMES)} (default {WORD_NAMES[0]}). cdc48 is the arithmetic of CDC computers, "
-    "which truncates results; cdc48-rounded rounds them.",
+    f"{', '.join(WORD_NAMES)} (default {WORD_NAMES[0]}). cdc48 truncates results, as CDC "
+    "computers did; cdc48-rounded rounds them.",
     **shared.outputs(plot=""),
 }
 EXAMPLE = "family --case 5 --weighting galerkin --terms 3"

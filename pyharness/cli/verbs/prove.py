@@ -17,17 +17,17 @@ _DIGITS = 25
 _MARK = FORMAT.rpartition("-")[0].encode()  # in certificates of every version
 OPTIONS = {
     **shared.SCENE,
-    "--times T1,T2,...": "Times of the results, in s, all positive or all negative (the first may "
-    "be 0), in order of increasing distance from 0 (default: the end of the scene's last step).",
-    "--digits D": f"Number of digits, 1 to {MOST_DIGITS} (default {_DIGITS}). The half-width of "
-    "each interval of omega is at most 10**-D times 1 rad/s or, if larger, the largest component "
-    "of omega.",
-    "--velocity": "Enclose the translational velocity too; needs the package python-flint.",
-    "--transition": "Enclose the derivatives of the solution with respect to the initial omega "
-    "too; needs the package python-flint.",
-    "--certificate FILE": "Write the steps of the proof to this file (JSON), a certificate for "
-    "--check. Only for torques that depend on time alone; not with --velocity or --transition.",
-    "--check FILE,...": "Verify the certificates in these files; needs no third-party library.",
+    "--times T1,T2,...": "Times of the results, in s, all positive or all negative, in order of "
+    "increasing distance from 0 (default: the end of the scene's last step).",
+    "--digits D": f"Number of digits, 1 to {MOST_DIGITS} (default {_DIGITS}): the half-width of "
+    "each interval of omega is at most 10**-D rad/s, or 10**-D of the largest component if that "
+    "exceeds 1 rad/s.",
+    "--velocity": "Enclose the translational velocity too; needs python-flint.",
+    "--transition": "Enclose the derivatives with respect to the initial omega too; needs "
+    "python-flint.",
+    "--certificate FILE": "Write the steps of the proof to this file (JSON), if the torque depends "
+    "on time alone; not with --velocity or --transition.",
+    "--check FILE,...": "Verify the certificates in these files.",
     **shared.EFFORT_WITHOUT_PROGRAMS,
     **shared.outputs(plot=""),
 }

@@ -31,35 +31,32 @@ OPTIONS = {
     **shared.SCENE,
     "--program P": f"Run this program of the thesis: {', '.join(PROGRAMS)}. The first two use "
     "collocation.",
-    "--implementation I": "Language of the program: fortran (default with --word binary64) or "
-    "python (default with any other --word).",
+    "--implementation I": "Language of the program: fortran (default with binary64) or python "
+    "(default with another --word).",
     "--word W": f"Floating-point arithmetic of the program: {', '.join(WORD_NAMES)} (default "
-    f"{WORD_NAMES[0]}). cdc48 is the arithmetic of CDC computers, which truncates results; "
-    f"cdc48-rounded rounds them. The Fortran programs support only {', '.join(COMPILED_WORDS)}.",
-    "--method M": "Solve the scene by this method: auto (default with "
-    "--scene), taylor, closed-form, dop853 or another of docs/reference/methods.md.",
+    f"{WORD_NAMES[0]}). cdc48 truncates results, as CDC computers did; cdc48-rounded rounds "
+    f"them. Fortran has only {', '.join(COMPILED_WORDS)}.",
+    "--method M": "Solve the scene by this method: auto (default with --scene), taylor, "
+    "closed-form, dop853 or another of docs/reference/methods.md.",
     **shared.LISTING,
     "--times T1,T2,...": "Times of the results, in s, positive or negative, in increasing or "
-    "decreasing order (default: the ends of the scene's steps); not with --program.",
-    "--attitude [FORM]": "Compute the attitude (orientation) of the body, even if the scene has "
-    f"none. FORM is {', '.join(FORMS)} (default {FORMS[0]}); 3-1-3 and 3-2-1 are Euler angles "
-    "about these axes. JSON always has quaternions.",
-    "--animate FILE": "Write an animation of the rotating body to this file (.gif or .html). It "
-    "needs --attitude or a scene with an attitude; not with --program.",
+    "decreasing order (default: the ends of the scene's steps).",
+    "--attitude [FORM]": "Compute the attitude (orientation) of the body, in this form: "
+    f"{', '.join(FORMS)} (default {FORMS[0]}, always in JSON). 3-1-3 and 3-2-1 are Euler angles.",
+    "--animate FILE": "Write an animation of the rotating body to this file (.gif or .html); "
+    "needs --attitude or a scene with an attitude.",
     "--tolerance E": "Largest allowed error of omega, relative to its largest component (default: "
-    "the method's own, 1e-9 for auto); not with --program.",
+    "the method's own, 1e-9 for auto).",
     "--strict": "Exit with status 1 if results are missing, if amplified rounding errors "
-    "may exceed the tolerance, or if a SciPy method may have missed a short change of the torque; "
-    "not with --program.",
+    "may exceed the tolerance, or if a SciPy method may have missed a short change of the torque.",
     **shared.EFFORT,
     **shared.outputs(FORMATS),
     "--format F": f"Output format: {FORMATS[0]} (default), {', '.join(shared.FORMATS[1:])}. With "
-    "--program also printer (the page that the program prints) or tape5 (the binary file TAPE5 "
-    "that it writes).",
+    "--program also printer (the printed page) or tape5 (the binary file TAPE5).",
 }
 GROUPS = {
     "a program of the thesis": "program implementation word",
-    "another method": "method times attitude tolerance animate strict",
+    "another method (not with --program)": "method times tolerance animate strict",
 }
 USAGE = "--case N (--program P | --method M)\n--scene FILE [--program P | --method M]"
 EXAMPLE = "run --case 5 --method auto --times 1,2,3"

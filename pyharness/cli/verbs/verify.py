@@ -39,46 +39,45 @@ _ABOUT = {
     "golden": "stored trajectories",
 }
 OPTIONS = {
-    "--only ID,...": "Run only the checks of these kinds, or whose ids begin with these texts, as "
-    "in cells/two-term. Kinds: "
+    "--only ID,...": "Run only checks of these kinds, or whose ids begin with these texts, as in "
+    "cells/two-term. Kinds: "
     f"{', '.join(f'{kind} ({_ABOUT[kind]})' for kind in KINDS)}.",
     "--seed S": "Seed of the random scenes, any text (default: the present year and week, as in "
     "2026-W47).",
-    "--draws N": f"Number of random scenes, up to 1000000 (default {DRAWS}, or 0 with --port). "
-    "With --integrator, the number for each kind of torque, 1 to 1000 (default 2).",
+    "--draws N": f"Number of random scenes, up to 1000000 (default {DRAWS}, or 0 with --port); "
+    "with --integrator, for each kind of torque, up to 1000 (default 2).",
     "--external FILE": "Only compare our methods with the published results in this file (format: "
     "docs/how-to/external.md).",
-    "--listing-output FILE": "Find the floating-point arithmetic of an unknown computer. FILE is a "
-    "page printed by one of the three programs on that computer; we compare it with our runs in "
-    "each arithmetic (only with --format table or json).",
-    "--port COMMAND": "Compare your port of the programs to another language bit for bit with our "
-    "Python programs. COMMAND starts it (protocol: docs/how-to/ports.md).",
-    "--integrator COMMAND": "Compare your integrator of rigid-body motion with the true solutions "
-    "of random scenes, and name its faults. COMMAND starts it (protocol: "
-    "docs/how-to/integrators.md).",
-    "--order P": "With --integrator, lowest order of convergence that passes, above 0 and at most "
-    "40 (default 1).",
-    "--program P": "With --listing-output or --port, consider only this program: two-term, "
-    "four-term or runge-kutta (default: all three).",
-    "--case N": "With --listing-output or --port, consider only this case of Table 1 of the "
-    "thesis, 1 to 7 (default: all).",
-    "--cell NAME,...": "With --port, compare only these runs, as in two-term/case-3, or random "
-    "scenes, as in random/7. With --integrator, use only these scenes, as in wave-1, or scenes "
-    "with these kinds of torque: free (none), constant, wave (default: all).",
-    "--self-test": "Plant known faults, one by one, in our software, or in the answers of your "
-    "port or integrator, and report which checks detect each fault.",
+    "--listing-output FILE": "Find the floating-point arithmetic of an unknown computer from a "
+    "page that one of the three programs printed there (only with --format table or json).",
+    "--port COMMAND": "Compare bit for bit our Python programs with your port of them to another "
+    "language, which COMMAND starts (protocol: docs/how-to/ports.md).",
+    "--integrator COMMAND": "Compare your integrator of rigid-body motion, which COMMAND starts, "
+    "with true solutions, and name its faults (protocol: docs/how-to/integrators.md).",
+    "--order P": "Lowest order of convergence that passes, with --integrator, at most 40 (default "
+    "1).",
+    "--program P": "Only this program: two-term, four-term or runge-kutta (not with --integrator; "
+    "default: all three).",
+    "--case N": "Only this case of Table 1 of the thesis, 1 to 7 (not with --integrator; default: "
+    "all).",
+    "--cell NAME,...": "With --port, only these runs, as in two-term/case-3, or random scenes, as "
+    "in random/7. With --integrator, only these scenes, as in wave-1, or kinds of torque: free "
+    "(none), constant, wave.",
+    "--self-test": "Plant known faults in our software, or in the answers of your port or "
+    "integrator, and report which checks detect each fault.",
     "--update": "Compute the stored trajectories (kind golden) again, write them, and report "
     "which changed.",
     "--record DIR": "Folder of the stored trajectories (default: tests/golden of the source "
     "checkout).",
-    **shared.outputs(FORMATS, plot="the errors of your integrator (needs --integrator)"),
+    **shared.outputs(FORMATS, plot="the errors of --integrator"),
     **shared.ALSO,
 }
 GROUPS = {
-    "our programs and methods": "only seed draws self-test update record",
+    "our programs and methods": "only update record",
     "your program": "port integrator order",
     "your data": "external listing-output",
     "selection for --port, --integrator and --listing-output": "program case cell",
+    "random scenes and planted faults": "seed draws self-test",
 }
 EXAMPLE = "verify --only cells,methods"
 

@@ -15,7 +15,7 @@ from scipy.integrate import DenseOutput, OdeSolver
 
 from pyharness.engine.recorded import LONGEST_TRIAL, Step, kernel_tape, taylor_step
 from pyharness.model.arrays import numbers_of
-from pyharness.model.errors import InputError
+from pyharness.model.errors import SLIDING, InputError, TimedError
 from pyharness.model.numpy_calls import called_once, symbol_array
 from pyharness.model.symbols import Recorder, recorded_twice
 from pyharness.model.tape import Tape
@@ -34,6 +34,9 @@ _FIRST_CHANGE = 0.01
 _MOST_GROWTH = 10.0
 # An event at a switch is 0 there, but for rounding, which hides its sign until a short step later.
 _AFTER_SWITCH = 0.01  # times the step that ended at the switch
+# This many steps in succession, each to a switch and of a few units in the last place of the time,
+# are no motion: the switch changes back and forth without end.
+_MOST_SWITCHES, _SHORT = 100, 16
 _FIRST_PARTS = 1e-12, 1e-2  # least and largest first step, in steps that the tolerances allow
 
 
@@ -122,6 +125,7 @@ class Taylor(OdeSolver):  # type: ignore[misc]
         span = abs(self.t_bound - self.t)
         self._trial = min(span, LONGEST_TRIAL)
         self._terms = np.zeros((1, self.n))
+        self._short_steps = 0  # in succession, each to a switch
         if first_step is None:
             self._longest = self._first_step(span)
         else:
@@ -140,7 +144,10 @@ class Taylor(OdeSolver):  # type: ignore[misc]
         if not (self.n and span):
             return span
         scale = self._scale()
-        step = self._step_of(scale, self._trial, span)
+        try:
+            step = self._step_of(scale, self._trial, span)
+        except TimedError:
+            return span  # the first step, which fails too, has the message
         if step.h == 0.0:
             return span
         change = _FIRST_CHANGE * max(1.0, float(np.abs(self.y / scale).max()))
@@ -162,7 +169,13 @@ class Taylor(OdeSolver):  # type: ignore[misc]
     def _step_impl(self) -> tuple[bool, str | None]:
         rest = abs(self.t_bound - self.t)
         longest = min(rest, self.max_step, self._longest)
-        step = self._step_of(self._scale(), min(self._trial, longest), longest)
+        # As in SciPy's methods, a step is at least ten times the spacing of the times.
+        if self.max_step < min(rest, 10.0 * math.ulp(self.t)):
+            return False, self.TOO_SMALL_STEP
+        try:
+            step = self._step_of(self._scale(), min(self._trial, longest), longest)
+        except TimedError as error:
+            return False, str(error)
         if step.h == 0.0:
             return False, self.TOO_SMALL_STEP
         end = self.t + step.h
@@ -173,6 +186,10 @@ class Taylor(OdeSolver):  # type: ignore[misc]
         self._longest = max(self._longest, _MOST_GROWTH * abs(step.h))
         if step.is_switched:
             self._longest = max(_AFTER_SWITCH * self._trial, 10.0 * math.ulp(end))
+        is_short = step.is_switched and abs(step.h) <= _SHORT * math.ulp(end)
+        self._short_steps = self._short_steps + 1 if is_short else 0
+        if self._short_steps > _MOST_SWITCHES:
+            return False, str(TimedError(SLIDING, self.t))
         self.t = self.t_bound if is_cut and longest == rest else end
         self.y = step.state
         return True, None

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import quad, solve_ivp
+from scipy.integrate import OdeSolver, quad, solve_ivp
 
 from pyharness import InputError, Taylor
 from tests.engine.textbook import PROBLEMS, Problem, pendulum, solution
@@ -143,6 +143,22 @@ def test_arguments_and_arrays_are_those_of_scipy() -> None:
     )  # fmt: skip
     assert ours.y.shape == (2, 2)
     np.testing.assert_allclose(ours.y, theirs.y, atol=1e-9)
+
+
+@pytest.mark.parametrize(("begin", "max_step"), [(0.0, 5e-324), (1.0 - 1e-15, 1.2e-16)])
+def test_a_max_step_below_the_spacing_of_times_fails(begin: float, max_step: float) -> None:
+    span = begin, begin + 1.0
+    found = solve_ivp(pendulum, span, [1.0, 0.0], method=Taylor, max_step=max_step)
+    assert found.status == -1
+    assert found.message == OdeSolver.TOO_SMALL_STEP
+
+
+@pytest.mark.parametrize("start", [0.0, 1.0])
+def test_a_switch_without_end_fails(start: float) -> None:
+    found = solve_ivp(lambda t, y: -np.sign(y), (0.0, 4.0), [start], method=Taylor)
+    assert found.status == -1
+    assert "would change back and forth without end" in found.message
+    assert found.t[-1] == pytest.approx(start)
 
 
 def test_a_terminal_event_ends_an_infinite_time_span() -> None:

@@ -30,13 +30,14 @@ def rates(scene: Scene, times: Array, state: Array) -> Array:
         bare = replace(bare, torque=torque)
     end = state.shape[1] - len(scene.states)
     omega, attitude, own = state[:, :3], state[:, 3:end], state[:, end:]
+    has_attitude, has_own = attitude.shape[1] > 0, own.shape[1] > 0
     inner = state
     if turn is not None:
-        turned = product(attitude.T, turn[1]) if attitude.size else []
+        turned = product(attitude.T, turn[1]) if has_attitude else []
         inner = np.column_stack([omega @ turn[0], *turned, own])
     more = own
     if torque.tape is not None:
-        tape = system_of(bare, bool(attitude.size and own.size))
+        tape = system_of(bare, has_attitude and has_own)
         found = outputs_at(tape, times, inner)
         found, more = found[:, :3], found[:, found.shape[1] - own.shape[1] :]
     else:
@@ -45,9 +46,9 @@ def rates(scene: Scene, times: Array, state: Array) -> Array:
         found = np.array([slopes(*row)[:3] for row in rows]).reshape(-1, 3)
     if turn is not None:
         found = found @ turn[0].T
-    if attitude.size:
+    if has_attitude:
         found = np.column_stack([found, *quaternion_rates(omega.T, attitude.T)])
-    return np.column_stack([found, more]) if own.size else found
+    return np.column_stack([found, more]) if has_own else found
 
 
 def steps_output(scene: Scene, pieces: Pieces) -> DenseOutput:

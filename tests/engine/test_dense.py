@@ -120,7 +120,7 @@ def test_shapes_and_defaults() -> None:
     sol = sol_of(solve(SCENES["law"], 2.0, attitude=True, dense_output=True))
     assert sol(1.0).shape == (7,)
     assert sol([1.0, 0.5, 1.0]).shape == sol.derivative((1.0, 0.5, 1.0)).shape == (7, 3)
-    assert sol([]).shape == (7, 0)
+    assert sol([]).shape == sol.derivative([]).shape == (7, 0)
     times = np.linspace(0.0, 2.0, 48_001)
     assert np.linalg.norm(sol(times)[3:], axis=0) == pytest.approx(1.0, abs=4e-16)
     assert sol(times)[:, [7, 47_999]].tolist() == sol(times[[7, 47_999]]).tolist()

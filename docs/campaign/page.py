@@ -54,9 +54,9 @@ def _estimates(tally: Tally) -> str:
             median, ninth, last, largest = quantiles
             found.append(
                 f"The row *{name}* also has {count} estimates of errors, of which {below} are too "
-                f"small. The error divided by its estimate has the median {median}, the 90 % "
-                f"quantile {ninth}, the 99 % quantile {last} and the largest value {largest}; "
-                f"ratios below 1e-9 count as 1e-9.\n"
+                f"small. The error divided by its estimate has the median {median} (smaller "
+                f"ratios count as 1e-9), the 90 % quantile {ninth}, the 99 % quantile {last} and "
+                f"the largest value {largest}.\n"
             )
     return "\n".join(found)
 

@@ -15,6 +15,7 @@ from pyharness.engine.term_input import ready_term
 from pyharness.model.array_type import Array
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.inertia_function import InertiaFunction, inertia_of_tables
+from pyharness.model.report import counted
 from pyharness.model.state_torque import Function, StateTorque
 from pyharness.model.tape import Table
 from pyharness.model.tape_arrays import value_of_table, without_equal_constants
@@ -72,7 +73,7 @@ def table(times: Numbers, values: Iterable[Numbers], interpolation: str = "linea
     rows: Any = _as_array(values)
     is_array = type(rows) is np.ndarray and rows.dtype == float and rows.shape == (n, 3)
     if not (is_array and np.isfinite(rows).all()):
-        rows = np.array(_rows("[torque] table values", rows, n, "allowed: a list of rows"))
+        rows = np.array(_rows("[torque] table values", rows, n, "allowed: a list of rows", "time"))
     tables = [_piecewise(found, axis, interpolation, "[torque] table") for axis in rows.T]
     return ready_term(
         "table", _torque(tables), times=found, values=rows.tolist(), interpolation=interpolation
@@ -145,10 +146,10 @@ def _as_array(values: Any) -> Any:
     return values.to_numpy() if hasattr(values, "to_numpy") else values
 
 
-def _rows(where: str, values: Any, count: int, allowed: str) -> list[Triple]:
+def _rows(where: str, values: Any, count: int, allowed: str, what: str) -> list[Triple]:
     given = list(islice(number_list(where, values, allowed), count + 1))
     if len(given) != count:
-        raise _other_number(where, "rows", len(given), count)
+        raise _other_number(where, "rows", len(given), count, what)
     return [three(f"{where}, row {n}", row) for n, row in enumerate(given, 1)]
 
 
@@ -194,7 +195,7 @@ def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbe
     allowed = "allowed: a list of numbers above 0, s"
     given = list(islice(number_list(where, durations, allowed), len(begins) + 1))
     if len(given) != len(begins):
-        raise _other_number(where, "numbers", len(given), len(begins))
+        raise _other_number(where, "numbers", len(given), len(begins), "pulse")
     lengths = [finite(f"{where}, number {n}", each) for n, each in enumerate(given, 1)]
     for begin, length in zip(begins, lengths, strict=True):
         if not length > 0.0:
@@ -210,7 +211,7 @@ def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbe
     if any(isinstance(converted(each), float) for each in given):
         torques = [three(where, given)] * len(begins)
     else:
-        torques = _rows(where, given, len(begins), wanted)
+        torques = _rows(where, given, len(begins), wanted, "pulse")
     ordered = sorted(zip(begins, lengths, torques, strict=True))
     ends = [begin + length for begin, length, _ in ordered]
     for n, (after, _, _) in enumerate(ordered[1:]):
@@ -267,9 +268,10 @@ def _times(where: str, values: Any, fewest: int, most: int) -> Array:
     return found
 
 
-def _other_number(where: str, what: str, given: int, wanted: int) -> InputError:
+def _other_number(where: str, things: str, given: int, wanted: int, what: str) -> InputError:
     count = f"more than {wanted}" if given > wanted else str(given)
-    return InputError(f"{where}: {count} {what} for {wanted} times; allowed: one for each time")
+    due = counted(wanted, what)
+    return InputError(f"{where}: {count} {things} for {due}; allowed: one for each {what}")
 
 
 def _before(first: float, second: float) -> float:

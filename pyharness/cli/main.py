@@ -57,13 +57,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stderr = open(os.devnull, "w")  # noqa: SIM115  (as long as the process)
     if sys.stdout is None:
         return _complain("standard output is closed", 2)
+    code = 0
     try:
         try:
             if "_ARGCOMPLETE" in os.environ:
                 return _complete()
-            return _run(list(sys.argv[1:] if arguments is None else arguments))
+            code = _run(list(sys.argv[1:] if arguments is None else arguments))
         finally:
             sys.stdout.flush()
+        return code
     except InputError as error:
         return _complain(str(error), 2)
     except NotBuiltError as error:
@@ -73,7 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         # The reader of the pipe closed it, as `head` does.
         _leave_stdout()
-        return 0
+        return code
     except OSError as error:
         _leave_stdout()
         return _complain(f"standard output: {error.strerror or error}", 2)

@@ -5,6 +5,7 @@ import math
 import os
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -340,7 +341,7 @@ def also_files(options: argparse.Namespace) -> dict[str, str]:
             raise InputError(
                 f"--also '{path}': the name has no known ending; allowed: {', '.join(_BY_SUFFIX)}"
             )
-        if path in found or path == options.out:
+        if path == options.out or any(_is_same(path, each) for each in found):
             raise InputError(f"--also '{path}': the file is given twice; give another name")
         found[path] = _BY_SUFFIX[suffix]
     return found
@@ -426,7 +427,10 @@ def emit(content: str | bytes, out: str | None) -> None:
     if out is not None:
         data = content if isinstance(content, bytes) else shown(content).encode()
         write_files({out: data}, "--out")
-    elif isinstance(content, bytes):
-        sys.stdout.buffer.write(content)
-    else:
-        write_text(sys.stdout, content)
+        return
+    # If the reader of a pipe closed it, as `grep -q` does, the exit status is that of the verb.
+    with suppress(BrokenPipeError):
+        if isinstance(content, bytes):
+            sys.stdout.buffer.write(content)
+        else:
+            write_text(sys.stdout, content)

@@ -220,3 +220,13 @@ def test_name_that_the_terminal_or_the_picture_can_not_write(tmp_path: Path) -> 
     arguments = ["run", "--scene", str(path), "--program", "two-term", "--plot", str(picture)]
     assert main([*arguments, "--out", str(tmp_path / "x.txt")]) == 0
     assert picture.exists()
+
+
+def test_a_closed_pipe_keeps_the_exit_status(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Regression test: `verify ... | grep -q` ended with status 0 although a check had failed."""
+    for form in ("table", "json"):
+        reader, writer = os.pipe()
+        os.close(reader)
+        with open(writer, "w") as closed:
+            monkeypatch.setattr("sys.stdout", closed)
+            assert main(["verify", "--port", "false", "--case", "1", "--format", form]) == 1

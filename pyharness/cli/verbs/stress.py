@@ -3,7 +3,7 @@
 import argparse
 import shlex
 
-from pyharness.checks.check import Check, requested_suites
+from pyharness.checks.check import Check, requested_suites, selected
 from pyharness.checks.stress import SCENE_TRIALS, TRIALS, Trial, stress, trial, worst
 from pyharness.checks.stress_report import stress_report
 from pyharness.cli import options as shared
@@ -42,8 +42,10 @@ def run(options: argparse.Namespace) -> int:
         shared.progress(names.index(check.suite), len(names), check.id)
         checks.append(check)
     shared.end_progress()
-    if not checks:
-        raise unknown("check", ",".join(only), trials or TRIALS, "--only")
+    ids = [check.id for check in checks]
+    missing = [x for x in only if "/" in x and not any(selected(id, [x]) for id in ids)]
+    if missing or not checks:
+        raise unknown("check", ",".join(missing or only), trials or TRIALS, "--only")
     failed = [check for check in checks if not check.passed]
     if options.save is not None:
         _save(options.save, checks)

@@ -2,6 +2,7 @@
 
 import math
 import shlex
+import time
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
@@ -100,6 +101,7 @@ class Check:
     reference_bound: Callable[[], ErrorBound | None] | None = field(
         default=None, compare=False, repr=False
     )
+    took: float | None = field(default=None, compare=False, repr=False)  # run time (s), for JUnit
 
     def __post_init__(self) -> None:
         if (self.limit is None) != (self.basis is None):
@@ -200,7 +202,15 @@ def run_suites(
         def whole(name: Name, make: Callable[[], Attempts] = attempts) -> Attempts:
             return make()
 
-        yield from make_checks([Attempt(Name(suite, command=command), whole)], only, raised)
+        yield from timed(make_checks([Attempt(Name(suite, command=command), whole)], only, raised))
+
+
+def timed(checks: Iterable[Check]) -> Iterator[Check]:
+    """Yield the checks with run times; the first of several made together has all their time."""
+    begin = time.perf_counter()
+    for check in checks:
+        yield replace(check, took=time.perf_counter() - begin)
+        begin = time.perf_counter()
 
 
 def requested_suites(suites: Iterable[str], only: Sequence[str]) -> list[str]:

@@ -100,7 +100,7 @@ def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Ite
 
     They end without a valid answer within `patience` (s).
     """
-    name, again = Name("port", "start"), replay_command(command)
+    name, again, begin = Name("port", "start"), replay_command(command), time.perf_counter()
     try:
         with PortProcess(command, patience) as process:
             for cell in cells:
@@ -110,7 +110,8 @@ def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Ite
                 seconds = time.perf_counter() - begin
                 yield compared(cell, cell.twin(), line, again, seconds)
     except PortError as error:
-        yield PortCheck(**vars(name.judged(False, str(error))) | {"again": again})
+        failed = {"again": again, "took": time.perf_counter() - begin}
+        yield PortCheck(**vars(name.judged(False, str(error))) | failed)
 
 
 def refuse_port(command: str) -> None:
@@ -138,7 +139,8 @@ def compared(
     same = len(wanted) == len(answer.rows)
     apart = ulps(wanted, answer.rows) if same else math.inf
     check = cell.of.judged(not found, "; ".join(found), apart, 0.0, BITS)
-    return PortCheck(**vars(check) | {"again": again}, seconds=seconds, difference=difference)
+    known = {"again": again, "took": seconds}
+    return PortCheck(**vars(check) | known, seconds=seconds, difference=difference)
 
 
 def differences(twin: Trajectory, answer: Answer) -> list[str]:

@@ -39,7 +39,7 @@ def checks_report(
             "build": build_record(),
         },
         page=summary_page(verb, checks) if page is None else page,
-        cases=[(each.suite, each.id, _failure(each), each.replay) for each in checks],
+        cases=[(each.suite, each.id, _failure(each), each.replay, each.took) for each in checks],
     )
 
 
@@ -72,6 +72,8 @@ def _code(text: str) -> str:
 def _failure(check: Check) -> str:
     if check.passed:
         return ""
+    if check.note and check.value is None and check.limit is None:
+        return check.note
     note = f": {check.note}" if check.note else ""
     mark = f" ({check.mark})" if check.mark else ""
     return f"{short(check.value)}, limit {short(check.limit)}{mark}{note}"
@@ -129,6 +131,8 @@ def listed_singly(checks: Sequence[Check]) -> list[str]:
 
 def _format_outcome(check: Check, against: str) -> str:
     found = "" if check.value is None else f" {short(check.value)}"
+    if check.value is not None and check.limit is not None and check.value <= check.limit:
+        against = ", limit "  # another fault than the value, which `note` tells
     allowed = "" if check.limit is None else f"{against}{short(check.limit)}"
     told = "; ".join(filter(None, (check.mark, check.note)))
     return f"{found}{allowed}" + (f" ({told})" if told else "")

@@ -120,8 +120,9 @@ class Picture:
         self.figure, self.numbers, self.title = figure, numbers, title
 
 
-# A check for JUnit: kind, id, reason of a failure (empty if passed), command that repeats it.
-Case = tuple[str, str, str, str]
+# A check for JUnit: kind, id, reason of a failure (empty if passed), command that repeats it, and
+# run time (s) if known.
+Case = tuple[str, str, str, str, float | None]
 
 
 class Report(NamedTuple):

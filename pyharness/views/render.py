@@ -161,13 +161,15 @@ def _finite(value: Any) -> Any:
 def _junit(report: Report) -> str:
     from xml.etree import ElementTree as xml
 
-    failures = sum(bool(why) for _, _, why, _ in report.cases)
+    failures = sum(bool(why) for _, _, why, _, _ in report.cases)
     counts = {"tests": len(report.cases), "failures": failures, "errors": 0, "skipped": 0}
     texts = {name: str(count) for name, count in counts.items()}
+    texts["time"] = f"{sum(seconds or 0.0 for *_, seconds in report.cases):.6f}"
     suite = xml.Element("testsuite", {"name": report.title} | texts)
-    for kind, id, why, replay in report.cases:
+    for kind, id, why, replay, seconds in report.cases:
         named = {"classname": f"{report.title}.{kind}", "name": id}
-        case = xml.SubElement(suite, "testcase", named)
+        known = {} if seconds is None else {"time": f"{seconds:.6f}"}
+        case = xml.SubElement(suite, "testcase", named | known)
         if why:
             xml.SubElement(case, "failure", message=why).text = f"{why}\n{replay}"
     xml.indent(suite)

@@ -189,7 +189,20 @@ def test_several_outputs_are_those_of_one_run(tmp_path: Path, capsys: Capture) -
         ["runs", "port/two-term"],
     ]  # fmt: skip
     assert junit.count("<failure ") == 2
+    assert junit.count(' time="0.') == 3  # of the suite and its two cases
     assert [each["passed"] for each in json.loads(record)["checks"]] == [False, False]
+    assert main(["verify", "--port", "missing", "--format", "junit"]) == 1
+    assert """<failure message="'missing' can't be started""" in capsys.readouterr().out
+
+
+def test_a_wrong_end_alone_is_told_without_a_false_comparison(
+    tmp_path: Path, capsys: Capture
+) -> None:
+    """Regression test: with equal rows, the line said ``0 > 0``."""
+    ending = "import types; run = types.SimpleNamespace(ended='overflow', stop=None, ier=run.ier)"
+    command = answering(tmp_path / "port.py", ending)
+    assert main(["verify", "--port", command, "--cell", CELL]) == 1
+    assert f"FAILED port/{CELL} 0, limit 0 (derived; ended: overflow" in capsys.readouterr().out
 
 
 @pytest.mark.campaign

@@ -146,6 +146,7 @@ def test_a_failure_is_told_in_every_form(
     assert _run(capsys, "--only", only, "--format", "junit", "--out", str(file))[0] == 1
     suite = xml.parse(file).getroot()
     assert (suite.get("tests"), suite.get("failures")) == ("2", "1")
+    assert float(suite.get("time", 0)) > 0.0
 
 
 def test_the_worst_input_is_saved_and_its_command_gives_the_same(

@@ -23,7 +23,10 @@ REPORT = Report(
     text=[[], [f"{'word ' * 18}{NAME} end", TABLE], [Line("x" * 120)], [Field("why  ", "y " * 60)]],
     record=lambda: {"values": [1.5, float("nan")]},
     data=TABLE,
-    cases=[("cells", "cells/a", "", "again a"), ("cells", "cells/b", "2, limit 1", "again b")],
+    cases=[
+        ("cells", "cells/a", "", "again a", None),
+        ("cells", "cells/b", "2, limit 1", "again b", 1.5),
+    ],
 )
 
 
@@ -80,6 +83,8 @@ def test_record_and_cases() -> None:
     (failure,) = suite.iter("failure")
     assert failure.text == "2, limit 1\nagain b"
     assert [each.attrib["classname"] for each in suite.iter("testcase")] == ["verify.cells"] * 2
+    times = [each.get("time") for each in (suite, *suite.iter("testcase"))]
+    assert times == ["1.500000", None, "1.500000"]
 
 
 def test_wide_table_has_parts_or_wrapped_values() -> None:

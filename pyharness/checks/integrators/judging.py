@@ -6,6 +6,7 @@ motion of a known fault, the report names it (docs/how-to/integrators.md).
 
 import math
 import shlex
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
@@ -72,6 +73,7 @@ class Verdict:
     judged: list[Judged] = field(default_factory=list)
     drift: Drift | None = None
     findings: list[Finding] = field(default_factory=list)
+    begin: float = field(default_factory=time.perf_counter)  # of the checks to be added next
 
     @property
     def control(self) -> str:
@@ -79,7 +81,12 @@ class Verdict:
         return self.judged[-1].finest.control if self.judged else ""
 
     def add(self, scene: str, *checks: Check) -> None:
-        self.checks += [replace(check, again=self.again(scene)) for check in checks]
+        # The first of several checks made together has all their time.
+        took, self.begin = time.perf_counter() - self.begin, time.perf_counter()
+        times = [took, *[0.0] * len(checks)]
+        again = self.again(scene)
+        pairs = zip(checks, times, strict=False)
+        self.checks += [replace(check, again=again, took=each) for check, each in pairs]
 
 
 def judge_integrator(

@@ -72,7 +72,7 @@ class Coordinates(NamedTuple):
         return np.array([self.on_b * b, y, a * a - self.bend * y * y, 0.0])
 
     def modulus(self, point: Array) -> Array:
-        """Return the squared elliptic modulus: 0 in rotation about axis a, 1 on the separatrix."""
+        """Return the squared elliptic modulus: 0 about axis a, 1 on the separatrix, inf beyond."""
         one = point[2]
         other = one + self.bend * (point[0] * point[0] + point[1] * point[1])
         low, high = np.minimum(one, other), np.maximum(one, other)

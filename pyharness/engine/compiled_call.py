@@ -17,13 +17,13 @@ from pyharness.model.values import number, three_floats
 class CompiledCall(NamedTuple):
     """A prepared solver as a function for compiled code, such as numba's.
 
-    ``function(data, start, t_end, state)`` reads omega (rad/s), and the quaternion of an attitude
-    solver, at the address `start`. It writes the state at `t_end` (s) to `state`, and returns a
-    status of `pyharness.h`, 0 if complete.
+    ``function(data, start, t_end, state)`` reads doubles at the address `start`: omega (rad/s), and
+    for an attitude solver a unit quaternion. It writes the state at `t_end` (s) to `state`, and
+    returns a status of `pyharness.h`, 0 if complete. `data` is valid while `solver` exists.
     """
 
     function: Any
-    data: int  # valid while `solver` exists
+    data: int
     solver: object
 
 

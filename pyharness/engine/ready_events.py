@@ -111,8 +111,7 @@ def extremum(axis: int, *, terminal: bool | int = False, direction: int = 0) -> 
         As in `crosses`.
     direction : {-1, 0, 1}
         1 if the derivative becomes positive, -1 if negative, in the direction of integration; 0 for
-        both. Forward in time, 1 selects minima and -1 maxima; backward, the
-        reverse.
+        both. Forward in time, 1 selects minima and -1 maxima; backward, the reverse.
 
     Returns
     -------

@@ -255,7 +255,7 @@ def packed_scene(
 ) -> Array:
     """Return a scene and its method's settings as an array, ordered by `Places`.
 
-    `leaves` is the address of compiled code.
+    `leaves` is the address of compiled code; 0 if built with the package, or missing.
     """
     if code == Methods.TAPE:
         tape = system_of(with_constant_body(scene))

@@ -157,11 +157,14 @@ class Solver(BoundKernel[Result]):
 
         ``solver.many(omega, t_end, threads=1, out=None)`` takes `omega` (rad/s) of shape (n, 3),
         and `t_end` (s), a number or of shape (n,). It returns omega (rad/s), shape (n, 3), and the
-        statuses of `Ensemble`, shape (n,). Rows do not depend on each other or on `threads`.
+        statuses of `Ensemble`, shape (n,). Rows do not depend on each other or on `threads`, but
+        may differ by rounding from a single call's result. If a changing moment of inertia reaches
+        0 before `t_end`, the status is `refused`, or `overflow` for one given by a function.
+        Invalid arguments raise an InputError.
 
         For a solver with attitude, it is ``solver.many(omega, t_end, attitude=None, threads=1,
         out=None)`` with quaternions of shape (n, 4) or (4,), and returns omega, attitudes and
-        statuses. `out` is an array for omega or, with attitude, an Ensemble.
+        statuses. `out`, to be overwritten, is an array for omega or, with attitude, an Ensemble.
         """
         if self.with_attitude:
             return partial(many_states, self)

@@ -395,8 +395,8 @@ class Conversions:
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the trajectory with its scene to a file, from which `pyharness.load` restores it.
 
-        Numbers are restored bit for bit. The file has the format of `numpy.savez`, with an
-        array for each array attribute.
+        Numbers are restored bit for bit. The file has the format of `numpy.savez`, with an array
+        for each array attribute; the array `scene` is the text of a scene file.
 
         Parameters
         ----------

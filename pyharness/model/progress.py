@@ -81,7 +81,7 @@ def for_each_piece(
 ) -> None:
     """Call ``work(piece, given_up)`` in threads for each of `pieces`, by default slices of n.
 
-    After an exception, `given_up[0]` is 1.
+    With several threads, an exception sets `given_up[0]` to 1, which ends kernels.
     """
     if not n:
         return

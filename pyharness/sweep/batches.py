@@ -65,7 +65,7 @@ def first_batch(sweep: Sweep) -> Batch:
 def listing_of(program: str, listing: str, reading: str) -> Listing:
     """Return the version of a program that `listing` and `reading` describe.
 
-    `listing` may be ``fix:`` or ``keep:`` with defects joined by ``+``.
+    `listing` is ``original``, ``corrected``, or ``fix:`` or ``keep:`` with defects joined by ``+``.
     """
     how, _, names = listing.partition(":")
     readings = [] if reading == "adopted" else reading.split("+")

@@ -28,7 +28,7 @@ def enclose_free(
 ) -> list[Balls]:
     """Return balls that contain omega (rad/s) in bounded torque-free motion at each of `times` (s).
 
-    With `attitude`, unit quaternions follow.
+    With `attitude`, unit quaternions follow; the scene must then have moments.
     """
     scale = max(Fraction(1), *(abs(Fraction(w)) for w in scene.omega))
     bits = min(64 + math.ceil(digits * math.log2(10)), _MOST_BITS)

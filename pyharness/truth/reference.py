@@ -144,7 +144,7 @@ def _check_torque(scene: Scene) -> None:
 def known_solution(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
     """Return omega (rad/s) of a sphere or torque-free symmetric body in closed form, else None.
 
-    The result has all decimal digits.
+    The result has all digits of the decimal context.
     """
     if isinstance(scene.torque, StateTorque) or scene.changing is not None:
         return None

@@ -132,7 +132,7 @@ def measure_ensembles(
 ) -> Rates:
     """Return each contender's speed on each load, at each target error.
 
-    `seed` is only recorded; a call solves at least `least` bodies.
+    `seed` is only recorded; a call solves at least `least` bodies, or all if fewer.
     """
     found = Rates(seed, loads[0].n)
     tasks: list[_Task] = []

@@ -36,7 +36,7 @@ BITS = Basis(
 
 @dataclass(frozen=True)
 class Name:
-    """The name of a check; its id joins the fields by slashes, as in ``cells/two-term``."""
+    """The name of a check; its id joins the first five fields by slashes, if not empty."""
 
     suite: str  # kind of check of `verify`, or trial of `stress`
     subject: str = ""  # program or method

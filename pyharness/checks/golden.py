@@ -118,7 +118,7 @@ def _compared(
         return name.judged(True, "", 0.0, 0.0, _RECORD)
     moved = _moved(entry, now)
     waves = each.scene.law.sines + each.scene.law.cosines
-    if each.tolerance is not None:
+    if each.tolerance is not None:  # processors and compilers round differently
         limit, basis = 2.0 * each.tolerance, _TWICE
     elif waves and not same_library:
         limit, basis = conditioning(each.scene, each.scene.times()[-1]).rounding, FLOW

@@ -36,8 +36,8 @@ BODY = {
 }
 SCENE = {
     **BODY,
-    "--step-size H": "Step size in s (default: the scene's).",
-    "--steps N": "Number of steps (default: the scene's).",
+    "--step-size H": "Step size in s, above 0 (default: the scene's).",
+    "--steps N": "Number of steps, at least 1 (default: the scene's).",
 }
 LISTING = {
     "--listing L": "Version of the program: original (default), or corrected (without the "
@@ -51,19 +51,21 @@ LISTING = {
     "defects --kind conjecture`; none: no assumption; default: torque-held, which evaluates a "
     "varying torque once in each step).",
     "--lipschitz L": "Stop the Runge-Kutta program when, within a step, a derivative changes by "
-    "more than L times the change of its variable; L in 1/s (default 500).",
+    "more than L times the change of its variable; L in 1/s, above 0 (default 500).",
     "--no-stop": "Omit the stop test of --lipschitz.",
 }
 _EFFORT = (
-    "Multiply the work limit of each computation by F. A computation beyond its limit ends with an "
-    "error, by default after about {} seconds{}."
+    "Multiply the work limit of each computation by F, above 0 (default 1). A computation beyond "
+    "its limit ends with an error, by default after about {} seconds{}."
 )
 EFFORT = {"--effort F": _EFFORT.format(10, " (30 for a program of the thesis)")}
 EFFORT_WITHOUT_PROGRAMS = {"--effort F": _EFFORT.format(10, "")}
 EFFORT_OF_PROGRAMS = {"--effort F": _EFFORT.format(30, "")}
 STRICT = {
     "--strict": "Exit with status 1 also if a method ends before the last requested time, or if "
-    "its amplified rounding errors may exceed its tolerance."
+    "its amplified rounding errors may exceed its tolerance. Without --strict, the status is 1 "
+    "only if Fortran and Python differ, a corrected program misses its order of convergence, or a "
+    "method of --method misses its tolerance or ends although the true solution continues."
 }
 ALSO = {
     "--also FILE,...": "Write the result also to these files: .md (Markdown), .xml (JUnit) or "

@@ -114,7 +114,7 @@ def limit_solution(
 ) -> tuple[Array, str, float | None]:
     """Return an original program's limit: omega (rad/s), description, and blow-up time (s) or None.
 
-    The omega has the shape (times, 3).
+    The omega has the shape (times, 3); it is NaN without a limit.
     """
     scale = float(np.abs([scene.omega, *truth.omega]).max()) or 1.0
     start = list(scene.omega)

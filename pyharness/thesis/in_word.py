@@ -73,7 +73,7 @@ def run_compiled(
 ) -> Trajectory:
     """Run a compiled program in the arithmetic `word`, with the same result as `run`.
 
-    Raise InputError if the compiler lacks this arithmetic.
+    Raise InputError if the compiler lacks this arithmetic, or an angle is too large for its sine.
     """
     if word.p > 53:
         _check_angles(scene)

@@ -9,7 +9,7 @@ SINGULAR = 129
 def leqt1f(
     matrix: list[list[float]], right_hand_sides: list[list[float]]
 ) -> tuple[list[list[float]], int]:
-    """Return the solutions of A x = b, and the error code IER: 129 if A is singular, else 0."""
+    """Return the solutions x of A x = b and IER = 0 or, if A is singular, each b and IER = 129."""
     factors = [list(row) for row in matrix]
     pivots = _factor(factors)
     if pivots is None:

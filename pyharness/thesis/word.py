@@ -113,7 +113,8 @@ def cdc(p: int, rounds: bool) -> Rules:
 
     `rounds` selects rounding instructions (RX), not truncating ones (FX).
     """
-    # By the CYBER 170 hardware reference, CDC 60463560.
+    # By the CYBER 170 hardware reference, CDC 60463560. In the order +, -, *, /, the instructions
+    # FX are octal 30, 31, 40 and 44, RX 34, 35, 41 and 45; NX, octal 24, normalises a sum.
     settled = rounding(p, _LEAST, _MOST, cut=True, gradual=False)
     quarter = 1 << p - 2 if rounds else 0
     third = (1 << p) // 3 if rounds else 0

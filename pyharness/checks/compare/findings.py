@@ -111,7 +111,11 @@ class Comparison:
 
     @property
     def unexpected(self) -> tuple[str, ...]:
-        """Return a sentence for each unexpected result of programs or, without any, of methods."""
+        """Return a sentence for each unexpected result.
+
+        Programs: differences between Fortran and Python, missed orders. Methods alone: missed
+        tolerances or times.
+        """
         found = [] if self.programs else [*filter(None, map(self._excess, self.methods))]
         if not self.programs and all(each.trajectory is None for each in self.methods):
             found.append("no method has a result")

@@ -73,7 +73,7 @@ class Conditioning:
 
     def angle_limit(self, made: float, time: float) -> float:
         """Return an attitude's allowed error (rad) at `time` (s); `made` sums step errors."""
-        # Omega has its largest rounding error at all times.
+        # As if omega had its largest rounding error at all times.
         turned = self.rounding * (1.0 + math.sqrt(3.0) * self.largest * abs(time))
         return made + turned + ATTITUDE
 

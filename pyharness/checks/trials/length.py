@@ -177,7 +177,7 @@ def measured(
 ) -> Iterator[tuple[str, Array, Array, list[float]]]:
     """Yield name, errors, numbers of steps and error bounds of each quantity.
 
-    Errors have the shape (initial conditions, times).
+    Errors have the shape (initial conditions, times), NaN after a run's end.
     """
     turn = 2.0 * math.pi / body.largest
     reached = [r for r in REVOLUTIONS if r <= 1.01 * integrator.revolutions]

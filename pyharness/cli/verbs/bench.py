@@ -26,14 +26,14 @@ _OPTION_OF = {"method": "--method", "peer": "--peers"}
 OPTIONS = {
     "--case N": "Only this case of Table 1 of the thesis, 1 to 7 (default: 2 to 7; with "
     "--attitude, all).",
-    "--horizon T": "End time of each integration, in s, up to 1000 (default: 3, and 100 too in "
-    "Cases 3 and 4; with --attitude, 100 too in all cases but 6).",
-    "--draws N": "Instead of the cases, measure N random scenes, up to 10000.",
+    "--horizon T": "End time of each integration, in s, above 0, up to 1000 (default: 3, and 100 "
+    "too in Cases 3 and 4; with --attitude, 100 too in all cases but 6).",
+    "--draws N": "Instead of the cases, measure N random scenes, 1 to 10000.",
     "--ensemble": "Instead of single trajectories, measure calls that solve many bodies at once: "
     "run times and memory.",
     "--terms": "Instead of the cases, measure scenes whose torques depend on omega (angular "
     "velocity), time and attitude, for one body and for many at once.",
-    "--bodies N": f"Number of bodies, up to {_MOST_BODIES} (default {_BODIES} with --ensemble, "
+    "--bodies N": f"Number of bodies, 1 to {_MOST_BODIES} (default {_BODIES} with --ensemble, "
     f"{_TERM_BODIES} with --terms).",
     "--seed S": "Seed, any text, of random scenes or bodies (default: the present year and week, "
     "as in 2026-W47).",

@@ -26,8 +26,8 @@ OPTIONS = {
     "--word W": f"Floating-point arithmetic of the programs: {', '.join(WORD_NAMES)} (default "
     f"{WORD_NAMES[0]}). cdc48 truncates results, as CDC computers did; cdc48-rounded rounds "
     "them.",
-    "--tolerance E": "Largest allowed error of omega, relative to its largest component, for "
-    "--method or SciPy's solve_ivp (default: each method's own).",
+    "--tolerance E": "Largest allowed error of omega, relative to its largest component, at most "
+    "1, for --method or SciPy's solve_ivp (default: each method's own).",
     "--attitude": "Compare the attitude (orientation) of the body too, by an angle in rad.",
     "--ablate": "Run each program with every subset of its defects, and list the subsets, largest "
     "error first.",

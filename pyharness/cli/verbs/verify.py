@@ -45,7 +45,7 @@ OPTIONS = {
     "--seed S": "Seed of the random scenes, any text (default: the present year and week, as in "
     "2026-W47).",
     "--draws N": f"Number of random scenes, up to 1000000 (default {DRAWS}, or 0 with --port); "
-    "with --integrator, for each kind of torque, up to 1000 (default 2).",
+    "with --integrator, for each kind of torque, 1 to 1000 (default 2).",
     "--external FILE": "Only compare our methods with the published results in this file (format: "
     "docs/how-to/external.md).",
     "--listing-output FILE": "Find the floating-point arithmetic of an unknown computer from a "
@@ -54,8 +54,8 @@ OPTIONS = {
     "language, which COMMAND starts (protocol: docs/how-to/ports.md).",
     "--integrator COMMAND": "Compare your integrator of rigid-body motion, which COMMAND starts, "
     "with true solutions, and name its faults (protocol: docs/how-to/integrators.md).",
-    "--order P": "Lowest order of convergence that passes, with --integrator, at most 40 (default "
-    "1).",
+    "--order P": "With --integrator, lowest order of convergence that passes, above 0, at most 40 "
+    "(default 1).",
     "--program P": "Only this program: two-term, four-term or runge-kutta (not with --integrator; "
     "default: all three).",
     "--case N": "Only this case of Table 1 of the thesis, 1 to 7 (not with --integrator; default: "

@@ -121,6 +121,7 @@ class Stepper:
 
     @property
     def steps(self) -> int:
+        """The number of steps so far."""
         return self._steps
 
     @property

@@ -149,7 +149,7 @@ def _as_array(values: Any) -> Any:
 def _rows(where: str, values: Any, count: int, allowed: str, what: str) -> list[Triple]:
     given = list(islice(number_list(where, values, allowed), count + 1))
     if len(given) != count:
-        raise _other_number(where, "rows", len(given), count, what)
+        raise _other_number(where, "row", len(given), count, what)
     return [three(f"{where}, row {n}", row) for n, row in enumerate(given, 1)]
 
 
@@ -195,7 +195,7 @@ def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbe
     allowed = "allowed: a list of numbers above 0, s"
     given = list(islice(number_list(where, durations, allowed), len(begins) + 1))
     if len(given) != len(begins):
-        raise _other_number(where, "numbers", len(given), len(begins), "pulse")
+        raise _other_number(where, "number", len(given), len(begins), "pulse")
     lengths = [finite(f"{where}, number {n}", each) for n, each in enumerate(given, 1)]
     for begin, length in zip(begins, lengths, strict=True):
         if not length > 0.0:
@@ -268,10 +268,10 @@ def _times(where: str, values: Any, fewest: int, most: int) -> Array:
     return found
 
 
-def _other_number(where: str, things: str, given: int, wanted: int, what: str) -> InputError:
-    count = f"more than {wanted}" if given > wanted else str(given)
+def _other_number(where: str, thing: str, given: int, wanted: int, what: str) -> InputError:
+    count = f"more than {counted(wanted, thing)}" if given > wanted else counted(given, thing)
     due = counted(wanted, what)
-    return InputError(f"{where}: {count} {things} for {due}; allowed: one for each {what}")
+    return InputError(f"{where}: {count} for {due}; allowed: one for each {what}")
 
 
 def _before(first: float, second: float) -> float:

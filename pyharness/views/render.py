@@ -164,12 +164,14 @@ def _junit(report: Report) -> str:
     failures = sum(bool(why) for _, _, why, _, _ in report.cases)
     counts = {"tests": len(report.cases), "failures": failures, "errors": 0, "skipped": 0}
     texts = {name: str(count) for name, count in counts.items()}
-    texts["time"] = f"{sum(seconds or 0.0 for *_, seconds in report.cases):.6f}"
+    known = [seconds for *_, seconds in report.cases if seconds is not None]
+    if known:
+        texts["time"] = f"{sum(known):.6f}"
     suite = xml.Element("testsuite", {"name": report.title} | texts)
     for kind, id, why, replay, seconds in report.cases:
         named = {"classname": f"{report.title}.{kind}", "name": id}
-        known = {} if seconds is None else {"time": f"{seconds:.6f}"}
-        case = xml.SubElement(suite, "testcase", named | known)
+        took = {} if seconds is None else {"time": f"{seconds:.6f}"}
+        case = xml.SubElement(suite, "testcase", named | took)
         if why:
             xml.SubElement(case, "failure", message=why).text = f"{why}\n{replay}"
     xml.indent(suite)

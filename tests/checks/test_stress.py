@@ -149,6 +149,18 @@ def test_a_failure_is_told_in_every_form(
     assert float(suite.get("time", 0)) > 0.0
 
 
+def test_an_exception_is_a_failure_of_the_requested_check(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*arguments: Any, **more: Any) -> Trajectory:
+        raise ArithmeticError("at all times")
+
+    monkeypatch.setattr("pyharness.checks.compare.candidates.solve", broken)
+    code, text = _run(capsys, "--only", "separatrix/closed-form/flip-1e-02/1e-14/error")
+    assert code == 1
+    assert "at all times" in text
+
+
 def test_the_worst_input_is_saved_and_its_command_gives_the_same(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:

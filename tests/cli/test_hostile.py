@@ -227,6 +227,6 @@ def test_a_closed_pipe_keeps_the_exit_status(monkeypatch: pytest.MonkeyPatch) ->
     for form in ("table", "json"):
         reader, writer = os.pipe()
         os.close(reader)
-        with open(writer, "w") as closed:
+        with open(writer, "w", buffering=1) as closed:
             monkeypatch.setattr("sys.stdout", closed)
             assert main(["verify", "--port", "false", "--case", "1", "--format", form]) == 1

@@ -154,6 +154,8 @@ class Attempt:
 
 
 Attempts = Iterable[Check | Attempt]
+# Quantity of a check that raised, instead of those that it would have had.
+_RAISED = "exception"
 
 
 def make_checks(
@@ -171,7 +173,8 @@ def make_checks(
                 found = each.make(each.name)
                 parts = [found] if isinstance(found, Check) else found
                 for check in make_checks(parts, only, raised):
-                    if each.name.id == each.name.suite or selected(check.id, only):
+                    is_whole = each.name.id == each.name.suite or check.name.quantity == _RAISED
+                    if is_whole or selected(check.id, only):
                         yield check
             except raised:
                 raise
@@ -181,7 +184,7 @@ def make_checks(
                     place = traceback.extract_tb(error.__traceback__)[-1]
                     where = f"{Path(place.filename).name}, line {place.lineno}"
                     said = printable(f"ended here: {type(error).__name__}: {error} ({where})")
-                ended = each.name.with_quantity("exception").judged(False, said)
+                ended = each.name.with_quantity(_RAISED).judged(False, said)
                 yield replace(ended, again=each.name.replay)
 
 

@@ -125,7 +125,7 @@ class Finding:
 def workloads(
     case: int | None = None, horizon: float | None = None, attitude: bool = False
 ) -> list[Workload]:
-    """Return workloads of Table 1, by default until 3 s, in some cases also until 100 s."""
+    """Return cases of Table 1 as workloads, by default until 3 s, some also until 100 s."""
     usual, long = (_TURNING_CASES, _LONG_TURNING_CASES) if attitude else (_CASES, _LONG_CASES)
     cases = usual if case is None else (case,)
     asked = [(n, HORIZON if horizon is None else horizon) for n in cases]

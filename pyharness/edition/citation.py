@@ -96,7 +96,8 @@ def csl(place: str = "", path: str = "") -> list[dict[str, Any]]:
 
 
 def cite_data() -> dict[str, Any]:
-    """Return the data with which the pages' script cites a part, with placeholders for it."""
+    """Return the data from which the script of the pages cites a part of the edition."""
+    # The script replaces these by the name and the path of the part.
     place = "@PLACE@", "@PATH@"
     return {
         "address": address(), "publish": PUBLISH, "digest": text_digest(),

@@ -84,7 +84,7 @@ class ZeroIntervals:
 def _is_zero_between(
     g: EventFunction, solution: Solution, ends: Array, times: Array, noise: Array
 ) -> Index:
-    """Return where a function is 0, to within `noise` or rounding, between `ends` and `times`."""
+    """Return in which intervals, `ends` to `times`, a function is 0 within `noise` or rounding."""
     n = len(ends)
     if not n:
         return np.zeros(0, dtype=bool)

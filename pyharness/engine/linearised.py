@@ -9,7 +9,10 @@ _HUGE = 1e100  # largest matrix element, which keeps products finite
 
 
 def propagators(scene: Scene, times: Array, omega: Array) -> Array:
-    """Return the state-transition matrices of omega from n close times to the last, (n, 3, 3)."""
+    """Return the state-transition matrices of omega, (n, 3, 3), from each time to the last.
+
+    The times (s) are closely spaced.
+    """
     return transitions(times, jacobians(scene, 0.5 * (omega[1:] + omega[:-1])))
 
 

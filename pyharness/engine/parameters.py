@@ -109,9 +109,9 @@ def tape_of_bodies(
     torque: StateTorque | TorqueLaw, body: tuple[Triple, Triple] | None, names: tuple[str, ...],
     attitude: bool,
 ) -> Tape:  # fmt: skip
-    """Return the recorded equations of bodies that differ in parameters.
+    """Return the recorded equations of motion, with the torque's parameters `names` as inputs.
 
-    Without `body`, A, B, C and the reciprocal moments are parameters too.
+    Without `body`, A, B, C and the reciprocal moments are inputs too.
     """
     n_body = 0 if body else 6
     recorder = Recorder(n_inputs=N_INPUTS + n_body + len(names))

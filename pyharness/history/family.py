@@ -238,7 +238,8 @@ class OrderFinding:
 
     @property
     def misses(self) -> bool:
-        """Return whether the measured order is too low; in special scenes it may be higher."""
+        """Return whether the measured order is below the derived one."""
+        # In special scenes it is higher.
         return self.settled and self.deviation < -SLACK
 
 

@@ -285,7 +285,8 @@ class Conversions:
             Its variables, if present, are `omega` and `velocity` (dimensions `time` and `axis`),
             `attitude` (`time` and `component`), `recorded_time` (if it differs from `time`), `ier`
             and the names in `Scene.states`. Each variable has `units` and `long_name`. Attributes
-            of the Dataset say how the integration ended.
+            of the Dataset, if known, are `title` (the scene's name), `ended`, `steps`,
+            `evaluations`, `error`, `growth` and `tolerance`.
 
         Raises
         ------

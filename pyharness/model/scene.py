@@ -104,7 +104,7 @@ class Scene:
     coefficients : three numbers, optional
         The dimensionless coefficients A, B, C of Euler's equations (13-15 of Jacobs 1982).
     torque : TorqueLaw, three numbers, StateTorque, or function of (t, omega[, attitude])
-        The torque in N m; for `coefficients`, torque over moment in rad/s2. The default is zero.
+        The torque in N m; for `coefficients`, divided by the moments, in rad/s2 (default: zero).
         `pyharness.torques` has functions that return a StateTorque. Your own function returns the
         components about the body axes. It is called with symbols, which record its arithmetic; if
         that fails, pass ``opaque(function)``.

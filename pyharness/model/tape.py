@@ -97,7 +97,7 @@ class Tape:
         return self._hash
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the fields for `pickle`; the hash differs between processes."""
+        """Return the fields for `pickle`, without the hash, which differs between processes."""
         return {name: value for name, value in vars(self).items() if name != "_hash"}
 
     @cached_property

@@ -25,8 +25,8 @@ class TorqueLaw:
 
     N(t) = constant + rate t + sum of amplitude sin(frequency t) + sum of amplitude cos(frequency t)
 
-    N is a torque in N m; for a body with coefficients, torque over moment in rad/s2. The fields are
-    tuples of floats.
+    N is a torque in N m or, for a body specified by Euler's coefficients A, B, C, torque divided by
+    moment of inertia, in rad/s2.
 
     Parameters
     ----------

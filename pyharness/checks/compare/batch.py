@@ -143,7 +143,7 @@ class Batch:
         return unit_quaternions(first)
 
     def by_method(self, method: str, tolerance: float, part: float = 1.0) -> Array:
-        """Return omega (rad/s) at `part` times `t_end` by another method, shape (n, 3)."""
+        """Return omega (rad/s) at `part * t_end` by `method`, shape (n, 3)."""
         return self._solve(method, tolerance, self.t_end * part).omega
 
     def from_start(self, omega0: Array) -> "Batch":

@@ -242,10 +242,12 @@ def problems(seed: str, draws: int, names: Sequence[str] = ()) -> list[Problem]:
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """The drifts of a long motion since time 0."""
+    """Drifts of a long motion since time 0."""
 
     times: Array  # s, shape (n,)
-    named: dict[str, Array]  # of "energy", "momentum" and, with attitudes, "direction", shape (n,)
+    # "energy", "momentum" (relative) and, with attitudes, "direction" (of the angular momentum in
+    # space, rad), shape (n,)
+    named: dict[str, Array]
     change: float  # largest change of a drift between successive times
 
 

@@ -199,8 +199,7 @@ def errors(
     error = np.array([float(x - y) for x, y in zip(found, truth, strict=True)])
     x, y, z = (float(w) for w in truth)
     slope = np.array(scene.euler_coefficients) * np.array([y * z, z * x, x * y])
-    # Time (s) by which `omega` is ahead.
-    late = float(error @ slope / (slope @ slope))
+    late = float(error @ slope / (slope @ slope))  # s; positive if `omega` is ahead of `truth`
     return {"energy": change(1), "momentum": 0.5 * change(2), "phase": body.frequency * late}
 
 

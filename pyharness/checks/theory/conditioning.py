@@ -72,8 +72,8 @@ class Conditioning:
         return 0.0 if math.isnan(allowed) else min(2.0, allowed)
 
     def angle_limit(self, made: float, time: float) -> float:
-        """Return an attitude's allowed error (rad) at `time` (s); `made` sums step errors."""
-        # As if omega had its largest rounding error at all times.
+        """Return an attitude's allowed error (rad) at `time` (s) from step errors of sum `made`."""
+        # Assume the largest rounding error of omega at all times.
         turned = self.rounding * (1.0 + math.sqrt(3.0) * self.largest * abs(time))
         return made + turned + ATTITUDE
 

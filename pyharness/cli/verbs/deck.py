@@ -17,7 +17,7 @@ OPTIONS = {
     "(default: as published, Case 5 for runge-kutta and Case 2 for the others).",
     **{each: shared.LISTING[each] for each in list(shared.LISTING)[:5]},
     "--dialect D": f"Form of the deck: {', '.join(DIALECTS)} (default {DIALECTS[0]}, as printed). "
-    "gfortran is for this compiler, ftn a batch job for the compiler of CDC computers.",
+    "gfortran is for GNU Fortran, ftn a batch job for the compiler of CDC computers.",
     "--system S": "With --dialect ftn, operating system of the CDC computer: "
     f"{' or '.join(SYSTEMS)} (default nos).",
     "--round": "With --dialect ftn, round results instead of truncating them.",

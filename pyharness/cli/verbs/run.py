@@ -42,7 +42,8 @@ OPTIONS = {
     "--times T1,T2,...": "Times of the results, in s, positive or negative, in increasing or "
     "decreasing order (default: the ends of the scene's steps).",
     "--attitude [FORM]": "Compute the attitude (orientation) of the body, in this form: "
-    f"{', '.join(FORMS)} (default {FORMS[0]}, always in JSON). 3-1-3 and 3-2-1 are Euler angles.",
+    f"{', '.join(FORMS)} (default {FORMS[0]}; JSON always has quaternions). 3-1-3 and 3-2-1 "
+    "are Euler angles.",
     "--animate FILE": "Write an animation of the rotating body to this file (.gif or .html); "
     "needs --attitude or a scene with an attitude.",
     "--tolerance E": "Largest allowed error of omega, relative to its largest component (default: "

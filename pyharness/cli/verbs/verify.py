@@ -50,11 +50,11 @@ OPTIONS = {
     "docs/how-to/external.md).",
     "--listing-output FILE": "Find the floating-point arithmetic of an unknown computer from a "
     "page that one of the three programs printed there (only with --format table or json).",
-    "--port COMMAND": "Compare bit for bit our Python programs with your port of them to another "
-    "language, which COMMAND starts (protocol: docs/how-to/ports.md).",
+    "--port COMMAND": "Compare our Python programs bit for bit with your port of them, which "
+    "COMMAND starts (protocol: docs/how-to/ports.md).",
     "--integrator COMMAND": "Compare your integrator of rigid-body motion, which COMMAND starts, "
     "with true solutions, and name its faults (protocol: docs/how-to/integrators.md).",
-    "--order P": "With --integrator, lowest order of convergence that passes, above 0, at most 40 "
+    "--order P": "With --integrator, lowest order of convergence that passes, above 0, up to 40 "
     "(default 1).",
     "--program P": "Only this program: two-term, four-term or runge-kutta (not with --integrator; "
     "default: all three).",

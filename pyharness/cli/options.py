@@ -62,7 +62,7 @@ EFFORT = {"--effort F": _EFFORT.format(10, " (30 for a program of the thesis)")}
 EFFORT_WITHOUT_PROGRAMS = {"--effort F": _EFFORT.format(10, "")}
 EFFORT_OF_PROGRAMS = {"--effort F": _EFFORT.format(30, "")}
 STRICT = {
-    "--strict": "Exit with status 1 if a method ends before the last requested time, or if "
+    "--strict": "Exit with status 1 also if a method ends before the last requested time, or if "
     "its amplified rounding errors may exceed its tolerance. Without --strict, the status is 1 "
     "only if Fortran and Python differ, a corrected program misses its order of convergence, or a "
     "method of --method misses its tolerance or ends although the true solution continues."

@@ -35,7 +35,8 @@ class Field:
     title: str
     allowed: str = "a finite number"  # description of accepted values
     takes: Callable[[float], bool] = lambda value: True  # whether a value is accepted
-    looped: bool = False  # whether scenes of one call share the value; see `looped_fields`
+    # whether scenes of one call share the value; see `looped_fields`
+    looped: bool = False
     whole: bool = False  # whether values are rounded to integers
 
 

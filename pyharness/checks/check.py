@@ -239,6 +239,15 @@ def may_hold(id: str, only: Sequence[str]) -> bool:
     return selected(id, only) or any(each.startswith(id + "/") for each in only)
 
 
+def without_check(only: Sequence[str], checks: Sequence[Check]) -> list[str]:
+    """Return the ids in `only` that name no check; empty if one failed."""
+    # A check that raised has another id than the requested one.
+    if not all(check.passed for check in checks):
+        return []
+    ids = [check.id for check in checks]
+    return [x for x in only if "/" in x and not any(selected(id, [x]) for id in ids)]
+
+
 @dataclass(frozen=True)
 class Selection:
     """The choice of the checks that one run of `verify` makes."""

@@ -96,8 +96,7 @@ class Stepper:
     ) -> None:
         wants = checked_scene(scene, *[True] * 5).has_attitude
         attitude = wants if attitude is None else boolean("attitude", attitude)
-        self._time = 0.0
-        self._steps = 0
+        self._time, self._begin, self._steps = 0.0, 0.0, 0
         self._tolerance = tolerance_of(tolerance, FINEST)
         if not FINEST <= self._tolerance <= 1.0:
             raise InputError(f"tolerance is {self._tolerance:g}; allowed: {FINEST:g} to 1")
@@ -112,7 +111,6 @@ class Stepper:
         self._origin = [0.0, *self._state.tolist()]
         self._trial, self._largest = LONGEST_TRIAL, 0.0
         self._last = Step(0.0, self._state[None], self._state, 0)
-        self._begin = 0.0
 
     @property
     def time(self) -> float:
@@ -146,7 +144,7 @@ class Stepper:
                 f"the scene has the states {names}; allowed: those of the first scene, "
                 f"{list(self.states)}"
             )
-        self._tape = _equations(scene, torque.tape, self._n == 7)
+        self._tape = _equations(scene, torque.tape, self._n)
         self._packed = kernel_tape(self._tape)
         self._breaks = self._tape.breaks
         self._scene = scene
@@ -234,8 +232,8 @@ class Stepper:
         # For a body at rest, a guess of the omega that it reaches.
         scale = self._largest or math.sqrt(np.abs(self._rates()[:3]).max()) or 1.0
         # Errors of own states are relative to these sizes; a state that is 0 so far has a guess.
-        own_sizes = np.maximum(self._own_sizes, np.abs(self._state[self._n : -3]))
-        self._own_sizes = sizes = own_sizes
+        sizes = own_sizes = np.maximum(self._own_sizes, np.abs(self._state[self._n : -3]))
+        self._own_sizes = own_sizes
         if not own_sizes.all():
             rates = np.abs(self._rates()[self._n : -3])
             guess = rates * min(abs(longest), self._trial, 1.0 / scale)
@@ -256,7 +254,7 @@ class Stepper:
                 raise SingularError(what, self._time)
             reached = float(np.abs(taken.state[:3]).max())
             own = np.abs(taken.state[self._n : -3])
-            is_far = (self._own_sizes == 0.0) & (own > 0.0) & (own < 0.5 * sizes)
+            is_far = (own_sizes == 0.0) & (own > 0.0) & (own < 0.5 * sizes)
             if (self._largest > 0.0 or not 0.0 < reached < 0.5 * scale) and not is_far.any():
                 return taken
             if self._largest == 0.0 and reached > 0.0:
@@ -314,9 +312,8 @@ class Stepper:
             self._last = Step(0.0, self._state[None], self._state, 0)
 
 
-def _equations(scene: Scene, torque: Tape, attitude: bool) -> Tape:
-    """Return the recorded rates of omega, attitude if computed, own states and held torque."""
-    n = 7 if attitude else 3
+def _equations(scene: Scene, torque: Tape, n: int) -> Tape:
+    """Return the recorded rates of omega, attitude (if n is 7), own states and held torque."""
     recorder = Recorder(2 * MOST_OPERATIONS, n + len(scene.states) + 4)
     time, *unknowns = recorder.inputs()
     omega: Any = np.array(unknowns[:3], dtype=object)
@@ -333,7 +330,7 @@ def _equations(scene: Scene, torque: Tape, attitude: bool) -> Tape:
     else:
         rates = rates_about_body_axes(scene.inertia, omega, total)
     rates = list(rates)
-    if attitude:
+    if n == 7:
         rates += quaternion_rates(omega, q)
     return recorder.tape([*rates, *found[3:], 0.0, 0.0, 0.0])
 

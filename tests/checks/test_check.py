@@ -5,7 +5,16 @@ from collections.abc import Iterator
 import pytest
 
 from docs.certificates.limits import counts_table, limits
-from pyharness.checks.check import BITS, Attempt, Attempts, Check, Name, make_checks, run_suites
+from pyharness.checks.check import (
+    BITS,
+    Attempt,
+    Attempts,
+    Check,
+    Name,
+    make_checks,
+    run_suites,
+    without_check,
+)
 from pyharness.checks.report import basis_note, marks
 from pyharness.model.basis import MARKS, Basis
 from pyharness.model.errors import InputError, NotBuiltError
@@ -49,6 +58,12 @@ def test_only_what_is_requested_is_computed() -> None:
     assert len(list(make_checks(attempts, []))) == 6
     # Checks that have been computed already were selected before.
     assert list(make_checks(found, ["d"])) == found
+
+
+def test_requested_ids_without_a_check_are_found_unless_one_failed() -> None:
+    passed, failed = (Name("a", x).judged(x == "b", "") for x in "bc")
+    assert without_check(["a/b", "a", "a/b/none", "a/n"], [passed]) == ["a/b/none", "a/n"]
+    assert without_check(["a/b", "a/b/none"], [passed, failed]) == []
 
 
 def test_a_record_tells_id_and_replay_and_what_a_number_is_compared_with() -> None:

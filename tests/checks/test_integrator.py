@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
 
+from pyharness.checks.check import Name
 from pyharness.checks.integrators.faults import FAULTS, motions, true_motion
+from pyharness.checks.integrators.judging import Verdict
 from pyharness.checks.integrators.plants import PLANTS, self_test
 from pyharness.checks.integrators.problem import LEVELS, convergence, growth_power, problems
 from pyharness.checks.integrators.protocol import read_motion, request
@@ -61,6 +63,17 @@ def _json(capsys: Capture, command: str, *words: str, status: int = 0) -> Any:
 
 def _faults(record: Any) -> set[str]:
     return {each["name"] for each in record["findings"]}
+
+
+def test_the_first_of_checks_made_together_has_their_time() -> None:
+    found = Verdict("command")
+    checks = [Name("integrator", x).judged(True, "") for x in "ab"]
+    begin = found.begin
+    for _ in range(2):
+        found.add("", *checks)
+    first, second, third, fourth = (check.took for check in found.checks)
+    assert first and third and first + third == pytest.approx(found.begin - begin)
+    assert second == fourth == 0.0
 
 
 @pytest.mark.campaign

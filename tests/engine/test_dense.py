@@ -84,6 +84,15 @@ def test_the_derivative_is_that_of_the_solution(name: str) -> None:
     assert sol.derivative(times) == pytest.approx(slope / (60.0 * step), rel=0.0, abs=1e-9)
 
 
+def test_the_derivative_of_omega_about_body_axes_without_attitude() -> None:
+    found = [
+        sol_of(solve(SCENES["full"], 3.0, "taylor", 1e-12, attitude=turns, dense_output=True))
+        for turns in (False, True)
+    ]
+    without, turning = (sol.derivative(2.0) for sol in found)
+    assert without == pytest.approx(turning[:3], abs=1e-10)
+
+
 def test_the_derivative_under_an_opaque_torque() -> None:
     torque = torques.opaque(lambda t, omega: [-0.1 * omega[0], 0.0, math.sin(t)])
     scene = Scene("opaque", (1.0, 0.0, 0.0), moments=(2.0, 2.0, 2.0), torque=torque)
@@ -263,12 +272,13 @@ def test_changing_inertia_has_steps_too() -> None:
     assert found.sol(5.0)[2] == pytest.approx(solve(scene, [5.0]).omega[0, 2], abs=1e-8)
 
 
-@pytest.mark.parametrize("name", ["damping", "table", "changing", "full", "fast"])
+@pytest.mark.parametrize("name", ["damping", "table", "changing", "full", "turning", "fast"])
 def test_the_steps_of_a_recorded_torque_are_read_and_nothing_is_solved_again(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     recorded = {
         "full": replace(SCENES["full"], torque=torques.damping([0.1, 0.2, 0.3])),
+        "turning": replace(SCENES["full"], torque=lambda t, w, q: [0.3 * q[1], q[2] * q[0], 0.0]),
         # In another unit of time.
         "fast": Scene("fast", (1e200, 2e200, 1e199), MOMENTS, torque=torques.damping(1e199)),
     }

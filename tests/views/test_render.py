@@ -85,6 +85,8 @@ def test_record_and_cases() -> None:
     assert [each.attrib["classname"] for each in suite.iter("testcase")] == ["verify.cells"] * 2
     times = [each.get("time") for each in (suite, *suite.iter("testcase"))]
     assert times == ["1.500000", None, "1.500000"]
+    untimed = REPORT._replace(cases=[("cells", "cells/a", "", "again a", None)])
+    assert "time" not in xml.fromstring(render(untimed, "junit").encode()).attrib
 
 
 def test_wide_table_has_parts_or_wrapped_values() -> None:

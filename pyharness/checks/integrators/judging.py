@@ -82,8 +82,9 @@ class Verdict:
 
     def add(self, scene: str, *checks: Check) -> None:
         # The first of several checks made together has all their time.
-        took, self.begin = time.perf_counter() - self.begin, time.perf_counter()
-        times = [took, *[0.0] * len(checks)]
+        now = time.perf_counter()
+        times = [now - self.begin, *[0.0] * len(checks)]
+        self.begin = now
         again = self.again(scene)
         pairs = zip(checks, times, strict=False)
         self.checks += [replace(check, again=again, took=each) for check, each in pairs]

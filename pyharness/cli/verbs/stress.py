@@ -3,7 +3,7 @@
 import argparse
 import shlex
 
-from pyharness.checks.check import Check, requested_suites, selected
+from pyharness.checks.check import Check, requested_suites, without_check
 from pyharness.checks.stress import SCENE_TRIALS, TRIALS, Trial, stress, trial, worst
 from pyharness.checks.stress_report import stress_report
 from pyharness.cli import options as shared
@@ -42,10 +42,8 @@ def run(options: argparse.Namespace) -> int:
         shared.progress(names.index(check.suite), len(names), check.id)
         checks.append(check)
     shared.end_progress()
-    ids = [check.id for check in checks]
-    missing = [x for x in only if "/" in x and not any(selected(id, [x]) for id in ids)]
-    # A check that raised an exception has another id.
-    if not checks or (missing and all(check.passed for check in checks)):
+    missing = without_check(only, checks)
+    if missing or not checks:
         raise unknown("check", ",".join(missing or only), trials or TRIALS, "--only")
     failed = [check for check in checks if not check.passed]
     if options.save is not None:

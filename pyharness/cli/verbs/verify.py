@@ -11,7 +11,7 @@ from pyharness.checks.check import (
     Selection,
     may_hold,
     requested_suites,
-    selected,
+    without_check,
 )
 from pyharness.checks.kinds import KINDS, verify
 from pyharness.checks.random_methods import ROUNDING
@@ -111,10 +111,8 @@ def run(options: argparse.Namespace) -> int:
     for check in verify(chosen):
         checks.append(check)
         shared.progress(kinds.index(check.suite), len(kinds), check.id)
-    ids = [check.id for check in checks]
-    missing = [x for x in chosen.only if "/" in x and not any(selected(id, [x]) for id in ids)]
-    # A check that raised an exception has another id.
-    if not checks or (missing and all(check.passed for check in checks)):
+    missing = without_check(chosen.only, checks)
+    if missing or not checks:
         if kinds == ["random"] and not chosen.draws:
             raise InputError("--draws 0 leaves no random scene to check; allowed: 1 or more")
         asked = missing[:1] or chosen.only

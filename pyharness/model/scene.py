@@ -191,8 +191,11 @@ class Scene:
             )
         self._set("name", printable(" ".join(self.name.split()))[:_LONGEST_NAME].rstrip())
         self._set_changing()
-        bodies = (self.moments, self.coefficients, self.inertia, self.changing)
-        if sum(each is not None for each in bodies) != 1:
+        bodies = ("moments", "coefficients", "inertia", "changing")
+        given = [each for each in bodies if getattr(self, each) is not None]
+        if len(given) > 1:
+            raise InputError(f"[body] has {' and '.join(given)}; allowed: one of them")
+        if not given:
             raise InputError(
                 "[body]: give either moments or coefficients, three numbers, or inertia, three rows"
             )

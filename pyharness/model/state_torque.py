@@ -476,6 +476,8 @@ def _takes_attitude(function: object) -> bool:
     required = [each.kind for each in parameters if each.default is Parameter.empty]
     many = Parameter.VAR_POSITIONAL in required
     count = sum(each in _POSITIONAL for each in required)
+    if any(each.name == "states" for each in places):
+        raise InputError("[torque]: the function has an argument states; give the scene's states=")
     if Parameter.KEYWORD_ONLY in required or count > 3 or not (many or len(places) >= 2):
         raise InputError(f"[torque]: the function has {len(places)} arguments; {_ARGUMENTS}")
     return count == 3 or (count < 2 and many)

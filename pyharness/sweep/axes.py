@@ -242,7 +242,8 @@ def _listed(where: str, table: dict[str, Any], field: str, dimension: str) -> Ax
     _refuse(where, table, "values", _SPREAD_KEYS)
     values = table["values"]
     if not isinstance(values, list) or not values:
-        raise InputError(f"{where}: values is {kind_of(values)}; allowed: a list, not empty")
+        what = "empty" if values == [] else kind_of(values)
+        raise InputError(f"{where}: values is {what}; allowed: a list, not empty")
     if field in CHOICES:
         for each in values:
             if not isinstance(each, str):

@@ -75,7 +75,8 @@ def _sweep(data: dict[str, Any], path: Path, text: str, claims: Mapping[str, Cla
     _check_axes(axes, scene)
     entries = data.get("reductions", ["end", "status"])
     if not isinstance(entries, list) or not entries:
-        raise InputError(f"reductions is {kind_of(entries)}; allowed: a list, not empty")
+        what = "empty" if entries == [] else kind_of(entries)
+        raise InputError(f"reductions is {what}; allowed: a list, not empty")
     reductions = tuple(_reduction(each, claims) for each in entries)
     chunk = integer("chunk", data.get("chunk", CHUNK))
     if not 1 <= chunk <= _MOST_IN_CHUNK:

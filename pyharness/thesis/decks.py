@@ -136,8 +136,10 @@ def _is_made(
 
 
 def _model(terms: int, listing: Listing, scene: Scene | None) -> dict[int, str]:
-    if listing.program != "four-term" or terms not in MODELS:
-        raise InputError(f"terms is {terms}; allowed: 3 or 5, with program four-term")
+    if listing.program != "four-term":
+        raise InputError("terms: not for this program; allowed: with program four-term")
+    if terms not in MODELS:
+        raise InputError(f"terms is {terms}; allowed: 3 or 5")
     if scene is not None and scene.torque.varies:
         raise InputError("--terms writes no torque that varies with time; allowed: --case 1 to 6")
     cards = model_cards(terms)

@@ -247,6 +247,19 @@ def test_run_says(options: str, words: str, printed: Printed) -> None:
     assert words in printed(f"run --case {options}")
 
 
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("plan --case 3 --times 1,2,1", "times: not strictly monotonic"),
+        ("deck --program two-term --terms 5", "terms: not for this program; allowed: with program"),
+        ("deck --program four-term --terms 4", "terms is 4; allowed: 3 or 5"),
+    ],
+)
+def test_an_unsuitable_value_is_refused(line: str, told: str, capsys: Capture) -> None:
+    assert main(line.split()) == 2
+    assert told in capsys.readouterr().err
+
+
 def test_options_reach_the_program(printed: Printed) -> None:
     def record(options: str) -> dict[str, Any]:
         return _record(printed, f"run --case 3 --program runge-kutta {options}")

@@ -371,6 +371,8 @@ def test_stepper_agrees_and_states_may_be_set() -> None:
         torque=wheel, states={"wheel": 0.0},
     )  # fmt: skip
     assert stepper.omega == pytest.approx(solve(later, 1.0, attitude=True).omega[0], rel=1e-11)
+    with pytest.raises(InputError, match="an argument states; give the scene's states="):
+        Scene("none", (0.0, 0.0, 1.0), MOMENTS, torque=lambda t, omega, states: states["wheel"])
     with pytest.raises(InputError, match="allowed: a dict of wheel"):
         stepper.states = {"wheels": 0.0}
     with pytest.raises(InputError, match="allowed: those of the first scene"):

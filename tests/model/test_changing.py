@@ -165,6 +165,8 @@ def test_scene_has_changing_moments_in_place_of_constant_ones() -> None:
     assert "changing" not in repr(Scene("plain", (0.0, 1.0, 1.0), moments=(1, 2, 3)))
     assert pickle.loads(pickle.dumps(scene)) == scene
     assert hash(scene) == hash(Scene("booms", (0.0, 1.0, 1.0), changing=BOOMS))
+    with pytest.raises(InputError, match="has inertia and changing; allowed: one of them"):
+        replace(scene, inertia=np.diag([2.0, 3.0, 4.0]))
 
 
 @pytest.mark.parametrize("more", [[], [0.0], [0.0, -0.0]])

@@ -188,7 +188,8 @@ DRAWN = PLACED + "draw = 'normal'\nmean = 0.0\ncount = 2\n"
 REFUSED = {
     f"name = 3\n{CASE}{OMEGA}": "name is a whole number; it must be text",
     CASE + "".join(axis(f"constants.{n}", [1.0]) for n in range(40)): "axis: 40 of them",
-    f"reductions = []\n{CASE}{OMEGA}": "reductions is a list; allowed: a list, not empty",
+    f"reductions = []\n{CASE}{OMEGA}": "reductions is empty; allowed: a list, not empty",
+    f"{CASE}{axis('steps', [])}": "values is empty; allowed: a list, not empty",
     f"scene = 3\n{OMEGA}": "scene is a whole number; it must be a table [scene]",
     f"[scene]\ncase = 3\nfile = 'a.toml'\n{OMEGA}": "[scene]: allowed: case, or file, or",
     f"[scene]\nfile = 3\n{OMEGA}": "[scene] file is a whole number; it must be text",

@@ -5,6 +5,7 @@ import argparse
 from pyharness.cli import options as shared
 from pyharness.engine.plan import plan
 from pyharness.engine.report import plan_report
+from pyharness.engine.solve import ascending_times
 from pyharness.engine.solver import PREPARED
 
 OPTIONS = {
@@ -29,7 +30,8 @@ def run(options: argparse.Namespace) -> int:
     method = options.method or "auto"
     shared.check_known("method", method, tuple(PREPARED))
     tolerance = shared.chosen_tolerance(options)
-    rows = options.times is not None and len(shared.numbers(options.times, "--times")) > 1
+    given = () if options.times is None else shared.numbers(options.times, "--times")
+    rows = bool(given) and len(ascending_times(given)[0]) > 1
     shared.check_outputs(options)
     found = plan(scene, method, tolerance, options.velocity, rows)
     return shared.show(plan_report(scene, found), options)

@@ -72,7 +72,9 @@ def test_the_first_of_checks_made_together_has_their_time() -> None:
     for _ in range(2):
         found.add("", *checks)
     first, second, third, fourth = (check.took for check in found.checks)
-    assert first and third and first + third == pytest.approx(found.begin - begin)
+    assert first
+    assert third
+    assert first + third == pytest.approx(found.begin - begin)
     assert second == fourth == 0.0
 
 

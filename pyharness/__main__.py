@@ -1,6 +1,6 @@
 """The entry point of `python -m pyharness` and of the command `pyharness`."""
 
-# Importing `signal` instead would import other modules too, and take some 10 ms.
+# `signal` would import other modules too, which takes some 10 ms.
 import _signal as signal  # type: ignore[import-not-found]  # noqa: PLC2701
 import os
 
@@ -19,7 +19,7 @@ if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
 
 
 def start() -> None:
-    """Run the command line, and exit with its status, promptly after Ctrl-C."""
+    """Run the command line, and exit with its status."""
     from pyharness.cli import interruption
     from pyharness.cli.main import main
 

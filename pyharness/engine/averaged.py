@@ -1,6 +1,6 @@
 """The method `averaged`: weak torques over very many revolutions, by two-scale averaging.
 
-A macro-step, 100 revolutions or more, computes the slow drift of the torque-free motion, sampled
+A macro-step of at least 100 revolutions computes the slow drift of the torque-free motion, sampled
 once per revolution (the stroboscopic solution).
 
 Stroboscopic averaging: Calvo, Chartier, Murua and Sanz-Serna 2011, Applied Numerical Mathematics
@@ -26,7 +26,7 @@ from pyharness.model.trajectory import ROUNDING, Trajectory
 # Cosines and sines of eight angles psi (see averaged_coordinates) at which the initial omega is
 # perturbed.
 _PSI = np.cos(0.25 * math.pi * np.arange(8)), np.sin(0.25 * math.pi * np.arange(8))
-_MOST_ENDS = 4  # ends of macro-steps at which the error is estimated
+_MOST_ENDS = 4  # ends of macro-steps, besides the last, at which the error is estimated
 
 NODES = 20  # Chebyshev points in a macro-step
 _TURN = 2.0 * math.pi
@@ -38,7 +38,7 @@ _BEYOND, _TURNS_BEYOND = 0.02, 3
 # Factors on the length of a macro-step: after a failure, after a success at the first attempt, and
 # after a later success.
 _SHORTER, _LONGER, _HARDLY_LONGER = 0.5, 4.0, 1.2
-_RELATIVE = 1.3  # ratio of the first macro-step to the angle in which the motion changes
+_RELATIVE = 1.3  # largest predicted relative change of the motion in a macro-step
 _APPROACH = 2.0  # the length is divided by this if the motion approaches the separatrix
 _WAVE = 4.0  # phase of a wave (rad) that counts as a relative change of 1
 # The number of angles is such that oscillations have the relative error exp(-_DIGITS/2), and means
@@ -68,7 +68,7 @@ def estimates(
 ) -> tuple[float, float]:
     """Return the estimated error of omega (rad/s), and the error amplification.
 
-    Both are maxima over the ends of up to five macro-steps.
+    Both are maxima over the ends of up to five macro-steps; `omega` and `angle` (rad) are final.
     """
     a, b, c = coefficients
     error, growth, count = 0.0, 1.0, len(done)
@@ -98,7 +98,7 @@ def averaged(
 ) -> Trajectory:
     """Return the trajectory at `times` (s) under a weak torque.
 
-    The result's `steps` are macro-steps. Raise InputError for an unsuitable scene.
+    The result's `steps` are macro-steps; `effort` is a factor on the work limit.
     """
     # The next macro-step refuses a point that is not finite.
     with np.errstate(all="ignore"):

@@ -1,4 +1,4 @@
-"""For `averaged`: the torque, and coordinates of omega that a weak torque changes slowly.
+"""Torque, and coordinates of omega that a weak torque changes slowly, for `averaged`.
 
 The body rotates about principal axis a; axes b and c follow in cyclic order. Euler's equations are
 w_b' = P w_c w_a + n_b, w_c' = Q w_a w_b + n_c and so on, where n is torque over moment (rad/s2),
@@ -164,16 +164,13 @@ def torque_of(scene: Scene) -> tuple[Torque, bool]:
 
 
 class _Slot(NamedTuple):
-    degree: float = 0.0  # of the polynomial factor; infinite if another factor is no wave
+    degree: float = 0.0  # of the polynomial factor; infinite if a factor is no sine or cosine
     fastest: float = 0.0  # highest frequency of the waves, rad/s
-    rate: float | None = None  # 1/s, of a slot that is linear in time alone
+    rate: float | None = None  # 1/s, if linear in time alone
 
 
 def fastest_of(torque: TorqueLaw | StateTorque) -> float:
-    """Return the highest frequency (rad/s) of a torque's sines and cosines.
-
-    Raise InputError if a macro-step may miss the torque's changes.
-    """
+    """Return the highest frequency (rad/s) of a torque's sines and cosines."""
     if isinstance(torque, TorqueLaw):
         return max((abs(f) for a, f in torque.sines + torque.cosines if any(a)), default=0.0)
     assert torque.tape is not None

@@ -117,7 +117,7 @@ class NotResolvedError(Exception):
 
 
 class MacroStep:
-    """The solution over one macro-step, with the measured `error` of V."""
+    """The solution V (p1, p2, p3 and time) over one macro-step, with its measured `error`."""
 
     def __init__(
         self,
@@ -129,9 +129,9 @@ class MacroStep:
         length: float,
         sizes: tuple[int, int],
     ) -> None:
-        """Solve over `length` (rad), a multiple of 2 pi, or raise NotResolvedError.
+        """Solve over `length` (rad), a multiple of 2 pi.
 
-        `sizes` are the even numbers of nodes and angles.
+        `sizes` are the numbers of nodes and angles; the latter is even.
         """
         self.coordinates, self._torque, self._start_time = coordinates, torque, start_time
         self._start, self.length, self._sizes = start[:, None], length, sizes
@@ -175,7 +175,6 @@ class MacroStep:
         self.error = self._measured()
 
     def _check(self, mean: Array) -> None:
-        # The largest squared elliptic modulus.
         self.modulus = float(self.coordinates.modulus(mean).max())
         if not (np.isfinite(mean).all() and self.modulus < 1.0):
             raise NotResolvedError
@@ -265,8 +264,8 @@ class MacroStep:
             if np.abs(change).max() <= _CLOSE:
                 angle = angle + change
                 break
-            # Near the separatrix omega is slow in a part of each revolution, where Newton's method
-            # leaves the interval that is known to contain the angle, or does not converge.
+            # Near the separatrix psi is slow in a part of each revolution; there Newton's method
+            # may diverge, or leave the interval that contains the angle.
             low = np.where(change > 0.0, np.maximum(low, angle), low)
             high = np.where(change < 0.0, np.minimum(high, angle), high)
             near = angle + change

@@ -34,7 +34,7 @@ def period_of(scene: Scene) -> float:
 def _largest_estimate(
     scene: Scene, times: Sequence[float], noise: float
 ) -> tuple[float | None, float | None]:
-    """Return estimated error and amplification at the end or, if amplified, maxima at 16 times."""
+    """Return the estimated error and amplification at the end, or maxima over up to 16 times."""
     error, growth = closed_form_estimate(scene, scene.omega, times[-1], noise)
     if error is None or growth is None or growth < _CALM:
         return error, growth
@@ -47,10 +47,7 @@ def _largest_estimate(
 def known_solution(
     scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
 ) -> Trajectory:
-    """Return the trajectory at `times` (s) in closed form.
-
-    Raise InputError if the scene has none, or the phase exceeds 1e15 rad.
-    """
+    """Return the trajectory at `times` (s) in closed form."""
     work = np.array([effort, 0.0])
     attitudes = None
     if scene.attitude is not None:

@@ -72,7 +72,7 @@ def with_events(
 def _first_periods(
     found: Trajectory, rows: dense.Rows, tolerance: float, period: float
 ) -> Trajectory:
-    """Return `found`; a side of time 0 with over six periods is cut to three."""
+    """Return `found`, with three periods on a side of time 0 that has over six."""
     ends = found.time[[0, -1]]
     last = PERIODS * period
     # For little more than three periods, repetition would save nothing.

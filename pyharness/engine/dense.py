@@ -106,7 +106,7 @@ def state_pieces(
     ends = sorted({0.0, *found.time[[0, -1]].tolist()})
     if tolerance == 1.0:
         return _of_fixed_steps(scene, ends, rows, partial(rates, scene))
-    # `finest` is the method's smallest tolerance.
+    # No tolerance may be below `finest`, the method's smallest.
     own = [max(finest, part * tolerance) for part in (_NODE_TOLERANCE, _LARGEST_NODE_TOLERANCE)]
     rough = tolerance + _OWN_ROUNDING * (found.growth or 0.0)
     edges = _first_edges(scene, found, ends, tolerance)
@@ -150,7 +150,7 @@ def _first_edges(
 def _fitted(
     edges: list[float], rows: Rows, tolerance: float, own: list[float], rough: float, n_own: int
 ) -> Pieces:
-    # `own` are the tolerances of the rows, and `rough` is their largest error that is not smooth.
+    # `own` are tolerances at the nodes, and `rough` is the largest error that is not smooth.
     open_pieces = [_Open(low, high) for low, high in itertools.pairwise(edges)]
     done: list[tuple[Array, Array, Array]] = []
     n_done = 0

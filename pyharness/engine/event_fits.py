@@ -124,7 +124,7 @@ class Solution:
     @cached_property
     def _sizes(self) -> Array:
         """The largest sizes of unknowns from time 0 to each polynomial."""
-        # The nodes come first, because many short columns are slow.
+        # The maximum is faster with the nodes on the first axis.
         largest = np.abs(self.pieces.values.swapaxes(0, 1), order="C").max(axis=0)
         count = np.searchsorted(self.pieces.edges[:-1], 0.0)
         for side in (largest[:count][::-1], largest[count:]):
@@ -167,7 +167,7 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
             | (level == _MOST_DIVISIONS)
         )
         if len(low) > most:
-            # A function with many jumps need not be divided far from 0.
+            # Intervals in which a function with many jumps is far from 0 need no division.
             is_rough |= ~is_done & (np.abs(values).min(axis=1) > np.ptp(values, axis=1))
             if (~is_done & ~is_rough).sum() > most // 2:
                 raise InputError(
@@ -200,7 +200,7 @@ def noise_of(
 def with_noise(
     g: EventFunction, solution: Solution, fits: Fits, needed: Index
 ) -> tuple[Fits, Roots]:
-    """Return `fits` with `noise` where needed, and roots at time 0 and both ends."""
+    """Return `fits` with `noise` where `needed`, and roots at time 0 and both ends."""
     sizes, largest = fits.sizes, fits.sizes.max(initial=0.0)
     which = np.flatnonzero(needed | (sizes <= largest / MUCH) | (sizes == largest))
     ends, states = solution.at_ends

@@ -211,7 +211,7 @@ def _with_own(
 
 
 def _arguments(given: Callable[..., Any], name: str, with_own: bool = False) -> int:
-    """Return 2 or 3, a function's number of arguments without own states."""
+    """Return the number of a function's arguments, 2 or 3, without the user's own states."""
     if type(given) is FunctionType and not (given.__defaults__ or vars(given).keys() & _SIGNED):
         code = given.__code__
         count = code.co_argcount - with_own

@@ -219,7 +219,7 @@ def _bracketed(c: Array, low: Array, high: Array, sign: Array) -> Array:
 def _bent(
     rows: Index, *given: Array
 ) -> tuple[Array, Index, list[tuple[Array, Array, Index, Index]]]:
-    """Return extrema that may be roots, indices of their polynomials, and parts with one root."""
+    """Return extrema that may be roots, their polynomials, and parts of intervals with one root."""
     c, first, last, slopes, near = (each[rows] for each in given)
     count = len(c)
     low, high = np.full(count, -1.0), np.ones(count)

@@ -33,7 +33,7 @@ class ZeroIntervals:
     after: Array
 
     def roots(self, counts_touches: bool) -> Roots:
-        """Return each interval's root, where integration from time 0 first reaches it.
+        """Return as roots the times at which integration from time 0 first reaches each interval.
 
         Without `counts_touches`, only sign changes away from time 0 count.
         """
@@ -65,7 +65,7 @@ class ZeroIntervals:
         for edges, number in ((before, following - 1), (after, following)):
             near = np.flatnonzero(np.isfinite(edges) & ~found)
             noise = np.maximum(self.noise[number[near]], roots.noise[near])
-            # Roots of odd multiplicity above 1 are inexact.
+            # Half the distance suffices, because roots of odd multiplicity above 1 are inexact.
             middle = 0.5 * roots.time[near] + 0.5 * edges[near]
             found[near] = _is_zero_between(g, solution, edges[near], middle, noise)
         return found

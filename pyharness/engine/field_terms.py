@@ -17,8 +17,7 @@ def gravity_gradient(inertia: Numbers | Iterable[Numbers] | Changing, rate: Numb
 
     I is the inertia matrix, and n the rate of the orbit. The unit vector r from the centre of
     attraction is (cos n t, sin n t, 0) along the axes of space. The torque is 0 if a principal axis
-    is along r. If this axis has the smaller of the two moments in the plane of the orbit, the
-    attitude is stable against rotations in this plane.
+    is along r.
 
     Parameters
     ----------

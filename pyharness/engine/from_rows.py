@@ -16,10 +16,7 @@ _MORE, _LESS = 0.25 + math.sqrt(3.0) / 6.0, 0.25 - math.sqrt(3.0) / 6.0
 
 @np.errstate(over="ignore", invalid="ignore")
 def attitude_from_rows(scene: Scene, time: Array, omega: Array) -> Array:
-    """Return the attitudes, (n, 4), at the times (s) of a table of omega (rad/s).
-
-    After an overflow they are NaN.
-    """
+    """Return the attitudes, (n, 4), at the times (s) of a table of omega (rad/s)."""
     times = np.concatenate([[0.0], time])
     rows = np.vstack([scene.omega, omega])
     slope = scene.right_hand_side()

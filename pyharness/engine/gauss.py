@@ -28,7 +28,7 @@ _NEAR_THE_END = 1e300
 
 class _Solution(NamedTuple):
     rows: Array
-    reached: Array
+    reached: Array  # time and omega at the end
     n_rows: int
     status: int
     evaluations: int
@@ -54,7 +54,7 @@ def gauss(
     lengths = np.abs(np.diff(np.array(times, dtype=float), prepend=0.0))
     lengths = lengths[lengths > 0.0]
     shortest = float(lengths.min())
-    # The first step has at most half a radian of phase, and divides the shortest interval.
+    # The first step has at most half a radian of phase, and divides the shortest interval evenly.
     step = max(1e-300, shortest / max(1.0, math.ceil(min(1e18, 2.0 * rate * shortest))))
     spent, reached = 0, 0.0
     more = 1.0  # ratio of estimated steps of the final solution to steps of the next
@@ -86,9 +86,8 @@ def gauss(
             n = found.n_rows
             scale = max(scale, float(np.abs(found.rows[:, :n]).max(initial=0.0)))
             difference = float(np.abs(found.rows[:, :n] - before.rows[:, :n]).max(initial=0.0))
-            # With as many steps as before in an interval, the difference measures no error, and
-            # `known` is 0.
-            # The estimated error is 2 difference / known, where 2 is a safety factor.
+            # The estimated error is 2 difference / known, with the safety factor 2. If an interval
+            # has as many steps as before, the difference measures no error, and `known` is 0.
             known = float((counts / previous).min(initial=2.0)) ** order - 1.0
             count = int(counts.sum())
             noise = torque_noise(scene, scene.omega, times[-1], count, scale)

@@ -127,7 +127,7 @@ def _in_lanes(text: str) -> str:
         "= 0.0;": "= {0.0};",
     }.items():
         text = text.replace(old, new)
-    # An exponential in lanes is never constant.
+    # Code for vectors has no special case for an exponential of a constant.
     text = re.sub(r"\bz\d+ \? 0\.0 : ", "", text)
     text = re.sub(r"\bsize\((?![cd]\[)", "size_in_lanes(", text)
     return re.sub(r"\bk\*", "whole*", text)

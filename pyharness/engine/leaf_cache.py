@@ -1,7 +1,7 @@
 """Compilation and cache of C code for recorded torques (leaves).
 
-A file is loaded only if it and the folder belong to the user, nobody else may write them, and its
-name has its content's hash.
+A file is loaded only if it and the folder belong to the user, nobody else may write them, and the
+file's name has the hash of its content.
 """
 
 import ctypes
@@ -65,7 +65,7 @@ def leaves_for(scene: Scene, compiled: bool) -> tuple[int, str]:
 
 
 def leaves_of(tape: Tape) -> tuple[int, str]:
-    """Return the address of a tape's compiled code and ``compiled``, or 0 and the reason."""
+    """Return the address of compiled code and ``compiled``, or 0 and the reason."""
     shape = structure(listing(tape))
     if shape is None:
         return 0, "interpreter: switches and torques of 500 operations are not compiled"
@@ -85,7 +85,7 @@ def leaves_of_many(packed: Array, leaves: str) -> str:
 
 @cache  # kernels may use a loaded library as long as the process lives
 def loaded(tape: Structure, place: str) -> int:
-    """Return the address of the compiled functions (see tape.h), or raise LeavesError."""
+    """Return the address of the compiled functions (see tape.h)."""
     try:
         text = whole_source(tape)
         library = CDLL(str(_found(Path(place), _key(text)) or compiled_file(Path(place), text)))

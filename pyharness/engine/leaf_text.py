@@ -66,7 +66,7 @@ def with_slots(text: str, operation: Listed) -> str:
 
 
 def combined(tape: Structure, number: int, name: str, *, is_value: bool) -> str:
-    """Return C code for a linear combination of variables, whose names are `name` and the slot."""
+    """Return C code for a linear combination of variables, named by `name` and their slots."""
     parts = [f"d[{number - 1}]"] * is_value
     parts += [f"c[{i}]*{name}{slot}" for i, slot in numbered_terms(tape, number)]
     return " + ".join(parts) or "0.0"

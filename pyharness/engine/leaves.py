@@ -60,10 +60,7 @@ static void put(double *to, int nodes, double h, abreast a, abreast b, abreast c
 
 @lru_cache(maxsize=64)
 def source(tape: Structure, suffix: str = "") -> str:
-    """Return the C source of the functions of tape.h for one body.
-
-    With a suffix to their names, the functions are static.
-    """
+    """Return the C source of tape.h's functions for one body, static if names get a `suffix`."""
     parts = chain(_expand(tape), _set_jacobian(tape), _set_values(tape), _set_noise(tape))
     text = "\n".join([HEADER, *parts]) + "\n"
     if suffix:
@@ -78,7 +75,7 @@ def names(tape: Structure, suffix: str = "") -> list[str]:
 
 
 def recurrences(tape: Structure) -> tuple[list[str], list[tuple[int, int]]]:
-    """Return C statements for term k of all results, and slots of the products that they sum."""
+    """Return C statements for term k of all results, and the slots whose products they sum."""
     pairs: dict[tuple[int, int], int] = {}
     terms = []
     for operation in tape.operations:
@@ -173,7 +170,7 @@ def _set_jacobian(tape: Structure) -> Iterator[str]:
 
 
 def first_values(tape: Structure) -> list[str]:
-    """Return C definitions of all results' term 0; empty if the interpreter must compute one."""
+    """Return C definitions of term 0 of all results, or [] if the interpreter must compute one."""
     lines = []
     for operation in tape.operations:
         if operation[0] == Operations.LINEAR:
@@ -209,7 +206,7 @@ def kept_values(lines: list[str], rates: list[str], number: str) -> Iterator[str
 
 
 def _roundings(tape: Structure) -> tuple[list[str], list[str]]:
-    """Return C code for errors of results and rates, as in fortran/modern/tape_noise.h."""
+    """Return C code for rounding errors of results and rates, as in fortran/modern/tape_noise.h."""
     # Inputs have no errors.
     known: set[int] = set()
     lines = []
@@ -272,7 +269,7 @@ def derivatives(tape: Structure, count: int) -> tuple[list[str], list[dict[int, 
 
     Values are at the fraction u of a step.
     """
-    # By slot: the names of its derivatives, by unknown.
+    # Names of derivatives, by slot and unknown.
     by = {slot: {slot: "one"} for slot in unknowns_of(tape)}
     lines = [_summed(slot, count) for slot in (TIME, *unknowns_of(tape))]
     for operation in tape.operations:

@@ -192,7 +192,7 @@ def solve_many(
             found = kind_of(parameters)
             raise InputError(f"parameters: {found}; allowed: a dict of names and arrays")
         check_values(scene, parameters)
-        # A torque of time alone is a law, which has no names.
+        # A torque that depends on time alone is a law, without names of parameters.
         scene = replace(scene, torque=getattr(scene.torque, "named", None) or scene.torque)
         arrays |= {f"{PARAMETER}{name}": value for name, value in parameters.items()}
     settings: Any = {"method": method, "tolerance": tolerance, "effort": effort}
@@ -323,7 +323,7 @@ def _solve_groups(
         groups.setdefault(kind, []).append(row)
     for kind, rows in groups.items():
         own: Any = scenes[rows[0]] if kind >= 0 else [scenes[row] for row in rows]
-        # Preparing a kernel takes longer than solving one scene; a torque given as array avoids it.
+        # A torque in an array avoids preparing a kernel, which takes longer than solving one scene.
         alone = {"torque_constant": own.law.constant} if kind >= 0 and own.torque.in_space else {}
         part = solve_many(own, times[rows], step=step, **alone, **settings)
         leaves.add(part.leaves)

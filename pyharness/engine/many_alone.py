@@ -57,7 +57,7 @@ NO_ATTITUDE = "the torque needs the initial attitude; give attitude, or scenes w
 
 
 def is_solved_alone(scene: Scene, arrays: Mapping[str, object]) -> bool:
-    """Return whether the vector kernel refuses the scene; raise InputError for a second torque."""
+    """Return whether the vector kernel refuses the scene."""
     named = [name for name, each in arrays.items() if each is not None]
     if isinstance(scene.torque, StateTorque):
         for name in named:
@@ -75,10 +75,7 @@ def solve_one_by_one(
     scene: Scene, t_end: Any, arrays: dict[str, Any], out: "Ensemble | Array | None", *,
     method: str, tolerance: float, effort: float, estimates: bool, threads: int, compiled: bool,
 ) -> Ensemble:  # fmt: skip
-    """Return final states by prepared solvers; invalid bodies have the status REFUSED.
-
-    Raise InputError for an unsuitable method, attitude or torque.
-    """
+    """Return final states by prepared solvers; invalid bodies have the status REFUSED."""
     by_coefficients = arrays["coefficients"] is not None or scene.coefficients is not None
     if by_coefficients and not isinstance(scene.torque, StateTorque):
         raise InputError(
@@ -102,7 +99,7 @@ def solve_one_by_one(
     leaves = None
     at_rest = partial(replace, scene, omega=_REST, attitude=None)
     shared = lanes = None
-    if not rows:  # bodies that differ in their starts alone share one solver
+    if not rows:  # bodies that differ only in initial states share a solver
         settings["compiled"] = compiled
         key = method, tolerance, *settings.values()
         shared = keep_with(scene, key, lambda: prepare(at_rest(), method, tolerance, **settings))
@@ -149,7 +146,7 @@ def _lanes(
     scene: Scene, rows: Mapping[str, Array], settings: tuple[float, float], attitude: bool,
     compiled: bool,
 ) -> tuple[tuple[Array, Array] | None, str | None]:  # fmt: skip
-    """Return equations and parameters for one kernel call, or None, and `Ensemble.leaves`."""
+    """Return (equations, parameters) of one kernel call, or None, and `Ensemble.leaves`."""
     names = [name for name in rows if name.startswith(PARAMETER)]
     kind = next((name for name in ("moments", "coefficients") if name in rows), None)
     if (

@@ -64,7 +64,7 @@ def many_starts(
 
 
 def times_within(scene: Scene, times: Array) -> Array:
-    """Return times (s), NaN (which kernels refuse) if beyond a zero of a changing moment."""
+    """Return `times` (s), with NaN, which kernels refuse, beyond zeros of changing moments."""
     if scene.changing is None:
         return times
     first, last = scene.changing.span

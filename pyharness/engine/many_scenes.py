@@ -32,7 +32,7 @@ from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
 from pyharness.model.waves import with_merged_rows
 
-_MERGED = ("torque_constant", "sines", "cosines")  # what `with_merged_rows` may change
+_MERGED = ("torque_constant", "sines", "cosines")  # arrays that `with_merged_rows` may change
 _NOTHING = np.empty((4, 0), order="F")  # in place of attitudes
 _UNKNOWN = -1.0  # in place of an estimate that the kernel does not compute
 _MOST_KEPT = 8  # scenes whose arrays are kept
@@ -267,7 +267,7 @@ def solve_bodies(
     found = place_for(out, n, attitude is not None, with_estimates)
     if found.estimates is not None:
         found.estimates[:] = _UNKNOWN
-    # As in `many_starts`.
+    # A kernel may write a result before it reads the initial state.
     if np.may_share_memory(omega, found.omega):
         omega = omega.copy()
     if attitude is not None and np.may_share_memory(attitude, found.attitude):

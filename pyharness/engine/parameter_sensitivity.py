@@ -97,9 +97,9 @@ def checked_names(
 def sensitivities_at(
     scene: Scene, found: Trajectory, names: Sequence[str], effort: float, states: States
 ) -> dict[str, Array]:
-    """Return the derivatives of k unknowns at n times by each parameter's m values, (n, k, m).
+    """Return, by name, derivatives of k unknowns at n times by a parameter's m values, (n, k, m).
 
-    `states` solves a changed scene.
+    `states` returns a changed scene's unknowns.
     """
     if not names:
         return {}

@@ -40,13 +40,13 @@ _KINDS = {
     "floor": (Operations.FLOOR, 1),
     "select": (Operations.SELECT, 1),
 }
-# The first trial step, in the user's unit of time. It hardly matters, because a series gives a step
-# of any length up to 16 times this.
+# The first trial step, in the user's unit of time. It hardly matters, because the series then gives
+# a step of any length up to 16 times this.
 LONGEST_TRIAL = 1e3
 
 
 def inputs_of(times: Array, state: Array) -> list[Array]:
-    """Return eight inputs of a tape, each (n,), from states (n, 7), or (n, 3) without attitude."""
+    """Return a tape's inputs, each (n,), from times and states (n, m); missing ones are 0."""
     columns = [times, *state.T]
     return columns + [np.zeros(len(times))] * (N_INPUTS - len(columns))
 
@@ -146,7 +146,7 @@ class Listing(NamedTuple):
     tables: list[Table]
 
 
-# Index, in a tape's array, of the address of compiled leaves or the number of built ones.
+# Index, in a tape's array, of compiled code's address, or its number if built with the package.
 _LEAVES = 7
 
 

@@ -211,7 +211,7 @@ def requested_tolerance(method: str, tolerance: Number | None) -> float:
 
 
 def computes_attitude(scene: Scene, method: str, requested: bool | None) -> bool:
-    """Return `requested`; for None, whether the attitude is given or needed, and computable."""
+    """Return whether to compute the attitude; by default if given or needed, and computable."""
     if requested is None:
         able = REGISTRY[method].attitude
         if method == "closed-form":

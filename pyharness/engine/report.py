@@ -36,7 +36,7 @@ _ATTITUDE = {
     ),
 }
 _POINTS = 2001  # of a curve from dense output, at least
-_MOST_MARKS = 100  # rows that are marked beside such a curve
+_MOST_MARKS = 100  # points marked on such a curve
 _END: dict[str, Any] = {
     "color": "black", "marker": "x", "linestyle": "none", "clip_on": False, "zorder": 5,
 }  # fmt: skip
@@ -52,7 +52,6 @@ def trajectory_report(
     word: str | None = None,  # a thesis program's arithmetic; None is binary64
     bound: "ErrorBound | None" = None,
 ) -> Report:
-    """Return the report of a trajectory, with a table and a picture."""
     times = np.column_stack([trajectory.time, trajectory.recorded_time])
     blocks: list[tuple[tuple[Column, ...], Array]] = [(_TIMES, times), (_OMEGA, trajectory.omega)]
     if trajectory.velocity is not None:
@@ -65,7 +64,7 @@ def trajectory_report(
     rows = np.column_stack([values for _, values in blocks])
     numbers = Table(columns, rows)
     steps = np.arange(1, len(rows) + 1)
-    # The nine elements of a matrix fill the width of a terminal; beside them only time is shown.
+    # A terminal has the width for a matrix's nine elements and the time alone.
     kept = [0, *range(5, len(columns))] if form == "matrix" else list(range(len(columns)))
     counted = Table(
         [Column("step", digits(".0f")), *(columns[k] for k in kept)],

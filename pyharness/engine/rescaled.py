@@ -38,10 +38,7 @@ _NEGLIGIBLE = 2.0**-60
 
 
 def scaled(scene: Scene, factor: float) -> Scene:
-    """Return the scene whose solution is factor * omega(factor * t).
-
-    Raise InputError if the torque or a changing inertia prevents this.
-    """
+    """Return the scene whose solution is factor * omega(factor * t)."""
     torque = scene.torque
     tape = _tape(torque, factor) if isinstance(torque, StateTorque) else None
     if tape is not None and scene.changing is None:
@@ -102,7 +99,7 @@ def rescaling_factor(scene: Scene, time: float) -> float:
     if is_ordinary(scene.omega):
         return 1.0
     torque = scene.torque if isinstance(scene.torque, StateTorque) else None
-    # Bounds, or estimates if the torque depends on the state, of the omega caused until `time` (s).
+    # A bound on omega at `time` from rest, or an estimate if the torque depends on the state.
     by_torque = omega_by_torque if torque is None else _omega_by_state_torque
     largest = max(max(map(abs, scene.omega)), by_torque(scene, time))
     if not (0.0 < largest < math.inf) or 1.0 / _LARGE <= largest <= _LARGE:
@@ -147,7 +144,10 @@ def _underflowing(law: TorqueLaw, factor: float) -> TorqueLaw:
 
 
 def omega_by_torque(scene: Scene, time: float) -> float:
-    """Return a bound on the omega (rad/s) that the torque alone causes until `time` (s)."""
+    """Return a bound on omega's components (rad/s) from rest to `time` (s).
+
+    Gyroscopic terms are omitted.
+    """
     law, span = scene.law, abs(time)
     moments = scene.moments or (1.0, 1.0, 1.0)
     if law.in_space:

@@ -200,7 +200,7 @@ class _Run(Run):
             scale = largest
         if coarse.status != 0:
             # Omega grows without bound, or its phase has no correct digit left. No tolerance can be
-            # met at the end; phase and amplification do not count.
+            # met at the end, so that phase and amplification do not matter.
             return _Ahead(max(scale, self._scale_by_torque()), 0.0, 1.0)
         length = abs(float(coarse.t[-1]) * self.unit)
         count = math.ceil(_NODES_PER_RADIAN * 2.0 * min(1e9, self.rate * largest * length))

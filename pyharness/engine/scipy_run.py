@@ -91,10 +91,7 @@ class Run:
         state: Sequence[float] | None = None,
         with_steps: bool = False,
     ) -> Any:
-        """Return SciPy's result by method `name`, with times in units of `self.unit` s.
-
-        Raise NoNumberError if infinities or NaNs stop SciPy.
-        """
+        """Return SciPy's result by method `name`, with times in units of `self.unit` s."""
         from scipy.integrate import solve_ivp
 
         def phase_left(time: float, state: Sequence[float]) -> float:
@@ -102,7 +99,7 @@ class Run:
             return LARGEST_PHASE - self.rate * abs(time * self.unit) * max(map(abs, state[:3]))
 
         phase_left.terminal = True  # type: ignore[attr-defined]
-        # LSODA's warning only repeats that rows are missing.
+        # LSODA's warning only repeats that results are missing.
         with (
             np.errstate(all="ignore"),
             warnings.catch_warnings(action="ignore"),
@@ -154,7 +151,7 @@ class Run:
     def _counted(self, time: float, state: Sequence[float]) -> list[float]:
         self.evaluations += 1
         if math.isnan(time):
-            raise NoNumberError  # the first step follows from the rates, which may be NaN after 0
+            raise NoNumberError  # SciPy's first step depends on rates, which may be NaN
         if self.evaluations > self.most:
             raise self.work_error(time * self.unit)
         if self.unit == 1.0:

@@ -106,7 +106,7 @@ def _refined(run: StateRun, times: Sequence[float], tolerance: float) -> StateRo
             return after
         if finer == FINEST_STEP:
             if not (before.is_complete or after.is_complete):
-                # No row meets the tolerance near the time at which omega becomes infinite.
+                # Near the time at which omega becomes infinite, no state meets the tolerance.
                 n = min(len(before.state), len(after.state))
                 while n and _differences(before, after, n).max() > tolerance:
                     n -= 1
@@ -151,7 +151,7 @@ def _differences(before: StateRows, after: StateRows, n: int) -> Array:
     if before.is_complete and after.is_complete:
         largest = min(before.largest, after.largest)
     else:
-        # Omega becomes infinite at the end; only its rows give a finite scale.
+        # Omega becomes infinite at the end; only the states before give a finite scale.
         largest = _largest_of(second)
     apart = np.abs(first[:, :3] - second[:, :3]).max(axis=1, initial=0.0)
     found: Array = np.divide(apart, largest, out=np.zeros(n), where=apart > 0.0)

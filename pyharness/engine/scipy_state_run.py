@@ -32,8 +32,8 @@ _UNBOUNDED = 1e3
 _ORDINARY = 1e100  # rad/s; products of smaller omegas are finite
 # A jump of the rates is searched in this fraction of the time span ahead, by so many halvings.
 _AHEAD, _HALVINGS = 1e-3, 50
-# Microseconds of a right-hand side without torque, including SciPy; of an operation of a tape; and
-# of an opaque function.
+# Microseconds of a right-hand side without torque, including SciPy; of a recorded operation; and of
+# an opaque function.
 _WORK, _OPERATION_WORK, _OPAQUE_WORK = 16.0, 0.7, 16.0
 
 
@@ -161,7 +161,7 @@ class StateRun(Run):
                 self._undefined = None
 
     def is_singular(self) -> bool:
-        """Return whether a rate at time 0 is not finite; SciPy's first step would not end."""
+        """Return whether a derivative at time 0 is not finite, so that SciPy would not return."""
         return not np.isfinite(self._rates(0.0, self.start)).all()
 
     def expected_omega(self) -> float:

@@ -49,7 +49,7 @@ def torque_noise(
     """
     if isinstance(scene.torque, StateTorque) or not (scene.law.sines or scene.law.cosines):
         return 0.0
-    # If negative, the kernel takes the larger of -scale and the omega that the torque causes.
+    # For a negative scale, the kernel takes the larger of -scale and the omega due to the torque.
     if scale is None:
         scale = -max(map(abs, omega0))
     return float(

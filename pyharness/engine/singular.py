@@ -36,7 +36,7 @@ def undefined_operation(
 ) -> str | None:
     """Return a text on the operation undefined at `end`, and a remedy, or None.
 
-    `begin` and `before` are the inputs before the first and the last step.
+    `begin`, `before` and `end` are the tape's inputs at time 0, and before and after the last step.
     """
     first, last = (max(abs(inputs[slot]) for slot in OMEGA) for inputs in (begin, end))
     if last > _UNBOUNDED * (first or 1.0):

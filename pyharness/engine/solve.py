@@ -266,7 +266,7 @@ def _to_terminal_events(call: _Call, values: list[float]) -> Trajectory:
         found, events = call.trajectory(some)
         assert events is not None
         spent += found.evaluations
-        # What happens at an end of the computed motion may differ from what happens within.
+        # An event at an end of a trial may differ from one within a longer integration.
         if (low > -end or -end < events.first) and (high < end or events.last < end):
             return replace(found, evaluations=spent)
     found, _ = call.trajectory(values)
@@ -314,7 +314,7 @@ def finest(method: str, scene: Scene, time: float) -> float:
     if method not in SCIPY_METHODS or time == 0.0:
         return claimed
     factor = rescaling_factor(scene, time)
-    # It grows with phase and error amplification, because local errors are at least 2e-14.
+    # The tolerance grows with phase and amplification, because local errors are at least 2e-14.
     met = finest_tolerance(SCIPY_METHODS[method], scaled(scene, factor), time / factor)
     return max(claimed, met)
 

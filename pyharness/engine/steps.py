@@ -17,7 +17,7 @@ from pyharness.model.state_torque import of_law
 from pyharness.model.torque_law import TorqueLaw
 
 STEP_NODES = 0.5 + 0.5 * POINTS  # in parts of a step
-MOST_STEPS = 20_000  # that `sol` has; it limits the memory
+MOST_STEPS = 20_000  # in `sol`, to limit its memory
 
 
 def rates(scene: Scene, times: Array, state: Array) -> Array:

@@ -294,7 +294,7 @@ def _piecewise(times: Array, values: Array, interpolation: str, where: str) -> T
             from scipy.interpolate import CubicSpline
 
             try:
-                # Distances that differ much cause a warning, and hardly an error.
+                # Very different distances of times cause a warning, but hardly an error.
                 with warnings.catch_warnings(action="ignore"):
                     pieces = CubicSpline(times, values).c[::-1].T
             except (ValueError, ArithmeticError, np.linalg.LinAlgError):

@@ -74,7 +74,7 @@ def taylor(
     last = times[n_rows - 1] if n_rows else 0.0
     if 0 < kept <= most and 0.0 < abs(last) <= abs(ends[kept]):
         edges, values = ends[: kept + 1].copy(), at_nodes[:, :, :kept].T
-        # A few steps must not hold the memory of many.
+        # A few steps must not keep the memory of many.
         values = values.copy() if kept < most // 16 else values
         if times[-1] < 0.0:
             edges, values = edges[::-1], values[::-1, ::-1]

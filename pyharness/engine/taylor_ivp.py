@@ -34,8 +34,8 @@ _FIRST_CHANGE = 0.01
 _MOST_GROWTH = 10.0
 # An event at a switch is 0 there, but for rounding, which hides its sign until a short step later.
 _AFTER_SWITCH = 0.01  # times the step that ended at the switch
-# This many steps in succession, each to a switch and of a few units in the last place of the time,
-# are no motion: the switch changes back and forth without end.
+# After this many successive steps to switches, each of a few units in the last place of the time,
+# the switch is known to change back and forth without end.
 _MOST_SWITCHES, _SHORT = 100, 16
 _FIRST_PARTS = 1e-12, 1e-2  # least and largest first step, in steps that the tolerances allow
 
@@ -181,7 +181,7 @@ class Taylor(OdeSolver):  # type: ignore[misc]
         end = self.t + step.h
         is_cut = end == self.t + self.direction * longest
         self._terms = step.terms
-        # As in `Stepper.step`.
+        # The length of a shortened step is no guess for the next one.
         self._trial = max(self._trial, abs(step.h)) if is_cut else abs(step.h)
         self._longest = max(self._longest, _MOST_GROWTH * abs(step.h))
         if step.is_switched:

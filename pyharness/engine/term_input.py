@@ -68,6 +68,6 @@ def law_of_vector(where: str, value: object, frame: str) -> TorqueLaw:
         if value.frame != frame:
             raise InputError(f"{where}: a TorqueLaw with frame {value.frame}; {allowed}")
         return value
-    # The message of `number_list`, unlike that of `three`, says that a law is allowed.
+    # Unlike `three`, `number_list` has a message that a law is allowed.
     number_list(where, value, allowed)
     return TorqueLaw(three(where, value), frame=frame)

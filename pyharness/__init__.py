@@ -6,7 +6,7 @@ other integrators.
 """
 
 # The public names by module; type checkers read `__init__.pyi`. A module is imported at its first
-# use, so that a program loads only what it needs, after it has begun to handle Ctrl-C.
+# use, so that a program loads only what it needs.
 _SUBMODULES = {
     "checks.compare.comparison": ("compare_methods", "compare_programs"),
     "checks.compare.findings": ("Comparison",),

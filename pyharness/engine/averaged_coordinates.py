@@ -29,8 +29,7 @@ from pyharness.model.torque_law import TorqueLaw
 
 _MOST_DEGREE = 8.0
 
-# A function of time (s) and omega (rad/s) that returns the components of the torque over the
-# moments (rad/s2).
+# A function of time (s) and omega (rad/s) that returns the torque over the moments (rad/s2).
 Torque = Callable[[Array, list[Array]], list[Array] | Array]
 
 

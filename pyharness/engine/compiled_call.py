@@ -15,7 +15,7 @@ from pyharness.model.values import number, three_floats
 
 
 class CompiledCall(NamedTuple):
-    """A prepared solver as a function for compiled code, such as numba's.
+    """A prepared solver as a function for compiled code.
 
     ``function(data, start, t_end, state)`` reads doubles at the address `start`: omega (rad/s), and
     for an attitude solver a unit quaternion. It writes the state at `t_end` (s) to `state`, and

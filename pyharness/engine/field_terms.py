@@ -121,8 +121,7 @@ def magnetic_damping(gain: Number, field: TorqueLaw | Numbers) -> StateTorque:
 
     The field B in space is b = R^T B about the body axes, where R rotates from body to space. The
     coils have the moment m = -k b', with b' = R^T B' - omega x b. In a constant field the torque is
-    -k (|b|^2 omega - (omega . b) b), and damps the part of omega perpendicular to the field. In a
-    rotating field the body finally rotates with the field.
+    -k (|b|^2 omega - (omega . b) b), and damps the part of omega perpendicular to the field.
 
     Parameters
     ----------
@@ -168,8 +167,7 @@ def magnetic_damping(gain: Number, field: TorqueLaw | Numbers) -> StateTorque:
 def in_space(torque: TorqueLaw | Numbers) -> StateTorque:
     """Return the torque R^T N, where N has components about the axes of space.
 
-    R rotates from body to space. Use this term in a sum; as the only torque of a scene, the
-    TorqueLaw suffices.
+    R rotates from body to space. As the only torque of a scene, the TorqueLaw suffices.
 
     Parameters
     ----------

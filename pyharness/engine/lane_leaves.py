@@ -25,7 +25,7 @@ _UNKNOWNS = (3, 7)  # numbers of unknowns that have lanes: without and with atti
 _TOGETHER = 4  # sums
 _N_INPUTS = 8  # time, omega and attitude; parameters follow
 _MOST_INLINED = 60  # sums; many more would take a minute to compile
-_TERMS_AMID = 5  # terms of a series amid a step
+_TERMS_AMID = 5  # terms of a series in the middle of a step
 _ROW = 7  # length of a row of the Jacobian
 
 _HEADER = (

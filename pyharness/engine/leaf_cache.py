@@ -112,7 +112,6 @@ def compiler() -> tuple[str, ...]:
 
 @cache
 def machine() -> str:
-    """Return a text that identifies compiler, flags and processor."""
     import platform
 
     file = os.stat(os.path.realpath(compiler()[0]))
@@ -177,7 +176,6 @@ def compiled_file(place: Path, text: str) -> Path:
 
 
 def _run(command: list[str]) -> str:
-    """Run a compiler; return its error's first line, or ""."""
     import subprocess
 
     try:

@@ -89,8 +89,7 @@ def solve_many(
         Final times, s; positive, negative or 0.
     times : float or iterable of float, shape (m,)
         Strictly monotonic times (s) of the results for all bodies, instead of `t_end`. The arrays
-        of the result then have a second axis, of length m. The states are bit for bit as from calls
-        with each time as `t_end`, unless the scene has own states.
+        of the result then have a second axis, of length m.
     omega : array, shape (n, 3) or (3,)
         Initial angular velocities, rad/s. A single row, here and below, applies to all bodies.
     attitude : array, shape (n, 4) or (4,), or scipy.spatial.transform.Rotation
@@ -264,7 +263,7 @@ def _solve(
             given = {"inertia": scene.inertia, **from_scene(scene), **own}
             own, axes, turns = about_principal(given)
         else:
-            if scene.inertia is not None:  # the arrays give other bodies
+            if scene.inertia is not None:
                 scene = replace(scene, inertia=None, moments=(1.0, 1.0, 1.0))
             ready = rows_of_scene(scene)
     else:

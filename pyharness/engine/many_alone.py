@@ -1,7 +1,7 @@
 """Solution of bodies one by one: events, sensitivities, and scenes that the vector kernel refuses.
 
-The kernel refuses a changing inertia, and torques that depend on the state or are about axes of
-space.
+These have a changing inertia, moments in double-double, or a torque that depends on the state or is
+about axes of space.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -264,10 +264,7 @@ def solve_with_states(
     scene: Scene, t_end: Any, times: Array | None, arrays: dict[str, Any], states: object, *,
     refused: Mapping[str, object], estimates: bool, threads: int, **settings: Any,
 ) -> Ensemble:  # fmt: skip
-    """Return the states of bodies with the user's own unknowns, at `t_end` or `times` (s).
-
-    `refused` are arguments that must be None.
-    """
+    """Return the states of bodies with the user's own unknowns, at `t_end` or `times` (s)."""
     for name, value in refused.items():
         if value is not None:
             raise InputError(f"{name}: the scene has states of its own; allowed: solve")

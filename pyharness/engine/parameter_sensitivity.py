@@ -118,7 +118,7 @@ def sensitivities_at(
     # Only closed forms take no evaluations.
     is_closed = not found.evaluations and not attitude and set(names) <= _PERIODIC
     period = 0.0
-    # A function of time that is 0 for these parameters may have derivatives that depend on time.
+    # A torque function that is 0 for its parameters may have derivatives that depend on time.
     if is_closed and not getattr(scene.torque, "named", None):
         period = period_of(scene)
         least = _VARIES * math.hypot(*scene.omega)

@@ -29,7 +29,7 @@ TORQUE = "torque."  # prefix of the names of torque parameters
 INERTIA_ELEMENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
-# The moments, coefficients, inertia matrix and changing inertia of a scene.
+# A scene's moments, coefficients, inertia matrix and changing inertia.
 _Body = tuple[Triple | None, Triple | None, Matrix | None, Changing | None]
 
 
@@ -43,7 +43,7 @@ class VariedEquations(NamedTuple):
 
 
 def parameters_of(scene: Scene) -> dict[str, list[float] | None]:
-    """Return values of body and torque parameters by name; None if summands share the name."""
+    """Return parameters of body and torque by name; None if summands of a torque share it."""
     found: dict[str, list[float] | None] = {}
     if scene.moments is not None:
         found["moments"] = list(scene.moments)

@@ -15,9 +15,9 @@ from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Trajectory
 
 FINEST = REGISTRY["auto"].finest
-# Under a torque with fast waves, Runge-Kutta, which averages them, may need fewer operations than
-# the Taylor series, or be the only method that can solve the scene. The kernel chooses between them
-# down to the smallest tolerance at which Runge-Kutta was better in tests.
+# Runge-Kutta averages fast waves of a torque, and may be faster than the Taylor series, or the only
+# method that succeeds. The kernel chooses between them down to the smallest tolerance at which
+# Runge-Kutta was better in tests.
 RK4_OR_TAYLOR = "quick or taylor"
 _FEW_DIGITS = 1e-9
 
@@ -33,9 +33,9 @@ class Decision(NamedTuple):
 @dataclass(frozen=True)
 class Plan:
     scene: Scene
-    method: str  # name of the method that was chosen or requested
+    method: str  # chosen or requested
     closed_form: str | None  # sphere, symmetric or elliptic, if a closed form is used
-    fallback: str | None  # name of the method that is used if `method` refuses the scene
+    fallback: str | None  # method to use if `method` refuses the scene
     velocity: bool  # whether the translational velocity is requested
     rows: bool  # whether intermediate output is requested
 

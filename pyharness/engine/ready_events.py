@@ -101,8 +101,6 @@ def flip(axis: int, *, terminal: bool | int = False, direction: int = 0) -> Even
 def extremum(axis: int, *, terminal: bool | int = False, direction: int = 0) -> Event:
     """Return the event that a component of omega has a maximum or a minimum.
 
-    It is a root of the component's derivative.
-
     Parameters
     ----------
     axis : {1, 2, 3}
@@ -110,8 +108,9 @@ def extremum(axis: int, *, terminal: bool | int = False, direction: int = 0) -> 
     terminal : bool or int
         As in `crosses`.
     direction : {-1, 0, 1}
-        1 if the derivative becomes positive, -1 if negative, in the direction of integration; 0 for
-        both. Forward in time, 1 selects minima and -1 maxima; backward, the reverse.
+        1 if the component's derivative becomes positive, -1 if negative, in the direction of
+        integration; 0 for both. Forward in time, 1 selects minima and -1 maxima; backward, the
+        reverse.
 
     Returns
     -------

@@ -41,7 +41,7 @@ _KINDS = {
     "select": (Operations.SELECT, 1),
 }
 # The first trial step, in the user's unit of time. It hardly matters, because the series then gives
-# a step of any length up to 16 times this.
+# a step up to 16 times as long.
 LONGEST_TRIAL = 1e3
 
 

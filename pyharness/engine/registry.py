@@ -18,8 +18,8 @@ from pyharness.model.state_torque import StateTorque, is_opaque
 from pyharness.model.trajectory import Trajectory
 from pyharness.model.values import Number, boolean, tolerance_of
 
-# Smallest tolerances of Gauss collocation with 1 to 8 stages; low orders would need too many steps
-# for smaller ones.
+# Smallest tolerances of Gauss collocation with 1 to 8 stages; below, low orders would need too many
+# steps.
 _GAUSS_FINEST = (1e-8, 1e-11, 1e-12, 1e-13, 1e-14, 1e-14, 1e-14, 1e-14)
 # At this tolerance 5 of 1000 ordinary motions are sensitive to rounding errors; at 1e-12, 303 are:
 # `python -m tests.campaigns.default_campaign 1000 2026-11-26`.
@@ -35,10 +35,10 @@ class Method:
     name: str
     title: str
     source: str
-    finest: float  # smallest tolerance that the method claims to meet; 1 if it takes no tolerance
+    finest: float  # smallest tolerance that the method claims to meet; 1 if it takes none
     solve: Integrator  # called with checked times on one side of 0, in order away from 0
-    # Default tolerance, 1e-9 or the smallest that the method meets in ordinary scenes within a
-    # fraction of its work limit; 1 if the method takes no tolerance.
+    # Default tolerance: 1e-9, or the smallest met in ordinary scenes within a fraction of the work
+    # limit; 1 if the method takes none.
     default: float = _DEFAULT
     gives_rows: bool = True  # false if only a prepared solver has it, without intermediate output
     # Takes a fifth argument, whether `sol` has the steps.
@@ -52,7 +52,7 @@ class Method:
     state_torque: bool = False
     # Takes only weak torques, also recorded ones of time and omega; computes no attitude.
     weak_torque: bool = False
-    scipy: str = ""  # SciPy's name of the method; empty for our own methods
+    scipy: str = ""  # SciPy's name; empty for our own methods
     is_fixed_step: bool = False  # uses the scene's step size, and takes no tolerance
 
 
@@ -185,7 +185,7 @@ REGISTRY = {
             "quick",
             "Runge-Kutta in scaled unknowns, for few digits at the end",
             "fortran/modern/scaled_runge_kutta.f90",
-            # At smaller tolerances the rounding errors of its many steps would matter.
+            # Below, rounding errors of many steps would matter.
             1e-12,
             _no_rows,
             gives_rows=False,
@@ -205,7 +205,7 @@ PREPARED_WITH_ATTITUDE = tuple(
 
 
 def requested_tolerance(method: str, tolerance: Number | None) -> float:
-    """Return the tolerance, without a check of its range; for None, the method's default."""
+    """Return the tolerance, by default the method's, without a check of its range."""
     chosen = REGISTRY[method]
     return chosen.default if tolerance is None else tolerance_of(tolerance, chosen.finest)
 

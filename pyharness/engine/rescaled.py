@@ -196,7 +196,6 @@ def scaled_tape(tape: Tape, exponent: int) -> Tape | None:
     places = list(range(N_INPUTS))
     exponents = [exponent if slot in OMEGA else 0 for slot in places]
     exponents[TIME] = -exponent
-    # Slots that are linear combinations.
     combinations: dict[int, Linear] = {TIME: Linear(0.0, ((TIME, 1.0),))}
 
     def combine(linear: Linear, power: int) -> Linear:
@@ -252,7 +251,6 @@ def scaled_tape(tape: Tape, exponent: int) -> Tape | None:
 def _scaled(values: Any, exponents: Any) -> Any:
     with np.errstate(all="ignore"):
         found = np.ldexp(values, exponents)
-        # A rounded product is refused.
         if not np.array_equal(np.ldexp(found, -exponents), values):
             raise ArithmeticError("the product underflows or overflows")
     return found

@@ -66,7 +66,7 @@ class _Ahead(NamedTuple):
 
 
 def steps_sum(name: str, radians: float, growth: float, turned: float = 0.0) -> float:
-    """Return a bound on the ratio of the error at the end to the local error; see `_Ahead`."""
+    """Return a bound on the ratio of the error at the end to the local error of a step."""
     found = _SUM[name] + _SUM_A_RADIAN[name] * radians * min(growth, _SENSITIVE)
     return found + _SUM_A_TURN[name] * turned * min(growth, _SENSITIVE)
 
@@ -97,7 +97,7 @@ def scipy_method(name: str) -> Integrator:
         try:
             ahead = run.ahead()
             if ahead.largest == 0.0:
-                # The body is at rest, and no torque acts.
+                # The body rests, because no torque acts.
                 rest = np.tile(state_of(scene), (len(times), 1))
                 return rows_of(times, rest, run.evaluations, len(times), "complete")
             if scene.attitude is not None:
@@ -141,8 +141,7 @@ def scipy_method(name: str) -> Integrator:
         grows = ahead.growth > _SENSITIVE
         if ended == "complete" and (is_blurred or grows):
             ended = "sensitive"
-        # SciPy does not report the number of steps. The evaluations include the preliminary
-        # integration.
+        # SciPy does not report the number of steps.
         found = rows_of(times[:count], rows[:count], run.evaluations, len(times), ended)
         if ended != "sensitive":
             return found
@@ -199,8 +198,7 @@ class _Run(Run):
                 break
             scale = largest
         if coarse.status != 0:
-            # Omega grows without bound, or its phase has no correct digit left. No tolerance can be
-            # met at the end, so that phase and amplification do not matter.
+            # Omega grows without bound, or its phase has no correct digit; no tolerance can be met.
             return _Ahead(max(scale, self._scale_by_torque()), 0.0, 1.0)
         length = abs(float(coarse.t[-1]) * self.unit)
         count = math.ceil(_NODES_PER_RADIAN * 2.0 * min(1e9, self.rate * largest * length))

@@ -78,7 +78,7 @@ class Run:
         self.unit = 1.0 if abs(end) >= _SHORTEST_SPAN else math.ldexp(1.0, math.frexp(end)[1])
 
     def after_step(self, time: float, state: Sequence[float]) -> None:
-        """Do nothing; subclasses may act at time 0, after each step, and within the last."""
+        """Do nothing; subclasses may act at time 0, after each step, and within the last step."""
 
     def solved(
         self,

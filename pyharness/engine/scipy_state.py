@@ -20,9 +20,9 @@ _FIRST = {"DOP853": 4.0, "RK45": 8.0, "Radau": 4.0, "LSODA": 25.0}
 # Smallest and largest ratio of a local tolerance to the next.
 _RATIO, _LARGEST_RATIO = 8.0, 1e3
 # The estimated error of the second of two integrations is their difference times _SAFETY, divided
-# by the ratio of the local tolerances; but at least _LEAST_FRACTION of the difference. This is 1 if
-# errors are not in proportion to the local tolerances: with LSODA, which also changes its order, or
-# with a torque that jumps.
+# by the ratio of the local tolerances; but at least _LEAST_FRACTION of the difference. The fraction
+# is 1 if errors are not in proportion to local tolerances, as with LSODA, which also changes its
+# order, or a torque that jumps.
 _SAFETY = 4.0
 _LEAST_FRACTION = {"DOP853": 0.25, "RK45": 0.25, "Radau": 0.25, "LSODA": 1.0}
 _WITHIN = np.array([0.2, 0.5, 0.8])  # parts of a step at which interpolants are compared
@@ -90,7 +90,7 @@ def _refined(run: StateRun, times: Sequence[float], tolerance: float) -> StateRo
     """Return states at `times` (s) with an estimated error that meets `tolerance`."""
     scale = run.expected_omega()
     if scale == 0.0:
-        # The body is at rest, and no torque acts.
+        # The body rests, because no torque acts.
         return StateRows(np.tile(run.start, (len(times), 1)), True, 0.0)
     local = max(tolerance / _FIRST[run.name], _RATIO * FINEST_STEP)
     before, ratio = run.rows(times, local, scale), _RATIO

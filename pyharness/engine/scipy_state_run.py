@@ -30,7 +30,7 @@ _MOST_STUCK = 50
 # Omega counts as unbounded if it has grown by this factor when the phase is too large.
 _UNBOUNDED = 1e3
 _ORDINARY = 1e100  # rad/s; products of smaller omegas are finite
-# A jump of the rates is searched in this fraction of the time span ahead, by so many halvings.
+# A jump of the rates is searched ahead in this fraction of the time span, by halvings.
 _AHEAD, _HALVINGS = 1e-3, 50
 # Microseconds of a right-hand side without torque, including SciPy; of a recorded operation; and of
 # an opaque function.

@@ -94,9 +94,8 @@ def solve(
         compute it.
     dense_output : bool
         Whether to return `sol`, the solution as a function of time between 0 and `times`, to within
-        the tolerance. Closed forms, Taylor series, and `dop853` and `lsoda` under an opaque torque
-        need no further integrations for it; other methods do. Methods with a fixed step return a
-        cubic polynomial on each step.
+        the tolerance; for methods with a fixed step, a cubic polynomial on each step. Some methods
+        need further integrations for it.
     events : callable, Event, or list of these
         Functions of (t, omega) or (t, omega, attitude), or events of `pyharness.events`. Their
         roots between 0 and `times` become `t_events`, and the states there `y_events`. A function
@@ -121,9 +120,8 @@ def solve(
     InputError
         If the method is unknown, or can't solve the scene or its attitude; if the torque needs the
         attitude, and `attitude` is false; if the times are not in order; if a changing moment of
-        inertia reaches 0; if the tolerance can't be met within `effort`; if dense output needs too
-        many polynomials; if the function of an event has wrong arguments or results; or if
-        sensitivities can't be computed.
+        inertia reaches 0; if the tolerance can't be met within `effort`; or if dense output, events
+        or sensitivities can't be computed.
     NotBuiltError
         If the method needs the extension, and it is not built.
 

@@ -82,7 +82,7 @@ class Solver(BoundKernel[Result]):
     scene : Scene
         The prepared scene.
     plan : Plan
-        The chosen method and the computed parts, with reasons, for the scene about principal axes.
+        The chosen method, and the computed parts with reasons.
     status, error, growth, digits, steps, method
         The ending, estimated error, error amplification, correct digits, steps and method of this
         thread's last call that raised no error.
@@ -159,7 +159,7 @@ class Solver(BoundKernel[Result]):
         and `t_end` (s), a number or of shape (n,). It returns omega (rad/s), shape (n, 3), and the
         statuses of `Ensemble`, shape (n,). Rows do not depend on each other or on `threads`, but
         may differ by rounding from a single call's result. If a changing moment of inertia reaches
-        0 before `t_end`, the status is `refused`, or `overflow` for one given by a function.
+        0 before `t_end`, the status is `refused`, or `overflow` if a function gives the moment.
         Invalid arguments raise an InputError.
 
         For a solver with attitude, it is ``solver.many(omega, t_end, attitude=None, threads=1,
@@ -294,8 +294,7 @@ def prepare(
     tolerance : float
         Largest allowed error of a component of omega, relative to the largest |omega| from time 0
         to the end; the default is as in `solve`. Methods with a fixed step and Gauss collocation
-        ignore it. If the motion amplifies perturbations by a factor K, no method has a relative
-        error below some 1e-15 K.
+        ignore it.
     effort : float
         Factor on the work limit of a call (about ten seconds); beyond it the status is `gave up`.
     attitude : bool
@@ -316,8 +315,8 @@ def prepare(
     InputError
         If the method is unknown, or can't solve the scene or its attitude; if the torque needs the
         attitude, and `attitude` is false; or if the tolerance or effort is out of range. A call
-        raises it if a changing moment of inertia reaches 0; for one given by a function, the status
-        is `overflow` instead.
+        raises it if a changing moment of inertia reaches 0; if a function gives the moment, the
+        status is `overflow` instead.
     NotBuiltError
         If the extension is not built.
 

@@ -31,8 +31,8 @@ _MOST, _LOOK = 1e8, 100_000  # most steps of `until`, and steps between its fore
 class Stepper:
     """A motion that is computed step by step by Taylor series.
 
-    Use it if something happens between steps: a controller changes its torque, or an impact changes
-    omega. Otherwise `pyharness.solve` is faster, and estimates the error of its result.
+    Use it if a controller or an impact changes torque or omega between steps. Otherwise
+    `pyharness.solve` is faster, and estimates the error of its result.
 
     Parameters
     ----------

@@ -57,7 +57,7 @@ def steps_output(scene: Scene, pieces: Pieces) -> DenseOutput:
 
 
 def up_to(pieces: Pieces, last: float) -> Pieces:
-    """Return the polynomials between time 0 and `last` (s), which is not 0."""
+    """Return the polynomials between time 0 and `last` (s), not 0."""
     low, high = sorted((0.0, last))
     kept = (pieces.edges[1:] > low) & (pieces.edges[:-1] < high)
     edges = np.clip(pieces.edges[np.append(kept, False) | np.append(False, kept)], low, high)

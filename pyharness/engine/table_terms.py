@@ -156,15 +156,12 @@ def _rows(where: str, values: Any, count: int, allowed: str, what: str) -> list[
 def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbers]) -> StateTorque:
     """Return a torque that acts within pulses, and is 0 elsewhere.
 
-    Steps of Taylor series end where a pulse begins or ends.
-
     Parameters
     ----------
     starts : iterable of numbers, shape (n,)
         1 to 10 000 times (s) at which the pulses begin, in any order.
     durations : iterable of numbers, shape (n,)
-        The durations (s), above 0. A pulse may begin when another ends, not before. The impulse is
-        torque times duration, even if the end of the pulse is rounded.
+        The durations (s), above 0. A pulse may begin when another ends, not before.
     torque : three numbers, or iterable of three numbers, shape (n, 3)
         The torque about the body axes (N m), one for all pulses or one each.
 

@@ -27,10 +27,7 @@ def taylor(
     effort: float = 1.0,
     with_steps: bool = False,
 ) -> Trajectory:
-    """Return the trajectory of a scene at `times` (s) by Taylor series.
-
-    `evaluations` counts all series, also of repeated integrations.
-    """
+    """Return the trajectory of a scene at `times` (s) by Taylor series."""
     # The kernel reads the initial attitude in the first column, and writes a column for each time.
     n_attitudes = 0 if scene.attitude is None else len(times)
     joint = np.empty((4, n_attitudes + 1), order="F")

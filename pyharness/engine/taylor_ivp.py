@@ -44,8 +44,8 @@ class Taylor(OdeSolver):  # type: ignore[misc]
     """Integrate an ordinary differential equation y' = fun(t, y) by its Taylor series.
 
     Pass it to `scipy.integrate.solve_ivp` by ``method=Taylor``. `fun` is called twice, with symbols
-    that record its arithmetic. Compiled code computes the series, whose order, 8 to 28, depends on
-    the tolerances. The dense output is the series.
+    that record its arithmetic. The order of the series, 8 to 28, depends on the tolerances. The
+    dense output is the series.
 
     Parameters
     ----------

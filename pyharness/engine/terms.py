@@ -62,8 +62,8 @@ def drag(coefficients: Iterable[MatrixLike], per_axis: bool = False) -> StateTor
     """Return a drag torque that is an odd polynomial of omega.
 
     It is the sum over n = 0, 1, 2, ... of -C_n |omega|^(2n) omega. With `per_axis` it is the sum of
-    -C_n v_n, where v_n has the components omega_i^(2n+1). Quadratic drag, -k |omega| omega, is no
-    such polynomial; if omega stays away from 0, use a Python function with ``numpy.sqrt``.
+    -C_n v_n, where v_n has the components omega_i^(2n+1). For quadratic drag, -k |omega| omega, use
+    a Python function with ``numpy.sqrt``; omega must stay away from 0.
 
     Parameters
     ----------
@@ -164,8 +164,7 @@ def attitude_control(
     For the attitude q, the error quaternion (e0, e) is target* q, with the conjugate target*. A
     quaternion and its negative have the same torque, so that the body does not rotate the long way
     round (unwinding). Let a be the angle of the error. If k is a number, the first term is -k
-    sin(a) about the axis of the error, with the potential k (1 - cos(a)). The equilibrium at a =
-    180 degrees is then unstable.
+    sin(a) about the axis of the error, and the equilibrium at a = 180 degrees is unstable.
 
     Parameters
     ----------

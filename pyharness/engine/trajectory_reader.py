@@ -146,7 +146,7 @@ def _events(
     _require(sum(lengths) == n and np.isfinite(times).all())
     ends = list(itertools.accumulate(lengths))
     parts = [slice(end - length, end) for end, length in zip(ends, lengths, strict=True)]
-    # Integration begins at time 0; a terminal event may be before the first row, or leave one row.
+    # Event times are in the order of the rows; with fewer than two rows, this is unknown.
     signs = (math.copysign(1.0, rows[-1] - rows[0]),) if len(rows) > 1 else (1.0, -1.0)
     for part in parts:
         _require(any((np.diff(sign * times[part]) >= 0.0).all() for sign in signs))

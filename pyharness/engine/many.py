@@ -191,7 +191,7 @@ def solve_many(
             found = kind_of(parameters)
             raise InputError(f"parameters: {found}; allowed: a dict of names and arrays")
         check_values(scene, parameters)
-        # A torque that depends on time alone is a law, without names of parameters.
+        # A torque that depends on time alone is a law without parameter names.
         scene = replace(scene, torque=getattr(scene.torque, "named", None) or scene.torque)
         arrays |= {f"{PARAMETER}{name}": value for name, value in parameters.items()}
     settings: Any = {"method": method, "tolerance": tolerance, "effort": effort}

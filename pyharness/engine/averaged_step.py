@@ -264,8 +264,8 @@ class MacroStep:
             if np.abs(change).max() <= _CLOSE:
                 angle = angle + change
                 break
-            # Near the separatrix psi is slow in a part of each revolution; there Newton's method
-            # may diverge, or leave the interval that contains the angle.
+            # Near the separatrix psi changes slowly in a part of each revolution; there Newton's
+            # method may diverge, or leave the interval that contains the angle.
             low = np.where(change > 0.0, np.maximum(low, angle), low)
             high = np.where(change < 0.0, np.minimum(high, angle), high)
             near = angle + change

@@ -43,7 +43,7 @@ def many_starts(
     n = len(starts)
     check_rows("t_end", times, n)
     omega = np.empty((n, 3)) if out is None else buffer_of("out", out, (n, 3), "d")
-    if np.may_share_memory(starts, omega):  # a kernel may write a result before it reads the start
+    if np.may_share_memory(starts, omega):  # a kernel may write results before it reads all
         starts = starts.copy()
     times = times_within(solver.scene, times)
     axes = axes_and_turn(solver.scene)[0] if uses_principal_axes(solver.scene) else None

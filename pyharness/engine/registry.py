@@ -185,7 +185,7 @@ REGISTRY = {
             "quick",
             "Runge-Kutta in scaled unknowns, for few digits at the end",
             "fortran/modern/scaled_runge_kutta.f90",
-            # Below, rounding errors of many steps would matter.
+            # Below this tolerance, rounding errors of many steps would matter.
             1e-12,
             _no_rows,
             gives_rows=False,

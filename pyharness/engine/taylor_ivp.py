@@ -35,7 +35,7 @@ _MOST_GROWTH = 10.0
 # An event at a switch is 0 there, but for rounding, which hides its sign until a short step later.
 _AFTER_SWITCH = 0.01  # times the step that ended at the switch
 # After this many successive steps to switches, each of a few units in the last place of the time,
-# the switch is known to change back and forth without end.
+# the switch changes back and forth without end.
 _MOST_SWITCHES, _SHORT = 100, 16
 _FIRST_PARTS = 1e-12, 1e-2  # least and largest first step, in steps that the tolerances allow
 

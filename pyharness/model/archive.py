@@ -21,12 +21,11 @@ from pyharness.model.output_files import check_writable
 from pyharness.model.pipes import read_input
 from pyharness.model.schema import check_schema
 
-DIGEST = "sha256"  # the last array
+DIGEST = "sha256"  # name of the last array
 _OTHERS = (".csv", ".json", ".md", ".toml", ".tsv", ".txt", ".xlsx", ".xml")
 
 
 def checked_path(where: str, path: object) -> str:
-    """Return a path as text; a new file without an ending gets .npz."""
     if not isinstance(path, (str, os.PathLike)):
         kind = "bytes" if isinstance(path, bytes) else kind_of(path)
         raise InputError(f"{where}: the path is {kind}; allowed: a path, as text or a Path")
@@ -36,10 +35,6 @@ def checked_path(where: str, path: object) -> str:
 
 
 def checked_file(where: str, path: object) -> str:
-    """Return the checked path of a file to write.
-
-    Raise InputError for a text file's ending or an unwritable file.
-    """
     name = checked_path(where, path)
     ending = os.path.splitext(name)[1].lower()
     if ending in _OTHERS:
@@ -59,7 +54,7 @@ def archive_of(arrays: dict[str, Any]) -> bytes:
             entry = io.BytesIO()
             np.lib.format.write_array(entry, np.asanyarray(array), allow_pickle=False)
             add_entry(digest, f"{name}.npy", entry.getbuffer())
-            # `ZipInfo` has no date, which would change the bytes with every run.
+            # The date of a `ZipInfo` is fixed, so that every run writes the same bytes.
             with archive.open(zipfile.ZipInfo(f"{name}.npy"), "w", force_zip64=True) as file:
                 file.write(entry.getbuffer())
     return buffer.getvalue()
@@ -75,10 +70,8 @@ def read_archive(
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return the arrays and the header of an archive; raise InputError if it is damaged.
 
-    Only arrays named in `known` are allowed.
+    Only arrays named in `known` are allowed. `kinds` names the content in the header and messages.
     """
-    # `kinds` names the kind of content, first as in the header, then as in messages, which describe
-    # a valid file by `written`.
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     content = read_input(name, where, memory // 4, written)
     damaged = InputError(f"{where}: no {kinds[1]}, or damaged; give {written}")
@@ -88,7 +81,7 @@ def read_archive(
             raise ValueError("another kind of file")
     except Exception:  # zipfile, json and NumPy raise errors of many types
         raise damaged from None
-    # Checked before the arrays, which may differ in another version.
+    # The schema is checked first: other versions may have other arrays.
     kind = f"{kinds[1]} file"
     check_schema(where, kind, header.get("schema"), "take a version that reads it")
     try:

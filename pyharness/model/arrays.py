@@ -72,7 +72,7 @@ def count_bodies(rows: Mapping[str, Array]) -> int:
     counts = {len(each) for each in rows.values()}
     n = 0 if 0 in counts else max(counts, default=1)
     if not counts <= {1, n}:
-        # Final times do not determine the number of bodies, if another array does.
+        # A wrong number of final times must not count as the number of bodies.
         others = [len(each) for name, each in rows.items() if name != "t_end"]
         n = max(others) if n else 0
         for name, each in rows.items():
@@ -109,7 +109,6 @@ def threads_of(threads: object) -> int:
 
 
 def buffer_of(where: str, array: Any, shape: tuple[int, ...], kind: str) -> Any:
-    """Return a user's output array; raise InputError unless a kernel can write to it."""
     right = isinstance(array, np.ndarray) and array.shape == shape and array.dtype == kind
     if not (right and array.flags.c_contiguous and array.flags.writeable and array.flags.aligned):
         raise InputError(

@@ -22,13 +22,13 @@ def assumptions() -> list[dict[str, Any]]:
 
 
 def open_starts() -> dict[int, str]:
-    """Return the source of our omega(0) by case number, for cases where the thesis has none."""
+    """Return the source of omega(0), by case number, for cases whose omega(0) the thesis lacks."""
     cases = facts("cases")["case"]
     return {each["number"]: each["assumed_omega"] for each in cases if "assumed_omega" in each}
 
 
 def assumed(scene: Scene, listings: Iterable[Listing] = ()) -> list[dict[str, Any]]:
-    """Return the assumptions that a scene and its runs of `listings` (program versions) need."""
+    """Return the assumptions on which `scene` and its runs of `listings` (programs) depend."""
     among = list(listings)
     return [each for each in assumptions() if _is_made(each, scene, among)]
 
@@ -49,13 +49,12 @@ def _is_made(each: dict[str, Any], scene: Scene, listings: Sequence[Listing]) ->
 
 def _is_in(each: dict[str, Any], listing: Listing) -> bool:
     (entry,) = (e for e in facts("apparatus")["entry"] if e["id"] == each["entry"])
-    # A corrected program is the same under every reading and conjecture.
+    # Readings and conjectures have no effect in a corrected program.
     has_it = listing.program in entry["programs"] and bool(listing.active)
     return has_it and listing.has(each["entry"]) == each["active"]
 
 
 def mark(scene: Scene, listing: Listing) -> str:
-    """Return `MARK` if a run depends on an assumption about its program, else ""."""
     return MARK if any(each["on"] == "listing" for each in assumed(scene, [listing])) else ""
 
 
@@ -85,7 +84,7 @@ def _record(each: dict[str, Any], what: str) -> dict[str, Any]:
 
 
 def legend(runs: Sequence[tuple[Scene, Iterable[Listing]]]) -> list[str]:
-    """Return a list with the line that explains the marks of `runs`; empty without marks."""
+    """Return, as a list, the line that explains the marks of `runs`; empty without marks."""
     every = {scene.case for scene, _ in runs}
     told = []
     for each in assumption_records(runs):

@@ -149,7 +149,6 @@ def quaternion_of_axes(axes: Array) -> Quaternion:
 
 def quaternions_of_axes(axes: Array) -> Array:
     """Return the attitudes, (n, 4), of n right-handed frames, columns of `axes`, (n, 3, 3)."""
-    # Imported only here, because only a full inertia matrix needs SciPy.
     from scipy.spatial.transform import Rotation
 
     # Older versions of SciPy refuse read-only arrays.

@@ -84,7 +84,6 @@ class Changing:
     @cached_property
     def span(self) -> tuple[float, float]:
         """The interval (s) around time 0 where the inertia is positive definite; maybe infinite."""
-        # Imported only here, because the programs need no exact numbers.
         from pyharness.model.exact_zeros import determinant, first_zeros
 
         if isinstance(self, ChangingMoments):

@@ -102,7 +102,7 @@ class Operations:
     SINE_COSINE = 6  # results: the sine, the cosine, and the weighted terms of their argument
     TABLE = 7  # cubic polynomials of time between breakpoints
     TANH = 8  # results: the function, its derivative, and the weighted terms of its argument
-    # The second operand is the derivative. Results: the function, weighted terms of the argument.
+    # Operand 2 is the derivative. Results: the function, and the weighted terms of its argument.
     LOG = 9
     ATAN = 10
     ASIN = 11

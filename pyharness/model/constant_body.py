@@ -17,10 +17,7 @@ from pyharness.model.values import Matrix
 
 
 def integrated(scene: Scene) -> Scene:
-    """Return the scene about the axes of its integration.
-
-    These are principal axes or, under a torque with switches, body axes.
-    """
+    """Return the scene about principal axes or, under a torque with switches, body axes."""
     torque = scene.torque
     if scene.inertia is None or uses_principal_axes(scene):
         return principal(scene)[0]
@@ -54,12 +51,12 @@ def rates_about_body_axes(inertia: Matrix, omega: Any, torque: Any) -> Any:
 
 
 def with_constant_body(scene: Scene) -> Scene:
-    """Return a scene of the same solution, with constant inertia and torque about the body axes."""
+    """Return a scene of the same solution, with constant inertia and no torque about space axes."""
     changing, torque = scene.changing, scene.torque
     if changing is None:
         return replace(scene, torque=of_law(scene.law)) if torque.in_space else scene
-    # The coefficients become 0, and the torque omega' from I omega' = N - I' omega - omega x
-    # (I omega), with inertia I and torque N.
+    # Euler's coefficients become 0, and the torque becomes omega', which follows from
+    # I omega' = N - I' omega - omega x (I omega), with inertia I and torque N.
     if isinstance(torque, TorqueLaw):
         torque = of_law(torque)
     tape = torque.tape

@@ -52,7 +52,7 @@ class _Quantity(NamedTuple):
 class Conversions:
     """The base class of trajectories.
 
-    If the inertia changes, quantities use its value at each time.
+    With a changing inertia, quantities use the inertia at each time.
     """
 
     time: Array
@@ -397,7 +397,7 @@ class Conversions:
         """Write the trajectory with its scene to a file, from which `pyharness.load` restores it.
 
         Numbers are restored bit for bit. The file has the format of `numpy.savez`, with an array
-        for each array attribute; the array `scene` is the text of a scene file.
+        for each array attribute.
 
         Parameters
         ----------

@@ -78,7 +78,7 @@ def sizes_of(largest: Array, n_own: int) -> Array:
 
     `largest` has the unknowns' largest absolute values.
     """
-    # The size is 1 for the quaternion. The last `n_own` unknowns are own states.
+    # A quaternion's size is 1. The last `n_own` unknowns are the scene's own states.
     sizes = np.ones_like(largest)
     sizes[..., :3] = largest[..., :3].max(axis=-1, keepdims=True)
     own = largest.shape[-1] - n_own

@@ -9,8 +9,8 @@ import numpy as np
 from pyharness.model.symbols import MOST_OPERATIONS, SYMBOLS, Recorder
 from pyharness.model.tape import Functions, Table, Tape, evaluate, selected, step, whole
 
-# Factors on the largest number of operations of a recorded torque. _MORE is for tapes that no
-# kernel reads, _FEWER for tapes of a kernel, whose memory is proportional to the number.
+# Factors on the largest number of operations: _MORE for tapes that no kernel reads, _FEWER for
+# kernels, whose memory is proportional to the number.
 _MORE, _FEWER = 100, 10
 
 
@@ -65,7 +65,7 @@ def dual(value: Any, count: int) -> Dual:
 
 
 def with_derivatives(tape: Tape, slots: Sequence[int]) -> Tape:
-    """Return a tape of the outputs, then of their derivatives with respect to inputs `slots`."""
+    """Return a tape of the outputs, and of their derivatives with respect to inputs `slots`."""
     recorder = Recorder(_MORE * MOST_OPERATIONS)
     inputs = [
         Dual(symbol, [float(slot == each) for each in slots])
@@ -76,7 +76,7 @@ def with_derivatives(tape: Tape, slots: Sequence[int]) -> Tape:
 
 
 def with_parameters(tape: Tape, values: Sequence[float]) -> Tape:
-    """Return a tape of derivatives with respect to the last inputs, then of the outputs.
+    """Return a tape of derivatives with respect to the last inputs, and of the outputs themselves.
 
     The constants `values` replace these inputs.
     """
@@ -96,9 +96,9 @@ def of_duals(
     slope: Callable[[Any, Any], Any],
     symbolic: Callable[[Any], Any] | None = None,
 ) -> Callable[[Any], Any]:
-    """Return `function` for numbers and dual numbers.
+    """Return `function` for numbers and dual numbers, with derivative ``slope(argument, value)``.
 
-    The derivative is ``slope(argument, value)``; `symbolic` computes the values of dual numbers.
+    `symbolic`, if given, computes the values of dual numbers.
     """
 
     def called(x: Any) -> Any:

@@ -310,7 +310,7 @@ class Ensemble(BatchResult):
         return Ensemble(**load_ensemble(path))
 
     def estimates_of(self, piece: slice) -> Array:
-        """Return the estimates of the m bodies in `piece`, (2, m), or (2, 0) if not requested."""
+        """Return errors and amplifications of bodies in `piece`, (2, m); (2, 0) if unrequested."""
         return _NO_ESTIMATES if self.estimates is None else self.estimates[piece].T
 
 

@@ -103,7 +103,6 @@ def kind_of(value: object) -> str:
 
 
 def known(what: str, name: object, allowed: Iterable[str]) -> str:
-    """Return `name` in lower case; raise InputError unless it is allowed."""
     names = list(allowed)
     found = name.lower() if isinstance(name, str) else ""
     if found not in names:
@@ -112,10 +111,7 @@ def known(what: str, name: object, allowed: Iterable[str]) -> str:
 
 
 def unknown(what: str, name: object, allowed: Iterable[str], where: str = "") -> InputError:
-    """Return an InputError for a `name` that is not `allowed`.
-
-    `what` is the kind of name, such as "case".
-    """
+    """Return an InputError for a `name` that is not `allowed`."""
     import difflib
 
     names = [str(each) for each in allowed]

@@ -87,7 +87,7 @@ def _bernstein(polynomial: Sequence[int]) -> list[int]:
 
 
 def _halves(row: list[int]) -> tuple[list[int], list[int]]:
-    """Return the coefficients for both halves of an interval, times 2**degree (de Casteljau)."""
+    """Return Bernstein coefficients for both halves, times 2**degree (de Casteljau)."""
     degree = len(row) - 1
     early, late = [row[0] << degree], [row[-1] << degree]
     for n in range(degree - 1, -1, -1):

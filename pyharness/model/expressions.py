@@ -61,9 +61,9 @@ def parsed(
 ) -> StateTorque | TorqueLaw:
     """Return the torque of three expressions about the body axes, if possible as a TorqueLaw.
 
-    `rates` has the derivatives of `Scene.states`.
+    The unit is N m, or rad/s2 for a body with coefficients. `rates` has expressions for the
+    derivatives of `Scene.states`.
     """
-    # Units are N m, or rad/s2 for a body with coefficients.
     values = _checked_constants(constants)
     texts = _three_texts(expressions)
     for name, text in rates.items():

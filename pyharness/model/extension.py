@@ -15,7 +15,7 @@ from pyharness.model.torque_law import Wave
 COMPLETE, STOPPED, OVERFLOW = Statuses.COMPLETE, Statuses.STOPPED, Statuses.OVERFLOW
 REFUSED, GAVE_UP, INTERRUPTED = Statuses.REFUSED, Statuses.GAVE_UP, Statuses.INTERRUPTED
 SENSITIVE = Statuses.SENSITIVE
-# Names of the statuses, for users; the index is the integer.
+# Names of the statuses, for users, in the order of their codes.
 ENDS = tuple(name.lower().replace("_", " ") for name in vars(Statuses) if name.isupper())
 
 

@@ -155,11 +155,10 @@ def inertia_of_tables(
 
 
 def checked_function(found: InertiaFunction) -> InertiaFunction:
-    """Return `found`, a valid inertia.
+    """Return `found`; raise InputError if it may jump or, at time 0, is not positive definite.
 
-    Raise InputError if it may jump, is asymmetric, or is not positive definite at time 0.
+    An inertia matrix must be symmetric at several times.
     """
-    # Imported only here, because most scenes need no exact numbers.
     from pyharness.model.inertia import checked_inertia
 
     where = f"[body] {found.place}"

@@ -121,7 +121,6 @@ def names_of(kind: str, program: str | None = None) -> tuple[str, ...]:
 
 
 def switchable(program: str | None = None) -> tuple[str, ...]:
-    """Return the names that the options --fix and --keep accept."""
     return tuple(name for kind in _FIELDS for name in names_of(kind, program))
 
 

@@ -30,7 +30,10 @@ _originals: list[tuple[Any, str, Any]] = []
 
 @contextmanager
 def replaced_functions(with_targets: bool) -> Iterator[None]:
-    """Replace functions in this thread; if `with_targets`, also numpy.zeros, empty and ones."""
+    """Replace functions of NumPy and math in this thread.
+
+    If `with_targets`, numpy.zeros, empty and ones are replaced too.
+    """
     global _installed
     before = getattr(_here, "targets", None)
     with _lock:

@@ -53,7 +53,7 @@ def write_files(contents: dict[str, bytes], option: str) -> None:
     path = ""
     try:
         for path, content in contents.items():
-            # Devices and pipes cannot be restored.
+            # Written first, because devices and pipes cannot be restored.
             if _is_special(path):
                 write_waiting(path, content)
         with DeferredInterrupt() as patience:

@@ -13,7 +13,7 @@ _PIECE = 1 << 20
 
 
 def read_input(path: str | os.PathLike[str], where: str, limit: int, what: str) -> bytes:
-    """Return a user's file or pipe; raise InputError if unreadable or larger than `limit` bytes."""
+    """Return a file's or pipe's content; raise InputError if unreadable or above `limit` bytes."""
     try:
         content = _read(os.fspath(path), limit)
     except (OSError, ValueError) as error:

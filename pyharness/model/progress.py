@@ -79,9 +79,10 @@ def for_each_piece(
     threads: int,
     pieces: Sequence[slice] | None = None,
 ) -> None:
-    """Call ``work(piece, given_up)`` in threads for each of `pieces`, by default slices of n.
+    """Call ``work(piece, given_up)`` in threads for each of `pieces`.
 
-    With several threads, an exception sets `given_up[0]` to 1, which ends kernels.
+    By default these are slices of n bodies. With several threads, an exception sets `given_up[0]`
+    to 1, which ends kernels.
     """
     if not n:
         return

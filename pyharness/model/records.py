@@ -16,7 +16,7 @@ from pyharness.model.trajectory import Trajectory
 def scene_record(scene: Scene) -> dict[str, Any]:
     """Return a scene for JSON, with the keys of a scene file and "case".
 
-    Python functions are only mentioned.
+    Python functions appear only as "recorded" or "opaque".
     """
     body, values = body_of(scene)
     return {

@@ -90,7 +90,7 @@ class Scene:
     """A problem to solve: a body, the torque on it, and initial conditions.
 
     Exactly one of `moments`, `coefficients`, `inertia` and `changing` is required. Three numbers
-    may be a list, a tuple or an array; the fields are tuples of floats.
+    may be a list, a tuple or an array.
 
     Parameters
     ----------
@@ -265,7 +265,6 @@ class Scene:
         for place in ("moments", "inertia"):
             given = getattr(self, place)
             if callable(given):
-                # Imported only here, because the programs need no recorded functions.
                 from pyharness.model.inertia_function import inertia_function
 
                 given = inertia_function(place, given)
@@ -315,7 +314,6 @@ class Scene:
             return None
         if self.moments is None:
             raise InputError(FULL_INERTIA if self.changing is None else CHANGING)
-        # Imported only here, because the programs need no exact numbers.
         from fractions import Fraction
 
         return triple(map(Fraction, self.moments))

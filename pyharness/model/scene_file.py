@@ -1,6 +1,6 @@
 """Scenes of Table 1 of the thesis, and the text of scene files (TOML).
 
-`pyharness.engine.scene_reader` reads scene files. Messages begin with the argument `where`.
+`pyharness.engine.scene_reader` reads scene files.
 """
 
 import os
@@ -75,7 +75,6 @@ def read_toml(path: str | os.PathLike[str], where: str) -> dict[str, Any]:
 
 
 def read_file(path: str | os.PathLike[str], where: str) -> bytes:
-    """Return the bytes of a user's TOML file; a pipe can be read only once."""
     return read_input(path, where, _LARGEST_FILE, "a TOML file")
 
 
@@ -204,7 +203,6 @@ def _toml(value: Any) -> str:
 
 
 def body_of(scene: Scene) -> tuple[str, Any]:
-    """Return the key and the value of the body in a scene file."""
     if isinstance(scene.changing, InertiaFunction):
         return scene.changing.place, scene.changing.values()
     if isinstance(scene.changing, ChangingMoments):

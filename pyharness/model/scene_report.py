@@ -24,7 +24,7 @@ def scene_title(scene: Scene) -> str:
 
 
 def heading(scene: Scene, listings: Iterable[Listing] = ()) -> list[str]:
-    """Return lines on a scene, with marks on values that runs of `listings` assume."""
+    """Return lines that describe a scene; marked values are assumed in runs of `listings`."""
     if scene.inertia is not None:
         body = f"I = {', '.join(map(_tuple, scene.inertia))} kg m2"
     elif isinstance(scene.changing, InertiaFunction):

@@ -20,7 +20,7 @@ from pyharness.model.torque_law import FRAMES, TorqueLaw, body_torque, law_value
 from pyharness.model.values import Triple, are_several, converted, three_floats, triple
 
 Function = Callable[..., Any]
-_MOST_REPLAYED = 1_000_000  # operations of a torque of this project
+_MOST_REPLAYED = 1_000_000  # most operations of an internal function
 _ARGUMENTS = "allowed: a function of (t, omega), or of (t, omega, attitude)"
 _WITH_STATES = (
     "a function of (t, omega, states) or (t, omega, attitude, states) that returns the torque and "
@@ -75,7 +75,6 @@ class StateTorque:
     own: tuple[str, ...] = ()
     starts: tuple[OwnState, ...] = field(default=(), compare=False, repr=False)
     parts: "tuple[StateTorque | TorqueLaw, ...]" = field(default=(), compare=False, repr=False)
-    # Attributes in common with a torque law.
     is_zero: bool = field(default=False, init=False, repr=False)
     varies: bool = field(default=True, init=False, repr=False)
     in_space: bool = field(default=False, init=False, repr=False)
@@ -400,7 +399,7 @@ def _with_parameters(torque: StateTorque, function: Function, called: Function) 
 
     def recorded_with(names: Sequence[str]) -> Tape | None:
         recorder = Recorder(n_inputs=N_INPUTS + len(names))
-        # An exponent, which is a number of factors, is no parameter.
+        # An exponent is no parameter: its value determines which operations are recorded.
         recorder.has_powers = not names
 
         def named(time: Symbol, omega: Any, attitude: Any, *inputs: Symbol) -> Any:

@@ -328,7 +328,7 @@ class Symbol:
 
     def arctan2(self, x: Any) -> "Symbol":
         """Return the angle (rad) of the point (x, self), -pi to pi; undefined at the origin."""
-        # At first, an integration takes every condition as false.
+        # Not x >= 0: at first, an integration takes every condition as false.
         is_left = x < 0.0
         # The tangent of half the angle to the x axis; y/x would not be defined where x is 0.
         half = self / ((self * self + x * x).sqrt() + select(is_left, -x, x))
@@ -357,7 +357,7 @@ class Symbol:
         return 2.0 * (self > 0.0) - 1.0
 
     def with_terms_of(self, others: "Iterable[Symbol]") -> "Symbol":
-        """Record this symbol plus 0 times the terms of `others`; 0 is returned unchanged."""
+        """Return this symbol plus 0 times the terms of `others`, recorded; 0 remains 0."""
         if not (self._terms or self._constant):
             return self
         terms = {slot: 0.0 for each in others for slot in each._terms} | self._terms

@@ -40,7 +40,7 @@ class Linear(NamedTuple):
 class Table:
     """A piecewise cubic function of time (s).
 
-    Row k of `pieces`, (n, 4), has coefficients, constant first, in the time after breaks[k].
+    Row k of `pieces`, (n, 4), has coefficients of ascending powers of the time since breaks[k].
     """
 
     def __init__(self, breaks: Any, pieces: Any) -> None:
@@ -191,7 +191,7 @@ def live_slots(
 ) -> list[int]:  # fmt: skip
     """Call `compute` for the slots that the outputs need, operands first; return these slots.
 
-    `is_true` evaluates conditions.
+    `is_true` evaluates the condition in a slot. Only Taylor series (`for_series`) need derivatives.
     """
     known = set(range(tape.n_inputs))
     wanted = [slot for output in tape.outputs for slot, _ in output.terms]

@@ -154,7 +154,7 @@ def _waves(where: str, values: object) -> tuple[Wave, ...]:
 
 
 def law_value(law: TorqueLaw, time: Any) -> Array:
-    """Return a law's components at a time (s), about its own axes."""
+    """Return a law's components at a time (s), about the axes of `law.frame`."""
     found: list[Any] = [c + r * time for c, r in zip(law.constant, law.rate, strict=True)]
     waves = [(amplitude, np.sin(frequency * time)) for amplitude, frequency in law.sines]
     waves += [(amplitude, np.cos(frequency * time)) for amplitude, frequency in law.cosines]

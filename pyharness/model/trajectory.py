@@ -286,7 +286,7 @@ class Trajectory(Conversions):
 
 
 def digits_left(error: float | None) -> float | None:
-    """Return the number of correct decimal digits, 0 to 15.95 (binary64), or None."""
+    """Return how many digits are correct, 0 to 15.95 (binary64), for a relative error, or None."""
     return None if error is None else max(0.0, -math.log10(max(error, ROUNDING)))
 
 

@@ -74,7 +74,6 @@ def is_no_number(value: object) -> bool:
 
 
 def parsed_float(text: str) -> float:
-    """Return the number in `text`; raise ValueError for other text, such as 1_000."""
     return float(_read_text(text))
 
 
@@ -112,13 +111,11 @@ def finite(where: str, value: object) -> float:
 
 
 def are_several(names: object) -> bool:
-    """Return whether `names` is an iterable, but neither text nor a zero-dimensional array."""
     is_whole = isinstance(names, (str, bytes)) or getattr(names, "shape", None) == ()
     return isinstance(names, Iterable) and not is_whole
 
 
 def number_list(where: str, values: object, allowed: str) -> Iterable[object]:
-    """Return an iterator over a user's ordered collection."""
     if not isinstance(values, (str, bytes, bytearray, Mapping, Set)):
         try:
             return iter(values)  # type: ignore[call-overload, no-any-return]
@@ -147,7 +144,6 @@ def boolean(where: str, value: object) -> bool:
 
 
 def tolerance_of(value: object, finest: float) -> float:
-    """Return a tolerance as a float, with no check of its range; `finest` is for the message."""
     found = converted(value)
     if isinstance(found, float):
         return found

@@ -154,7 +154,7 @@ class Axis:
         return self.field in CHOICES
 
     def coordinates(self) -> NDArray[Any]:
-        """Return all values, shape (count,); cached, so do not change them."""
+        """Return all values, shape (count,), read-only."""
         return _coordinates(self)
 
 

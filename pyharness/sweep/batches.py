@@ -30,9 +30,9 @@ Columns = dict[str, Array]
 
 
 def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
-    """Return an array for each reduction (stored quantity) of a chunk, in the chunk's shape.
+    """Return an array for each reduction (stored quantity), in the shape of the chunk.
 
-    Several components are the last dimension.
+    Components of a quantity, if any, are a last dimension.
     """
     box = sweep.box(chunk)
     shape = tuple(part.stop - part.start for part in box)
@@ -41,9 +41,9 @@ def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
 
 
 def solve_points(sweep: Sweep, where: list[Indices]) -> Arrays:
-    """Return reductions (stored quantities) of the scenes at `where`, indices for each dimension.
+    """Return n values, or rows, of each reduction (stored quantity).
 
-    The first dimension of each array counts scenes.
+    `where` has, for each dimension of the grid, the indices of the n scenes.
     """
     n = len(where[0])
     found = {asked.name: empty(asked, n) for asked in sweep.reductions}
@@ -149,7 +149,7 @@ def _components(
 
 
 def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
-    """Return "moments", "inertia" or "coefficients", and n values (kg m2 or 1; None if equal)."""
+    """Return "moments", "inertia" or "coefficients", and n of them, or None if none varies."""
     if scene.coefficients is not None:
         return "coefficients", _components("body.coefficients", scene.coefficients, own, n)
     if scene.inertia is not None:
@@ -204,7 +204,7 @@ def _omega(scene: Scene, own: Columns, moments: Array | None, n: int) -> Array:
 
 
 def _tilted(scene: Scene, moments: Array | None, tilt: Array, azimuth: Array) -> Array:
-    """Return unit vectors at angles `tilt` from the middle axis and `azimuth` about it."""
+    """Return unit vectors at angles (rad) `tilt` from the middle axis and `azimuth` about it."""
     bodies = np.array([scene.moments]) if moments is None else moments
     order = np.broadcast_to(np.argsort(bodies, axis=1, kind="stable"), (len(tilt), 3))
     sine = np.sin(tilt)
@@ -262,10 +262,7 @@ def follows_body(sweep: Sweep) -> bool:
 def with_numbers(
     sweep: Sweep, constants: Mapping[str, float], values: Sequence[Any] | None
 ) -> Scene:
-    """Return the scene with other `constants` in torque expressions, and a body of other `values`.
-
-    `values` are moments, inertia or coefficients.
-    """
+    """Return the scene with other `constants` of the torque, and other `values` of the body."""
     tables = dict(sweep.tables)
     if constants:
         torque = tables["torque"]

@@ -120,8 +120,8 @@ def _by_pool(sweep: Sweep, chunks: list[int], workers: int) -> Results:
 @contextlib.contextmanager
 def deaf_children() -> Iterator[None]:
     """Block Ctrl-C in this thread, and in processes and threads started within this context."""
-    # Children inherit a blocked signal. Python would start the resource tracker with the first
-    # child, and then unblock the signal.
+    # Children inherit a blocked signal. Python starts its resource tracker with the first child and
+    # then unblocks the signal; the tracker is therefore started before.
     warning = "ignore:resource_tracker"
     # The tracker would warn of leftover semaphores.
     sys.warnoptions.append(warning)

@@ -26,8 +26,6 @@ RANKS = ("least", "middle", "largest")
 
 @dataclass(frozen=True)
 class Reduction:
-    """A quantity of each scene, and its computation."""
-
     title: str
     # Returns n values, or n rows of components, for a batch of n scenes and parameters.
     compute: Callable[[Batch, Mapping[str, Any]], Found]
@@ -42,7 +40,6 @@ class Reduction:
 
     @property
     def fill(self) -> Any:
-        """Return the value for scenes without a result."""
         return np.nan if self.dtype == "f8" else -1
 
 
@@ -175,7 +172,7 @@ def _tilts(batch: Batch, given: Mapping[str, Any]) -> Array:
 
 
 def _tilt_squares(batch: Batch, given: Mapping[str, Any]) -> tuple[Array, Array]:
-    """Return squared cosine and sine of half a body axis's angle from its initial direction."""
+    """Return squared cosine and sine of half a body axis's angle to its initial direction."""
     squares = batch.attitudes(given["samples"]) ** 2
     is_own = _is_own(batch, given, len(squares))[:, None, :]
     along = squares[:, :, 0] + np.where(is_own, squares[:, :, 1:], 0.0).sum(axis=2)
@@ -294,7 +291,7 @@ def needs_attitudes(asked: Iterable[ReductionSpec]) -> bool:
 
 
 def empty(asked: ReductionSpec, n: int) -> Found:
-    """Return missing values for n scenes, shape (n,) or (n, components)."""
+    """Return an array of missing values for n scenes, shape (n,) or (n, components)."""
     reduction = REDUCTIONS[asked.reduction]
     shape = (n, len(reduction.labels)) if reduction.labels else (n,)
     return np.full(shape, reduction.fill, dtype=reduction.dtype)

@@ -91,10 +91,7 @@ def _pattern(sweep: Sweep, chunk: int) -> Arrays:
 
 
 def seconds_per_chunk(sweep: Sweep) -> float:
-    """Return the time (s) to solve a chunk in this process.
-
-    If chunks take long, it is extrapolated from parts.
-    """
+    """Return the time (s) to solve a chunk in this process; a long time is extrapolated."""
     scenes = math.prod(sweep.chunk_shape)
     seconds = scenes * seconds_per_scene(sweep)
     most, enough = _FILES, _ENOUGH
@@ -150,10 +147,7 @@ def seconds_per_scene(sweep: Sweep) -> float:
 
 
 def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
-    """Return sample indices, changed so that many scenes share a batch (one call).
-
-    Batches become about as large as in a chunk.
-    """
+    """Return sample indices, changed so that batches (calls) are about as large as in a chunk."""
     shared = {axis.dimension for axis in sweep.axes if axis.field in looped_fields(sweep)}
     found, scenes = [], math.prod(sweep.chunk_shape)
     dimensions = sweep.dimensions.items()
@@ -167,16 +161,13 @@ def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
     return found
 
 
-# Ratio of the memory of a process to the size of a chunk. A process holds several chunks, and their
-# computation needs more.
+# Memory of a process over the size of a chunk: it holds several chunks, and computes.
 _COPIES = 12
 _MOST_CHUNKS = 1_000_000
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of one run of a sweep."""
-
     estimate: Estimate | None  # None if no chunk was missing
     before: int  # number of chunks from earlier runs
     computed: int  # number of chunks from this run

@@ -103,7 +103,6 @@ class Store:
         return self._arrays[name][self.sweep.box(chunk)]
 
     def array(self, name: str) -> Any:
-        """Return the Zarr array of a reduction; indexing reads only the selected part."""
         return self._arrays[name]
 
     def _is_done(self, chunk: int) -> bool:

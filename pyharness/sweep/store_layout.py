@@ -150,7 +150,6 @@ def place_checksums(
         raise OSError(errno.EIO, f"{damage}, though it was written now") from None
     path = folder / checksums
     path.parent.mkdir(parents=True, exist_ok=True)
-    # Renamed when complete.
     new = path.with_name(f"{path.name}.{os.urandom(8).hex()}.partial")
     try:
         new.write_bytes(content)

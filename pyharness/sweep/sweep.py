@@ -33,8 +33,6 @@ class ReductionSpec:
 
 @dataclass(frozen=True)
 class Sweep:
-    """A sweep as a sweep file describes it."""
-
     name: str
     scene: Scene  # supplies the values that no axis varies
     tables: dict[str, Any]  # the scene's tables, none for a case
@@ -59,11 +57,8 @@ class Sweep:
 
     @property
     def chunk_shape(self) -> tuple[int, ...]:
-        """Return the number of scenes of a chunk along each dimension.
-
-        It is 1 along programs, methods, listings and readings.
-        """
-        # All scenes of a chunk share a solver.
+        """Return the number of scenes of a chunk along each dimension."""
+        # All scenes of a chunk share program, method, listing and reading.
         single = {axis.dimension for axis in self.axes if axis.is_choice}
         room = self.chunk
         lengths = []
@@ -120,10 +115,7 @@ def value_columns(sweep: Sweep, where: list[Indices]) -> dict[str, NDArray[Any]]
 
 
 def groups(columns: list[NDArray[Any]], n: int) -> list[tuple[Indices, tuple[Any, ...]]]:
-    """Return groups of indices 0 to n - 1 with equal values in all columns.
-
-    A group is a pair (indices, values).
-    """
+    """Return the groups of indices below n with equal values in all columns, and these values."""
     if not columns:
         return [(np.arange(n), ())]
     numbered = [np.unique(column, return_inverse=True) for column in columns]

@@ -44,10 +44,7 @@ _LONGEST_NAME = 240  # bytes; most file systems take 255
 
 
 def read_sweep(path: str | os.PathLike[str], claims: Mapping[str, Claim] | None = None) -> Sweep:
-    """Return the sweep that a TOML file describes.
-
-    `claims` has a function for each claim.
-    """
+    """Return the sweep that a TOML file describes; `claims` has a function for each claim."""
     path = os.fsdecode(path)
     where = f"sweep file '{path}'"
     content = read_file(path, where)
@@ -90,7 +87,7 @@ def _sweep(data: dict[str, Any], path: Path, text: str, claims: Mapping[str, Cla
 
 
 def _scene(table: object, path: Path) -> tuple[Scene, dict[str, Any], bytes]:
-    """Return the scene, its tables, and a null byte and the scene file's content for the digest."""
+    """Return the scene, its tables, and bytes for the digest: a null byte and the scene file."""
     if not isinstance(table, dict):
         raise InputError(f"scene is {kind_of(table)}; it must be a table [scene]")
     given = [key for key in ("case", "file") if key in table]

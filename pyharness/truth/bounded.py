@@ -45,7 +45,6 @@ class ErrorBound(NamedTuple):
         return f"{' '.join(filter(None, (at_most(self.value), unit)))} ({self.basis})"
 
     def over(self, scale: float) -> "ErrorBound":
-        """Return the bound with `value` divided by `scale` (rad/s), unchanged if `scale` is 0."""
         return self._replace(value=self.value / scale) if scale else self
 
     @property
@@ -56,7 +55,6 @@ class ErrorBound(NamedTuple):
 
     @property
     def turned(self) -> "ErrorBound | None":
-        """The bound for the attitude alone (rad), or None."""
         if self.angle is None or self.angle_basis is None:
             return None
         return ErrorBound(self.angle, self.angle_basis, warning=self.warning)
@@ -141,7 +139,6 @@ def _exact(omega: Array, remainder: Array | None) -> Sequence[Row]:
 
 
 def joined(found: Sequence[ErrorBound]) -> ErrorBound:
-    """Return one bound that is not below any of `found`."""
     angles = [each.angle for each in found if each.angle is not None]
     bases = [each.angle_basis for each in found if each.angle_basis is not None]
     return ErrorBound(
@@ -189,7 +186,6 @@ class _Statement(NamedTuple):
         self, any_torque: bool, effort: float
     ) -> tuple[Sequence[Balls] | None, Sequence[Balls] | None]:
         """Return balls that contain omega and the attitude; None where nothing is proved."""
-        # Imported only here, because few programs need the provers.
         from pyharness.truth.certificate import has_certificate, prove
 
         digits = self._digits()
@@ -214,7 +210,7 @@ class _Statement(NamedTuple):
         return omega, attitude
 
     def _digits(self) -> int | None:
-        """Return the digits that a proof needs to improve the estimate; None if above 60."""
+        """Return how many digits a proof needs to improve the estimate; None if above 60."""
         largest = max(1.0, *(abs(float(x)) for row in self.omega for x in row))
         if not (0.0 < self.claimed < math.inf):
             # Omega is 0 at all times, or there is no estimate.

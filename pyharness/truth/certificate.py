@@ -148,7 +148,7 @@ class _Run:
         self.omega: list[Balls] = []
 
     def prove(self, limit: float, effort: float, progress: Progress, early: float) -> None:
-        """Compute all steps; raise _AmplifiedError if radii after part `early` grow too fast."""
+        """Compute all steps; raise _AmplifiedError if errors grow too fast after part `early`."""
         system, clock = self._system, self._clock
         middle = [int(Fraction(x) * (1 << self._bits)) for x in self._record["omega"]]
         waves = [0, 1 << self._bits] * len(system.frequencies)

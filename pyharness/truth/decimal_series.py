@@ -46,7 +46,7 @@ def taylor_series(
 ) -> list[Row]:
     """Return a row of omega (rad/s), velocity (m/s) and attitude at each of `times` (s).
 
-    The rows end at a singularity.
+    The rows end at a singularity of the torque or of the solution.
     """
     equations, limit = _Equations(scene, coefficients, velocity), _Limit(scene, effort)
     tape = equations.tape
@@ -57,8 +57,8 @@ def taylor_series(
     at_end = [equations]
     switches = Switches(tape) if tape is not None and tape.has_switches else None
     if is_recorded:
-        # The last equations show the effect of rounding: their state and the terms of their sums
-        # are changed a little, because sums may cancel to 0, such as 1 - tanh(x) for a large x.
+        # The last of `at_end` show the effect of rounding: their state and the terms of their sums
+        # are slightly changed, because sums such as 1 - tanh(x) may cancel to 0.
         changes = Decimal(0), Decimal(10) ** (4 - getcontext().prec)
         results = {} if switches is None else switches.results
         at_end = [_Equations(scene, coefficients, velocity, each, results) for each in changes]

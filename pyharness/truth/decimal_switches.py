@@ -38,7 +38,7 @@ class Switches:
         for slot, is_floor, x in self._tape.operands_of_switches():
             level = x[0].to_integral_value() if is_floor else Decimal(0)
             if abs(x[0] - level) <= _ZERO * (1 + abs(x[0])):
-                # On the level, the result is NumPy's, until `turns` uses the operand's derivative.
+                # On a level, an earlier choice (as by `turns`) is kept; the first is NumPy's.
                 known = self._levels.get(slot)
                 value = level if is_floor else Decimal(0)
                 if slot in self.results and known is not None:

@@ -35,7 +35,6 @@ class Enclosure:
 
     @property
     def radius(self) -> float:
-        """The largest radius of omega's balls (rad/s), rounded up."""
         return max((rounded_up(each.radius) for each in self.omega), default=0.0)
 
     def rows(self) -> list[dict[str, Any]]:

@@ -98,7 +98,7 @@ def enclose_steps(
 class Equations:
     """The equations of motion of a scene, with exact coefficients.
 
-    `blocks` are slices of the unknowns, `scales` units of errors.
+    `blocks` are slices of the unknowns, `scales` the units of their errors.
     """
 
     # The unknowns are omega (rad/s), the scene's quaternion, the velocity (m/s) and, by rows, the
@@ -259,7 +259,7 @@ class _Proof:
         return _upper(sum((_upper(abs(x) / s) ** 2 for x, s in parts), arb(0)).sqrt())
 
     def balls(self, attitude: bool) -> list[Balls]:
-        """Return the balls of each group of unknowns; with `attitude`, group 1 is normalised."""
+        """Return the balls of each block of unknowns; with `attitude`, block 1 is normalised."""
         found = []
         for n, (block, radius) in enumerate(zip(self.blocks, self.radii, strict=True)):
             pairs = zip(self.middle[block], self.scales[block], strict=True)

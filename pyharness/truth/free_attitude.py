@@ -30,7 +30,7 @@ _MOST_RADIANS = 1e5  # work limit of the integration; some three minutes
 def free_attitude(scene: Scene, time: float) -> Row:
     """Return the torque-free attitude at `time` (s), a unit quaternion that is continuous in time.
 
-    Raise InputError if this takes too long.
+    Raise InputError if the integration would take too long.
     """
     checked_scene(scene)
     assert scene.attitude is not None
@@ -89,11 +89,9 @@ def _settling_time(scene: Scene, rate: Decimal) -> Decimal:
     i, w = list(scene.exact_moments or ()), [Fraction(x) for x in scene.omega]
     low, middle, high = sorted(range(3), key=lambda axis: i[axis])
     energies = [moment * rate * rate for moment, rate in zip(i, w, strict=True)]
-    # Omega is then constant to all digits: its components about the axes of the least and the
-    # largest moment are proportional to sech(rate * time - u), where exp(abs(u)) is at most
-    # 2/sech(u).
-    # Part of the energy about the low axis at u = 0, where omega has no component about the middle
-    # axis.
+    # Omega is steady where its components about the axes of the least and the largest moment, both
+    # proportional to sech(rate * time - u), are negligible; exp(abs(u)) is at most 2/sech(u). Where
+    # the sech is 1, omega has no middle component, and `part` of the energy is about the low axis.
     part = (i[high] - i[middle]) / (i[high] - i[low])
     return ((2 * _root(sum(energies) * part / energies[low])).ln() + _SETTLED) / rate
 
@@ -106,7 +104,6 @@ def _rotated(q: Row, omega: Row, time: Decimal) -> Row:
 
 
 def is_steady(scene: Scene) -> bool:
-    """Return whether omega is constant without torque."""
     i, w = list(scene.exact_moments or ()), [Fraction(x) for x in scene.omega]
     return all((i[a - 1] - i[a - 2]) * w[a - 1] * w[a - 2] == 0 for a in range(3))
 

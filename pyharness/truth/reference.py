@@ -76,7 +76,7 @@ def reference(
         scene.changing.check(times)
         if isinstance(scene.changing, InertiaFunction):
             scene = with_constant_body(scene)
-        # The law's tape rounds the sum of the amplitudes of one frequency to binary64.
+        # A recorded law has amplitudes of one frequency added in binary64, with rounding errors.
         if isinstance(scene.torque, TorqueLaw) and scene.torque.in_space:
             scene = replace(scene, torque=of_law(scene.torque))
     _check_torque(scene)
@@ -112,10 +112,7 @@ def reference(
 
 
 def check_order(times: Sequence[float], who: str) -> None:
-    """Raise InputError unless times are finite, on one side, and lead away from 0.
-
-    `who` names the computation.
-    """
+    """Raise InputError unless times are finite, on one side of 0, and lead away from it."""
     if not all(map(math.isfinite, times)):
         raise InputError(f"{who}: a time is not finite; allowed: finite numbers, in seconds")
     away = [abs(t) for t in times]

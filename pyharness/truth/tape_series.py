@@ -205,10 +205,7 @@ class TapeSeries:
         ]
 
     def reach(self, length: Decimal) -> Decimal:
-        """Return the step (s), reduced so that the series of every operation converges.
-
-        The step reaches no zero of a divisor.
-        """
+        """Return the step (s), reduced so that the series of every operation converges."""
         for _, operation in self._live_operations():
             most = self._largest_change(operation)
             if most is None:

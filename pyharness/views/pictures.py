@@ -34,7 +34,6 @@ def check_matplotlib(what: str) -> None:
 
 
 def numbers_beside(path: str) -> str:
-    """Return the path of a picture's CSV file."""
     return str(Path(path).with_suffix(".csv"))
 
 

@@ -61,8 +61,8 @@ class Series:
     MOST_ORDER = 24
     LEAST_LOCAL_TOLERANCE = 1e-19  # relative to omega: size of the last Taylor terms of a step
     SLACK = 16.0  # a step is shortened if its last Taylor terms exceed this many local tolerances
-    # Phase (rad) of the fastest perturbation. Over a longer time, inaccurate perturbations lose
-    # their phase, and the error amplification computed from them is too small.
+    # Phase (rad) of the fastest perturbation. Beyond it, inaccurate perturbations lose their phase,
+    # and the error amplification computed from them is too small.
     LONG = 5000.0
 
 

@@ -69,7 +69,6 @@ class Pieces:
         return np.ascontiguousarray(self.edges), np.asfortranarray(self.values.T)
 
     def numbers(self, times: Array) -> NDArray[np.intp]:
-        """Return the indices of the intervals that contain `times` (s)."""
         return np.searchsorted(self.edges[1:-1], times, side="right")
 
 

@@ -14,8 +14,8 @@ _SLACK = 2.0  # safety factor on the estimated effort, which may be too low
 _ROUNDING = 1.0 + 1e-9  # tolerates the rounding of an effort that a message suggested
 _UNFORESEEN = 10.0  # factor on the present effort if the needed effort is not estimated
 # By implementation: the largest number of steps without waves of the torque (some 30 s for the
-# slowest program), and the work for a wave over that for a step. "another word" is a Python program
-# in an arithmetic other than binary64; "binary32" and "binary128" are compiled.
+# slowest program), and the work for a wave, in steps. "another word" is a Python program in an
+# arithmetic other than binary64; "binary32" and "binary128" are compiled.
 _LIMITS = {
     "fortran": (1e8, 1.0),
     "python": (5e5, 0.05),

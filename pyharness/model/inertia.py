@@ -127,7 +127,7 @@ def diagonalised(
     exponent = min((_last_bit(x) for row in matrix for x in row if x), default=0)
     whole = [[int(Fraction(x) / Fraction(2) ** exponent) for x in row] for row in matrix]
     size = max(abs(x) for row in whole for x in row).bit_length()
-    # The determinant of `whole` is 0 or at least 1; its eigenvalues are below 3 * 2**size.
+    # The absolute determinant of `whole` is 0 or at least 1; eigenvalues are below 3 * 2**size.
     fraction = 2 * size + 4 + _BITS
     bits = size + fraction
     a = [[x << fraction for x in row] for row in whole]

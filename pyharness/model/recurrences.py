@@ -11,14 +11,14 @@ from pyharness.model.codes import Operations
 class Operation(NamedTuple):
     """An operation's recurrence for Taylor series, and its partial derivatives (slopes), as C."""
 
-    # Letters o, p and q are results, x and y operands. For o, for example, t_o is term k of the
-    # series (l_o for a table), b_o term k - 1, z_o term 0, f_o term 1, and m_o the value at a node.
-    # i is 1/k. s0 and s1 sum products of terms 1 to k - 1 of the series in `pairs`.
+    # o, p and q are results, x and y operands. Of o, for example, t_o is term k of the series (l_o
+    # for a table), b_o term k - 1, z_o term 0, f_o term 1, and m_o the value at a node. i is 1/k.
+    # s0 and s1 sum products of terms 1 to k - 1 of the two series in pairs[0] and pairs[1].
     series: tuple[str, ...]
     pairs: tuple[str, ...] = ()
     value: str = ""  # of o at a node; if empty, the series is summed
-    slopes: tuple[str, ...] = ()  # of o by x and by y
-    second: str = ""  # slope of p by x, if another operation may read p
+    slopes: tuple[str, ...] = ()  # derivatives of o with respect to x and y
+    second: str = ""  # derivative of p with respect to x, if another operation may read p
     first: str = ""  # z_o, if `value` does not give it; without both, the interpreter computes it
     # Rounding error of the operation alone, in units of 2**-53. The errors of the operands, times
     # the absolute slopes, are added.

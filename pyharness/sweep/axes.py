@@ -97,7 +97,7 @@ NUMBERS = {
 }
 _POLAR = ("omega.magnitude", "tilt", "azimuth", "height", "longitude")
 # Pairs of groups of fields, by the beginnings of their names. A field of one group excludes those
-# of the other, mostly because both describe the same quantity.
+# of the other, mostly because both describe one quantity.
 RIVALS = (
     (("omega.1", "omega.2", "omega.3"), _POLAR),
     (("tilt", "azimuth"), ("height", "longitude")),
@@ -154,7 +154,7 @@ class Axis:
         return self.field in CHOICES
 
     def coordinates(self) -> NDArray[Any]:
-        """Return all values, shape (count,), read-only."""
+        """Return all values, shape (count,); cached, so do not change them."""
         return _coordinates(self)
 
 

@@ -29,7 +29,6 @@ _PACE_SLACK = 3.0
 # times the difference between the series' derivative and the rates at the end of the step.
 _MOST_DEFECT = 64
 _NEARLY_1 = 1 - Decimal("1e-26")  # a relative change of thousands of rounding errors
-# Least growth of the number of steps, as a power of time, that the forecast extrapolates.
 _GROWING = Decimal("1.3")
 _LEAST = Decimal("1e-330")  # s, below all floats
 
@@ -165,7 +164,7 @@ class _Limit:
     def _forecast(self, step: int, begin: Decimal, rest: Decimal) -> Decimal:
         # `begin` (s) is the time after `step` steps, `rest` (s) the remaining time. The mean length
         # of a step is assumed to remain. If the number of steps grew with a power of time above
-        # 1.3, it is extrapolated with this power, at most 3.
+        # _GROWING, it is extrapolated with this power, at most 3.
         step_before, begin_before = self._before
         power = Decimal(1)
         if 0 < step_before < step:

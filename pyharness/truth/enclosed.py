@@ -109,7 +109,7 @@ def _decimal(x: Fraction, digits: int) -> str:
 def scales_of(coefficients: Sequence[Fraction]) -> list[float]:
     """Return the units in which proofs measure errors of omega's components.
 
-    They are square roots of absolute coefficients over the largest, at least 0.01.
+    They are square roots of Euler's absolute coefficients over the largest, at least 0.01.
     """
     # If all are above 0.01, the Jacobian's logarithmic norm is 0 for rotations about the axes of
     # largest and smallest moment.

@@ -153,11 +153,11 @@ class _Equations:
         self._products = [_fixed(x * span * unit) for x in products]
         self._constant = [_fixed(Fraction(x) * p) for x, p in zip(law.constant, push, strict=True)]
         self._rate = [_fixed(Fraction(x) * p * span) for x, p in zip(law.rate, push, strict=True)]
-        # The waves of one frequency have two unknowns, a sine and a cosine. If the angle at the
-        # last time is below 1 rad, the sine is divided by this angle: a small sine has few digits
-        # in fixed point, and a large amplitude would magnify its error. An entry has the cosine's
-        # factor in the sine's derivative, the sine's factor in the cosine's derivative, and by axis
-        # the factors of the sine and of the cosine in torque over moment.
+        # Each frequency has two unknowns, a sine and a cosine. If the angle at the last time is
+        # below 1 rad, the sine is divided by this angle: a small sine has few digits in fixed
+        # point, and a large amplitude would magnify its error. An entry has the factors of the
+        # cosine in the sine's derivative, of the sine in the cosine's derivative and, by axis, of
+        # the sine and of the cosine in torque over moment.
         self._waves = []
         for frequency in {abs(f) for _, f in law.sines + law.cosines}:
             angle = Fraction(frequency) * span

@@ -305,8 +305,9 @@ def called_once(
 ) -> list[Any]:
     """Return the components that a user's function returns for symbols.
 
-    Raise InputError if the call fails or returns one number.
+    Raise InputError if the call fails, or returns one number or nothing.
     """
+    # Called again with numpy.zeros replaced, if a symbol had to become a float.
     for with_targets in (False, True):
         try:
             with replaced_functions(with_targets):

@@ -133,7 +133,7 @@ class StateTorque:
     __radd__ = __add__
 
     def rotated(self, axes: Array) -> "StateTorque":
-        """Return the torque with omega, attitude and components about new `axes` (columns).
+        """Return the torque with its arguments and components about new `axes` (columns).
 
         Raise InputError for an opaque torque.
         """

@@ -413,7 +413,7 @@ class Symbol:
         """Return a composed function, such as tan, which NumPy looks up by name."""
         if name in _COMPOSED:
             return partial(_COMPOSED[name], self)
-        # NumPy's mean works without `dtype`.
+        # numpy.mean works for objects without an attribute `dtype`.
         if name.startswith("_") or name == "dtype":
             raise AttributeError(name)
         raise self.recorder.refusal(f"{name} of the state")

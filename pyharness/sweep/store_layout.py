@@ -49,7 +49,7 @@ class Label(NamedTuple):
 def checksum_text(label: Label, part: str, folder: Path, names: Sequence[str], limit: int) -> bytes:
     """Return a checksum file's content for the files `names` of `part`, such as "chunk 0/1".
 
-    Raise DamageError for unreadable or too large files.
+    Raise DamageError for files that are unreadable or above `limit` bytes.
     """
     identity = f"schema {label.schema}, version {label.version}, sweep {label.fingerprint}"
     lines = [f"# pyharness sweep store, {identity}, {part}"]

@@ -55,7 +55,7 @@ class Switches:
         return False
 
     def turns(self, time: Decimal, length: Decimal) -> bool:
-        """Change the first result whose operand leaves its level to the other side.
+        """Change the first result whose operand, now at a level, moves to the other side.
 
         Return whether one did; raise TimedError for sliding.
         """
@@ -68,7 +68,7 @@ class Switches:
             first = next((each for each in terms if abs(each) > _ZERO * total), Decimal(0))
             if (is_floor if first == 0 else first > 0) == (level < 0):
                 continue
-            # Sliding: with both results the operand moves to the other side.
+            # Sliding: with either result, the operand moves to the other side.
             if slot in self._turned:
                 raise TimedError(f"reference: {SLIDING}", float(time))
             self._turned.add(slot)

@@ -109,10 +109,10 @@ def _decimal(x: Fraction, digits: int) -> str:
 def scales_of(coefficients: Sequence[Fraction]) -> list[float]:
     """Return the units in which proofs measure errors of omega's components.
 
-    They are square roots of Euler's absolute coefficients over the largest, at least 0.01.
+    They are square roots of absolute Euler coefficients over the largest, at least 0.01.
     """
-    # If all are above 0.01, the Jacobian's logarithmic norm is 0 for rotations about the axes of
-    # largest and smallest moment.
+    # Unless a unit was raised to 0.01, the Jacobian's logarithmic norm is 0 for rotations about the
+    # axes of largest and smallest moment.
     sizes = [abs(x) for x in coefficients]
     largest = max(sizes) or Fraction(1)
     return [math.sqrt(max(float(x / largest), _LEAST)) for x in sizes]

@@ -20,7 +20,7 @@ from pyharness.views.pictures import saved
 
 HERE = Path(__file__).parent
 PAGE = "gallery/README.md"
-"""The path of the index in the folder `docs`."""
+"""The index's path in the folder `docs`."""
 
 PAGES = ("free-body", "satellites", "many-bodies", "programs")
 """The pages, in the order of the index."""
@@ -30,8 +30,8 @@ NOTEBOOKS = HERE.parents[1] / "build" / "notebooks"
 
 _HEAD = """
 Each example answers a question by a short program, a picture and numbers. In a script,
-`figure.savefig("picture.png")` saves the picture. The web pages offer the examples as Jupyter
-notebooks; `python -m docs.gallery.build` writes these to `build/notebooks`.
+`figure.savefig("picture.png")` saves the picture. The web pages offer Jupyter notebooks, which
+`python -m docs.gallery.build` writes to `build/notebooks`.
 """
 
 
@@ -42,7 +42,7 @@ def page(name: str) -> Path:
 
 @cache
 def examples() -> dict[str, tuple[str, str]]:
-    """Return the page and text of each example by its name, in the order of the index."""
+    """Return page and text of each example by the example's name, in the order of the index."""
     found = {}
     for each in PAGES:
         _, *sections = re.split(r"^(?=## )", page(each).read_text(encoding="utf-8"), flags=re.M)
@@ -80,7 +80,7 @@ def gallery_page() -> str:
 
 
 def _alternative(picture: str) -> str:
-    """Return what a picture shows: its alternative text up to the first comma or the like."""
+    """Return a picture's alternative text up to the first comma, semicolon or colon."""
     return " ".join(re.split("[],;:]", picture[2:])[0].split())
 
 

@@ -29,8 +29,8 @@ PICTURE = re.compile(r"!\[[^]]*\]\(([^)/]+\.(?:svg|png))\)")
 """A picture in the folder of its document; the first group is the file."""
 
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?(?![\w.]*\w)")
-_ROUNDING = 1e-9  # smaller numbers are rounding errors, which depend on the machine
-_POINTS = 30  # of a curve in the numbers of a picture
+_ROUNDING = 1e-9  # smaller numbers may be rounding errors, which depend on the machine
+_POINTS = 30  # stored of each curve, at most
 
 
 class Step(NamedTuple):
@@ -87,7 +87,7 @@ def _are_close(shown: str, printed: str) -> bool:
 
 
 def picture_of(figure: "Figure") -> Picture:
-    """Return a figure with numbers: some points of each curve, set of dots and map."""
+    """Return a figure with some points of each curve, set of dots and map as numbers."""
     rows: list[list[Any]] = []
     for number, axes in enumerate(figure.axes, 1):
         for label, columns in _drawn(axes):

@@ -35,7 +35,7 @@ def states(asked, integrator):
     moments = asked["moments"]
     text = MODEL.format(step=h, integrator=integrator, moments=" ".join(map(repr, moments)))
     model = mujoco.MjModel.from_xml_string(text)
-    # MuJoCo sorts the axes of a body by moment, and rotates its frame of inertia.
+    # Undo MuJoCo's sorting of the axes by moment, and its rotation of the inertial frame.
     model.body_inertia[1], model.body_iquat[1] = moments, (1.0, 0.0, 0.0, 0.0)
     mujoco.mj_setConst(model, mujoco.MjData(model))
     data = mujoco.MjData(model)

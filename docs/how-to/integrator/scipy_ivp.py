@@ -40,7 +40,7 @@ def right_hand_side(asked):
 def by_steps(asked, method):
     h, times = asked["step_size"], asked["times"]
     start = asked["omega"] + asked["attitude"]
-    # With this tolerance no step is rejected, and each has the largest length.
+    # With so large a tolerance, every step is accepted and has the length max_step.
     solver = method(
         right_hand_side(asked), 0.0, start, times[-1], first_step=h, max_step=h, atol=1e9
     )

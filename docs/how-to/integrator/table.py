@@ -10,7 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-# From the documents or the source of each package.
+# Expected results, from the documents or the source of each package.
 KNOWN = {
     "scipy_ivp.py RK45 fixed": "order 5",
     "scipy_ivp.py DOP853 fixed": "order 8",
@@ -26,7 +26,7 @@ KNOWN = {
 
 
 def judged(python: str, script: str, seed: str) -> list[str]:
-    """Return the cells of an integrator's row."""
+    """Return the cells of an integrator's row in the table."""
     command = f"{shlex.quote(python)} {Path(__file__).parent.name}/{script}"
     verb = [sys.executable, "-m", "pyharness", "verify", "--integrator", command]
     run = subprocess.run(

@@ -140,7 +140,7 @@ static void print_row(int row, double time, const double x[6]) {
     printf("]");
 }
 
-/* Replace the six columns of b by the solutions of a x = b; return IER. If it is not 0, b stays. */
+/* Return IER. If it is 0, the solutions of a x = b replace the six columns of b. */
 static int leqt1f(int n, double a[][POINTS], double b[][6]) {
     double scale[POINTS], kept[POINTS];
     int pivots[POINTS];

@@ -26,7 +26,7 @@ _KEPT = ("|", "```", "$$", "#", "![")
 
 
 def built(found: Mapping[str, Any]) -> dict[str, str]:
-    """Return article and metadata by file name, filled with values as `values()` returns them."""
+    """Return article and metadata, filled with the values of `values()`, by file name."""
     entries = references((HERE / "bibliography.bib").read_text(encoding="utf-8"))
     listed = "\n".join(f"- {each}" for each in entries)
     article = rendered(_template(ARTICLE), {**found, "references": listed})

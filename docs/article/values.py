@@ -1,7 +1,7 @@
 """The values of the article: every number and table of its text, computed by the package.
 
 The template `article.md.in` names each value, as in ``{{ stop.step }}``. The values are texts, with
-as many digits as the article shows. None is written by hand.
+as many digits as the article shows.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -41,7 +41,7 @@ from pyharness.truth import reference
 from pyharness.views.render import render
 
 _LONG = 300  # steps of the printed collocation decks
-_FINER = 10  # the step size of the thesis over that of its experiment with a small step
+_FINER = 10  # the step size of the thesis, divided by its small step size
 
 
 def values() -> dict[str, Any]:
@@ -194,7 +194,6 @@ def _one(case: int, who: str) -> ProgramFinding:
 
 
 def _orders() -> dict[str, str]:
-    """Return the orders of convergence of the corrected programs, measured in Case 3."""
     found = {}
     for program in PROGRAMS:
         order = _one(3, f"{program} corrected").order
@@ -205,7 +204,7 @@ def _orders() -> dict[str, str]:
 
 
 def _limits() -> dict[str, dict[str, str]]:
-    """Return orders and distances of the original programs from limit and solution (rad/s)."""
+    """Return the original programs' orders, and distances (rad/s) from limit and true solution."""
     found = {}
     chosen = {
         "runge_kutta": ("runge-kutta", 2), "runge_kutta_7": ("runge-kutta", 7),
@@ -228,13 +227,13 @@ def _limits() -> dict[str, dict[str, str]]:
 
 
 def _long_error() -> float:
-    """Return the larger error of the corrected collocation programs in a long Case 6 (rad/s)."""
+    """Return the larger error (rad/s) of the corrected collocation programs in a long Case 6."""
     lab = Laboratory(False, Assumptions(steps=_LONG))
     return max(lab.error(program, 6) for program in COLLOCATION)
 
 
 def _gains() -> dict[str, str]:
-    """Return the factors by which the small step reduces the error of Runge-Kutta."""
+    """Return the factors by which the small step reduces the Runge-Kutta program's error."""
     claim = "v3-small-step-runge-kutta"
     return {
         f"{programs}_{form}": _number(claim, programs, "case *: gain", form)
@@ -284,7 +283,7 @@ def _norms(cases: Iterable[int]) -> list[float]:
 
 
 def _machine() -> dict[str, str]:
-    """Return the changes of the printed pages and stops in the CDC's words of 48 bits."""
+    """Return how many printed numbers and stops change in the CDC's words of 48 bits."""
     bits = WORDS["cdc48"].p
     found = list(word_cells(case_numbers(), lengths=(bits,)))
 
@@ -332,7 +331,7 @@ def _cases_table() -> str:
 
 
 def _faults_table() -> str:
-    """Return a table of the effects of each fault, alone in the corrected program."""
+    """Return a table of the effects of each fault, kept alone in the corrected program."""
     rows = []
     for each in _switched():
         found = list(effects_of(each["id"]))
@@ -371,7 +370,7 @@ def _effects_row(
 
 
 def _errors_table() -> str:
-    """Return a table of the largest error of omega (rad/s) and the stop of each run."""
+    """Return a table of each run's largest error of omega (rad/s) and stop."""
     rows = []
     for case, found in _compared().items():
         by_listing: dict[str, list[str]] = {}

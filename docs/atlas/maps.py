@@ -43,7 +43,7 @@ def thinned(count: int, most: int = _MOST_PLACES) -> Any:
 
 
 def nearest(values: Array, value: float) -> int:
-    """Return the index of the positive number that is nearest to a value on a log scale."""
+    """Return the index of the positive number nearest to `value` on a logarithmic scale."""
     return int(np.argmin(np.abs(np.log(values / value))))
 
 

@@ -123,7 +123,7 @@ def predicted(scene: Scene, t_end: float) -> tuple[float, float]:
 
 
 def _ended(store: Store, listing: int, case: int) -> Array:
-    """Return the number of the stop variable, 0 for a complete run, `_OVERFLOW` for an overflow."""
+    """Return each run's stop variable by number, 0 if complete, or `_OVERFLOW`."""
     variable = np.asarray(store.array("stop-variable")[listing, case])
     status = np.asarray(store.array("status")[listing, case])
     return np.where(status == Statuses.OVERFLOW, _OVERFLOW, variable)

@@ -53,7 +53,6 @@ def torque_picture(store: Store) -> Picture:
 
 
 def _told(store: Store) -> list[str]:
-    """Return a description of each torque of the sweep."""
     count = store.sweep.dimensions["torque"]
     found = [""] * count
     for axis in store.sweep.axes:

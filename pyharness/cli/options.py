@@ -28,49 +28,34 @@ FORMATS = ("table", "json", "csv", "markdown")
 ONE_SCENE = "(--case N | --scene FILE)"
 # A placeholder after an option's name, as N in "--case N", means that the option takes a value.
 BODY = {
-    "--case N": "Use Case N of Table 1 of the thesis, 1 to 7: body, initial state, torque and "
-    "steps.",
-    "--scene FILE": "Read the scene from a TOML file (sample: `pyharness scene new`).",
-    "--omega A,B,C": "Initial angular velocity (omega) about the body axes, in rad/s (default: "
-    "the scene's).",
+    "--case N": "Case 1 to 7 of the thesis.",
+    "--scene FILE": "Scene file (sample: `pyharness scene new`).",
+    "--omega A,B,C": "Replace the initial angular velocity (body axes, rad/s).",
 }
 SCENE = {
     **BODY,
-    "--step-size H": "Step size in s, above 0 (default: the scene's).",
-    "--steps N": "Number of steps, at least 1 (default: the scene's).",
+    "--step-size H": "Replace the step size (s).",
+    "--steps N": "Replace the number of steps.",
 }
 LISTING = {
-    "--listing L": "Version of the program: original (default), or corrected (without the "
-    "author's faults, called defects).",
-    "--fix NAME,...": "Correct only these defects of the original program (names: `pyharness "
-    "defects`).",
-    "--keep NAME,...": "Correct all defects except these.",
-    "--reading NAME,...": "For these doubtful lines, use the reading that we did not adopt (names: "
-    "`pyharness defects --kind reading`).",
-    "--conjecture NAME,...": "Make these assumptions about missing statements (names: `pyharness "
-    "defects --kind conjecture`; none: no assumption; default: torque-held, which evaluates a "
-    "varying torque once in each step).",
-    "--lipschitz L": "Stop the Runge-Kutta program when, within a step, a derivative changes by "
-    "more than L times the change of its variable; L in 1/s, above 0 (default 500).",
-    "--no-stop": "Omit the stop test of --lipschitz.",
+    "--listing L": "Version: original (default), or corrected (without defects).",
+    "--fix NAME,...": "Correct only these defects (`pyharness defects --all` lists all names).",
+    "--keep NAME,...": "Correct all other defects.",
+    "--reading NAME,...": "Use the rejected reading of these doubtful lines.",
+    "--conjecture NAME,...": "Assumptions about missing lines, or `none` (default torque-held).",
+    "--lipschitz L": "Lipschitz quotient (1/s) above which the Runge-Kutta program stops (default "
+    "500).",
+    "--no-stop": "Omit this stop test.",
 }
-_EFFORT = (
-    "Multiply the work limit of each computation by F, above 0 (default 1). A computation beyond "
-    "its limit ends with an error, by default after about {} seconds{}."
-)
-EFFORT = {"--effort F": _EFFORT.format(10, " (30 for a program of the thesis)")}
+_EFFORT = "Multiply each computation's work limit, about {} s{}, by F."
+EFFORT = {"--effort F": _EFFORT.format(10, " (programs: 30 s)")}
 EFFORT_WITHOUT_PROGRAMS = {"--effort F": _EFFORT.format(10, "")}
 EFFORT_OF_PROGRAMS = {"--effort F": _EFFORT.format(30, "")}
 STRICT = {
-    "--strict": "Exit with status 1 also if a method ends before the last requested time, or if "
-    "its amplified rounding errors may exceed its tolerance. Without --strict, the status is 1 "
-    "only if Fortran and Python differ, a corrected program misses its order of convergence, or a "
-    "method of --method misses its tolerance or ends although the true solution continues."
+    "--strict": "Exit with status 1 also if results are incomplete, or rounding errors may "
+    "exceed the tolerance."
 }
-ALSO = {
-    "--also FILE,...": "Write the result also to these files: .md (Markdown), .xml (JUnit) or "
-    ".json."
-}
+ALSO = {"--also FILE,...": "Write the result also to these files (.md, .json; .xml: JUnit)."}
 _BY_SUFFIX = {".md": "markdown", ".xml": "junit", ".json": "json"}
 # Options and arguments that name a file to read; --check names several.
 _INPUTS = ("scene", "file", "scan", "vectors", "external", "listing_output", "sweep")
@@ -100,10 +85,7 @@ def outputs(formats: Sequence[str] = FORMATS, plot: str = "the results") -> dict
     """
     first, *others = formats
     form = {"--format F": f"Output format: {first} (default), {', '.join(others)}."}
-    picture = {
-        "--plot FILE": f"Write a picture of {plot} to this file (.png, .svg or .pdf), and its "
-        "numbers to a .csv file of the same name."
-    }
+    picture = {"--plot FILE": f"Draw {plot} (.png, .svg, .pdf), and write the numbers (.csv)."}
     out = {"--out FILE": "File for the result (default: standard output)."}
     return {**form, **(picture if plot else {}), **out}
 

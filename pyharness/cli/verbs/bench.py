@@ -24,29 +24,24 @@ _BODIES, _MOST_BODIES, _MOST_GROWN = 100_000, 1_000_000, 10_000_000
 _TERM_BODIES = 1000
 _OPTION_OF = {"method": "--method", "peer": "--peers"}
 OPTIONS = {
-    "--case N": "Only this case of Table 1 of the thesis, 1 to 7 (default: 2 to 7; with "
-    "--attitude, all).",
-    "--horizon T": "End time of each integration, in s, above 0, up to 1000 (default: 3, and 100 "
-    "too in Cases 3 and 4; with --attitude, 100 too in all cases but 6).",
+    "--case N": "Only this case of the thesis, 1 to 7 (default: 2 to 7; with --attitude, all).",
+    "--horizon T": "End time of each integration in s, up to 1000 (default 3; for some cases 100 "
+    "too).",
     "--draws N": "Instead of the cases, measure N random scenes, 1 to 10000.",
-    "--ensemble": "Instead of single trajectories, measure calls that solve many bodies at once: "
-    "run times and memory.",
-    "--terms": "Instead of the cases, measure scenes whose torques depend on omega (angular "
-    "velocity), time and attitude, for one body and for many at once.",
+    "--ensemble": "Measure run times and memory of calls that solve many bodies.",
+    "--terms": "Measure scenes whose torques depend on angular velocity, time and attitude, with "
+    "one body and with many.",
     "--bodies N": f"Number of bodies, 1 to {_MOST_BODIES} (default {_BODIES} with --ensemble, "
     f"{_TERM_BODIES} with --terms).",
-    "--seed S": "Seed, any text, of random scenes or bodies (default: the present year and week, "
-    "as in 2026-W47).",
-    "--attitude": "Measure the attitude (orientation) of the body together with omega.",
+    "--seed S": "Seed of random scenes or bodies, any text (default: this week, as 2026-W47).",
+    "--attitude": "Measure the attitude (orientation) too.",
     "--method M,...": "Only these of our methods and programs (names: first column of the result; "
-    "none: no method; default: all).",
+    "`none` for no method; default: all).",
     "--peers NAME,...": "Only these third-party solvers (names: first column of the result, or "
-    "packages: heyoka, numba, scipy; none: no solver; default: all installed).",
+    "heyoka, numba, scipy; `none` for no solver; default: all installed).",
     "--compiled": "With --terms, compile all torques with the C compiler first.",
-    "--plan": "Instead of comparing solvers, measure run times with and without each computation "
-    "that may be omitted (see `pyharness plan`).",
-    "--growth": "Instead of comparing solvers, measure how the error of the Taylor method grows "
-    "with time, up to 1e5 s, in Cases 3 and 4.",
+    "--plan": "Measure the time saved by each omitted computation (see `pyharness plan`).",
+    "--growth": "Measure how the error of the Taylor method grows up to 1e5 s, in Cases 3 and 4.",
     **shared.outputs(),
 }
 GROUPS = {

@@ -27,16 +27,16 @@ OPTIONS = {
     "cards CARDS": "Cards to show, separated by commas: programs, numbers or ranges, as in "
     "two-term, 1660, 1040-1090 or two-term:1660 (default: a table of contents; in JSON, CSV and "
     "Markdown, all cards).",
-    "--classes": "For each kind of note (defect, doubtful reading, ...), count the notes, the "
-    "cards that they name, and the differences between our text and the scan that they explain.",
+    "--classes": "For each kind of note (defect, doubtful reading, ...), count notes, annotated "
+    "cards, and the differences between our text and the scan that the notes explain.",
     "--collate": "Compare the operations of the three programs with each other and with sections "
     "II to V of the thesis.",
-    "--origins": "Show where the programs and the thesis disagree, and what each disagreement "
-    "suggests about the origin of a fault.",
+    "--origins": "Show where the programs and the thesis disagree, and what this suggests about "
+    "the origin of faults.",
     "--second-reading": "Compare our text of a random sample of cards with a second reading of "
     "the scan, and estimate how many misreadings remain.",
-    "--scan FILE": "Compare our text of the cards, character by character, with the text in this "
-    "file, made by character recognition (OCR) of a scan of the thesis.",
+    "--scan FILE": "Compare our text of the cards, character by character, with this file, an OCR "
+    "text of the thesis.",
     **shared.outputs(FORMATS, plot=""),
     "--format F": f"Output format: {FORMATS[0]} (default), {', '.join(FORMATS[1:])}. tei has all "
     "cards and notes in TEI, the XML format of text editions.",

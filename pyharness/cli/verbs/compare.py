@@ -17,23 +17,17 @@ from pyharness.thesis.programs import BINARY64, WORD_NAMES
 OPTIONS = {
     **shared.SCENE,
     **shared.LISTING,
-    "--listing L": "Version of the programs: original, or corrected (without the author's faults, "
-    "called defects); default: both.",
-    "--program P": f"Only this program: {', '.join(PROGRAMS)} (default: all three). The first two "
-    "use collocation.",
-    "--method M,...": "Compare these methods instead of the programs, as in auto,taylor,dop853 "
-    "(names: docs/reference/methods.md).",
-    "--word W": f"Floating-point arithmetic of the programs: {', '.join(WORD_NAMES)} (default "
-    f"{WORD_NAMES[0]}). cdc48 truncates results, as CDC computers did; cdc48-rounded rounds "
-    "them.",
-    "--tolerance E": "Largest allowed error of omega, relative to its largest component, at most "
-    "1, for --method or SciPy's solve_ivp (default: each method's own).",
-    "--attitude": "Compare the attitude (orientation) of the body too, by an angle in rad.",
-    "--ablate": "Run each program with every subset of its defects, and list the subsets, largest "
-    "error first.",
-    "--numerics": "Show also drifts of energy and momentum, differences between the Fortran and "
-    "the Python programs, error amplification, errors of SciPy's solve_ivp, and run times (always "
-    "in JSON and CSV).",
+    "--listing L": "Only this version: original, or corrected (without defects).",
+    "--program P": f"Only this program: {', '.join(PROGRAMS)}.",
+    "--method M,...": "Compare methods instead of programs (names: docs/reference/methods.md).",
+    "--word W": f"Arithmetic of programs: {', '.join(WORD_NAMES)} (default {WORD_NAMES[0]}; "
+    "cdc48: CDC computers).",
+    "--tolerance E": "Allowed error of omega, relative to its largest component, for --method or "
+    "solve_ivp (default: each method's own).",
+    "--attitude": "Compare the attitude (orientation) too, by an angle in rad.",
+    "--ablate": "Run each program with every subset of its defects.",
+    "--numerics": "Show also drifts, differences between Fortran and Python, error amplification, "
+    "solve_ivp and run times.",
     **shared.STRICT,
     **shared.EFFORT,
     **shared.outputs(),

@@ -13,14 +13,13 @@ from pyharness.thesis.decks import DIALECTS, SYSTEMS, deck_text, job_text
 FORMATS = ("table", "json")
 OPTIONS = {
     "--program P": f"Write the deck of this program: {', '.join(PROGRAMS)}.",
-    "--case N": "Put the data of this case of Table 1 of the thesis, 1 to 7, on the cards "
-    "(default: as published, Case 5 for runge-kutta and Case 2 for the others).",
+    "--case N": "Put the data of this case of the thesis, 1 to 7, on the cards (default, as "
+    "published: 5 for runge-kutta, otherwise 2).",
     **{each: shared.LISTING[each] for each in list(shared.LISTING)[:5]},
-    "--dialect D": f"Form of the deck: {', '.join(DIALECTS)} (default {DIALECTS[0]}, as printed). "
-    "gfortran is for GNU Fortran, ftn a batch job for the compiler of CDC computers.",
-    "--system S": "With --dialect ftn, operating system of the CDC computer: "
-    f"{' or '.join(SYSTEMS)} (default nos).",
-    "--round": "With --dialect ftn, round results instead of truncating them.",
+    "--dialect D": f"Form of the deck: {', '.join(DIALECTS)} (default {DIALECTS[0]}: as printed; "
+    "gfortran: for GNU Fortran; ftn: batch job for CDC computers).",
+    "--system S": f"With --dialect ftn, operating system: {' or '.join(SYSTEMS)} (default nos).",
+    "--round": "With --dialect ftn, round results to nearest (default: truncate).",
     "--terms N": "With --program four-term, write our conjecture of the unprinted deck for N "
     "terms, 3 or 5.",
     **shared.outputs(FORMATS, plot=""),

@@ -8,15 +8,15 @@ from pyharness.model.report import Report
 
 FORMATS = ("table", "json")
 OPTIONS = {
-    "name NAME": "Defect or doubtful line, by name or card (numbered line of a program), as in "
-    "stage-base, 1660 or two-term:1660; shows its effect in every case of the thesis. Without "
-    "NAME, list the defects that change results.",
+    "name NAME": "Show the effect of this defect or doubtful line in every case of the thesis. "
+    "NAME is a name or card (line number), as in stage-base, 1660 or two-term:1660. Default: list "
+    "the defects that change results.",
     "--all": "List all entries (JSON always has all); not with NAME.",
     "--kind K": "List only entries of this kind: defect (fault of the author of the programs), "
     "reading (line that can be read in two ways), conjecture (assumption about a missing line), "
-    "misreading (wrong text in the scan), 'missing text' (lost cards or pages), normalization "
-    "(name made uniform), dialect (peculiar to the machine's FORTRAN), redundant, unread or "
-    "unreachable (code without effect). Not with NAME.",
+    "misreading (character wrongly recognized in the scan), 'missing text' (lost cards or pages), "
+    "normalization (name made uniform), dialect (peculiar to the machine's FORTRAN), redundant, "
+    "unread or unreachable (code without effect). Not with NAME.",
     **shared.outputs(FORMATS, plot=""),
 }
 EXAMPLE = "defects stage-base"

@@ -7,13 +7,13 @@ from pyharness.model.errors import InputError
 
 FORMATS = ("table", "json")
 OPTIONS = {
-    "--out DIR": "Write the web pages to this folder, which is created if missing; the first page "
-    "is index.html.",
+    "--out DIR": "Write the web pages to this folder (created if missing); the first is "
+    "index.html.",
     "--data DIR": "Write the data to this folder, as CSV, JSON, TEI (XML) "
-    "and text: cards (program lines), notes on them, verdicts on the thesis, figures, runs, and "
-    "the pages that the programs print.",
-    "--docs DIR": "With --out, folder of the documents that also become pages (default: docs in "
-    "the source checkout or the current folder).",
+    "and text: cards (program lines), notes, verdicts on the thesis, figures, runs, printed "
+    "pages.",
+    "--docs DIR": "With --out, folder of the documents that also become pages (default: the folder "
+    "docs of the source checkout or, without one, of the current folder).",
     "--format F": "Output format of the list of written files: table (default) or json.",
 }
 USAGE = "(--out DIR | --data DIR)"

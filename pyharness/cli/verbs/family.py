@@ -11,8 +11,7 @@ _OF_A_MEMBER = ("weighting", "terms", "points", "corrections")
 _DEFAULT_CASE = "5"
 OPTIONS = {
     **shared.SCENE,
-    "--case N": "Use Case N of Table 1 of the thesis, 1 to 7 (default: "
-    f"{_DEFAULT_CASE}, without --scene).",
+    "--case N": f"Case 1 to 7 of the thesis (default: {_DEFAULT_CASE}, without --scene).",
     "--weighting W": "Measure one method, with this weighting of its residual: "
     f"{', '.join(WEIGHTINGS)} (default: several methods; collocation alone if --terms, --points or "
     "--corrections is given).",
@@ -21,11 +20,11 @@ OPTIONS = {
     "(Legendre nodes), or one fraction of the step for each term, as in 0.3,0.6.",
     "--corrections K": "Number of times that each step corrects its first estimate, 0 to 100 "
     "(default 1).",
-    "--lost": "Instead of measuring orders, look for programming mistakes that explain why three "
-    "unprinted programs of the thesis failed (section IV.2).",
-    "--word W": "Floating-point arithmetic of the programs of --lost: "
+    "--lost": "Look for programming mistakes that explain why three unprinted programs of the "
+    "thesis failed (section IV.2).",
+    "--word W": "Arithmetic of the programs of --lost: "
     f"{', '.join(WORD_NAMES)} (default {WORD_NAMES[0]}). cdc48 truncates results, as CDC "
-    "computers did; cdc48-rounded rounds them.",
+    "computers did.",
     **shared.outputs(plot=""),
 }
 EXAMPLE = "family --case 5 --weighting galerkin --terms 3"

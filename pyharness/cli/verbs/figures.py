@@ -8,8 +8,8 @@ from pyharness.model.errors import InputError
 
 FORMATS = ("table", "json")
 OPTIONS = {
-    "--out DIR": "Write the figures to this folder, as SVG, PNG and CSV files; it is created if "
-    "missing.",
+    "--out DIR": "Write the figures to this folder (created if missing), as SVG, PNG and CSV "
+    "files.",
     "--format F": "Output format of the list of drawn figures: table (default) or json.",
 }
 USAGE = "--out DIR"

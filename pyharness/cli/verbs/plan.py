@@ -10,14 +10,13 @@ from pyharness.engine.solver import PREPARED
 
 OPTIONS = {
     **shared.BODY,
-    "--method M": "Plan a solution by this method: auto (default), closed-form, taylor, quick, "
-    "improved-euler, taylor-3, rk4, or gauss-1 to gauss-8. With auto, the plan chooses "
-    "closed-form, quick or taylor.",
+    "--method M": "Plan a solution by this method: auto (default; chooses closed-form, quick or "
+    "taylor), closed-form, taylor, quick (extrapolated Runge-Kutta), improved-euler, taylor-3, "
+    "rk4, or gauss-1 to gauss-8.",
     "--tolerance E": "Largest allowed error of omega, relative to its largest component, at most "
     "1 (default: the method's own, 1e-9 for auto).",
     "--velocity": "Plan the computation of the translational velocity too.",
-    "--times T1,T2,...": "Times of the results, in s (default: the end of the scene's last step). "
-    "With several times, the plan includes intermediate output.",
+    "--times T1,T2,...": "Times of the results, in s (default: the end of the scene's last step).",
     **shared.outputs(plot=""),
 }
 USAGE = shared.ONE_SCENE

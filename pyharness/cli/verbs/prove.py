@@ -25,8 +25,8 @@ OPTIONS = {
     "--velocity": "Enclose the translational velocity too; needs python-flint.",
     "--transition": "Enclose the derivatives with respect to the initial omega too; needs "
     "python-flint.",
-    "--certificate FILE": "Write the steps of the proof to this file (JSON), if the torque depends "
-    "on time alone; not with --velocity or --transition.",
+    "--certificate FILE": "Write the steps of the proof to this file (JSON); needs a torque that "
+    "depends on time alone; not with --velocity or --transition.",
     "--check FILE,...": "Verify the certificates in these files.",
     **shared.EFFORT_WITHOUT_PROGRAMS,
     **shared.outputs(plot=""),

@@ -9,12 +9,11 @@ from pyharness.model.errors import InputError
 
 OPTIONS = {
     **shared.BODY,
-    "--disturbance D": "Initial perturbation of each steady rotation, divided by the rotation's "
-    "omega; above 0 and below 1 (default 0.001). It affects the time between flips (reversals of "
-    "the rotation about the middle axis).",
+    "--disturbance D": "Initial perturbation of each steady rotation, relative to its angular "
+    "velocity, above 0 and below 1 (default 0.001); affects the time between flips (reversals "
+    "of the rotation about the middle axis).",
     **shared.outputs(
-        plot="the polhodes (curves of omega without torque) and of the growth rates of "
-        "perturbations"
+        plot="the polhodes (curves of omega without torque) and the growth rates of perturbations"
     ),
 }
 USAGE = shared.ONE_SCENE

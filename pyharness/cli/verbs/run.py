@@ -29,31 +29,23 @@ PROGRAM_FORMATS = ("printer", "tape5")
 FORMATS = (*shared.FORMATS, *PROGRAM_FORMATS)
 OPTIONS = {
     **shared.SCENE,
-    "--program P": f"Run this program of the thesis: {', '.join(PROGRAMS)}. The first two use "
-    "collocation.",
-    "--implementation I": "Language of the program: fortran (default with binary64) or python "
-    "(default with another --word).",
-    "--word W": f"Floating-point arithmetic of the program: {', '.join(WORD_NAMES)} (default "
-    f"{WORD_NAMES[0]}). cdc48 truncates results, as CDC computers did; cdc48-rounded rounds "
-    f"them. Fortran has only {', '.join(COMPILED_WORDS)}.",
-    "--method M": "Solve the scene by this method: auto (default with --scene), taylor, "
-    "closed-form, dop853 or another of docs/reference/methods.md.",
+    "--program P": f"Program: {', '.join(PROGRAMS)}.",
+    "--implementation I": "Language: fortran (default with binary64) or python.",
+    "--word W": f"Arithmetic: {', '.join(WORD_NAMES)} (default {WORD_NAMES[0]}; cdc48: CDC "
+    f"computers). Fortran: {', '.join(COMPILED_WORDS)}.",
+    "--method M": "Method (list: docs/reference/methods.md; with --scene, default auto).",
     **shared.LISTING,
-    "--times T1,T2,...": "Times of the results, in s, positive or negative, in increasing or "
-    "decreasing order (default: the ends of the scene's steps).",
-    "--attitude [FORM]": "Compute the attitude (orientation) of the body, in this form: "
-    f"{', '.join(FORMS)} (default {FORMS[0]}; JSON always has quaternions). 3-1-3 and 3-2-1 "
-    "are Euler angles.",
-    "--animate FILE": "Write an animation of the rotating body to this file (.gif or .html); "
-    "needs --attitude or a scene with an attitude.",
-    "--tolerance E": "Largest allowed error of omega, relative to its largest component (default: "
-    "the method's own, 1e-9 for auto).",
-    "--strict": "Exit with status 1 if results are missing, if amplified rounding errors "
-    "may exceed the tolerance, or if a SciPy method may have missed a short change of the torque.",
+    "--times T1,T2,...": "Times of the results (s), ascending or descending (default: the scene's "
+    "steps).",
+    "--attitude [FORM]": f"Attitude (orientation): {', '.join(FORMS)} (default {FORMS[0]}).",
+    "--animate FILE": "Animate the body (.gif, .html); needs an attitude.",
+    "--tolerance E": "Allowed error of omega, relative to its largest component (default: the "
+    "method's own).",
+    "--strict": "Exit with status 1 if results are missing, or errors may exceed the tolerance.",
     **shared.EFFORT,
     **shared.outputs(FORMATS),
-    "--format F": f"Output format: {FORMATS[0]} (default), {', '.join(shared.FORMATS[1:])}. With "
-    "--program also printer (the printed page) or tape5 (the binary file TAPE5).",
+    "--format F": f"Output format: {FORMATS[0]} (default), {', '.join(shared.FORMATS[1:])}; for "
+    "programs also printer, tape5.",
 }
 GROUPS = {
     "a program of the thesis": "program implementation word",

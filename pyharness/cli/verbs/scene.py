@@ -17,11 +17,11 @@ FORMATS = ("table", "json")
 _ACTIONS = ("new", "check", "schema")
 _NEW = Path(__file__).with_name("brick.toml")
 OPTIONS = {
-    "action ACTION": "One of new (write a sample scene file), check (check FILE) and schema "
-    "(print the JSON Schema of scene files, with which an editor can check them).",
+    "action ACTION": "Action: new (write a sample scene file), check (check FILE) or schema "
+    "(print the JSON Schema of scene files).",
     "file FILE": "Scene file to check; required with check, not allowed otherwise.",
-    "--case N": "With new, write the scene of this case of Table 1 of the thesis, 1 to 7 (default: "
-    "a brick, an example with every section of a scene file).",
+    "--case N": "With new, write the scene of this case of the thesis, 1 to 7 (default: a brick, "
+    "with every section of a scene file).",
     **shared.outputs(FORMATS, plot=""),
     "--format F": "With check, the output format: table (default) or json.",
 }

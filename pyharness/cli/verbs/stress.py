@@ -13,13 +13,13 @@ FORMATS = ("table", "json", "junit")
 _FOLDER = "worst"
 OPTIONS = {
     "--only ID,...": f"Run only these trials: {', '.join(TRIALS)}; or only the checks whose ids "
-    "begin with this text, as in shapes/auto. The output says what each trial tests.",
+    "begin so, as in shapes/auto.",
     "--scene FILE": f"Run only the trials {', '.join(SCENE_TRIALS[:-1])} and {SCENE_TRIALS[-1]}, "
     "with the scene in this TOML file instead of the built-in one. Its torque may depend on omega "
     "or attitude.",
-    "--save DIR": "Save, for each method in each trial, the scene with the worst result as a TOML "
-    "file in this folder (default: save only scenes of failed checks, in the folder worst).",
-    **shared.outputs(FORMATS, plot="one trial, chosen by --only,"),
+    "--save DIR": "In this folder, save each method's scene with the worst result in each trial, "
+    "as TOML (default: only scenes of failed checks, in the folder worst).",
+    **shared.outputs(FORMATS, plot="the trial of --only"),
 }
 EXAMPLE = "stress --only separatrix --plot separatrix.png"
 

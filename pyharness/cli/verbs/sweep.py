@@ -20,16 +20,15 @@ OPTIONS = {
     "the quantities to store for each scene (format: docs/how-to/sweeps.md).",
     "--out STORE": "Store the results in this folder, in the Zarr format, and print a summary. "
     "After an interruption, the same command computes only the missing results.",
-    "--repair": "Recompute damaged chunks (parts of the grid that are stored together), and "
-    "rewrite damaged metadata.",
+    "--repair": "Recompute damaged chunks (stored parts of the grid), and rewrite damaged "
+    "metadata.",
     "--executor E": "Where to compute: here (in this process, the default), processes (in "
     "several processes of this machine) or dask (in a Dask cluster).",
     "--workers N": "Number of worker processes of --executor processes or dask, 1 to "
     f"{_MOST_WORKERS} (default: one for each processor); not with --scheduler.",
     "--scheduler ADDRESS": "Address of the scheduler of a Dask cluster, as in tcp://host:8786 "
     "(default: start a cluster on this machine); needs --executor dask.",
-    "--quantity NAME": "Stored quantity that --plot draws (default: the first with numerical "
-    "values).",
+    "--quantity NAME": "Stored quantity that --plot draws (default: the first numerical one).",
     **{key: help for key, help in shared.outputs().items() if key != "--out FILE"},
 }
 USAGE = "FILE.toml --out STORE"

@@ -25,50 +25,42 @@ FORMATS = ("table", "json", "junit", "markdown")
 _OF_ONE_KIND = {"random": ("seed", "draws"), "golden": ("record",)}
 _OF_THE_CHECKS = ("only", "seed", "draws", "external", "self_test", "update", "record", "also")
 _ABOUT = {
-    "cells": "Fortran programs against Python",
-    "words": "other floating-point formats",
-    "decks": "programs compiled from cards",
-    "schemes": "single steps of the programs",
-    "stops": "the stop test of the Runge-Kutta program",
+    "cells": "Fortran against Python",
+    "words": "other arithmetics",
+    "decks": "compiled cards",
+    "schemes": "single steps",
+    "stops": "stop test",
     "methods": "errors of omega",
-    "prepared": "solvers for many calls",
-    "attitudes": "errors of the attitude",
+    "prepared": "repeated calls",
+    "attitudes": "errors of attitudes",
     "orders": "orders of convergence",
-    "random": "random scenes",
+    "random": "programs and methods in random scenes",
     "external": "published results",
     "golden": "stored trajectories",
 }
 OPTIONS = {
-    "--only ID,...": "Run only checks of these kinds, or whose ids begin with these texts, as in "
-    "cells/two-term. Kinds: "
+    "--only ID,...": "Only checks of these kinds, or whose ids begin so, as in cells/two-term. "
+    "Kinds: "
     f"{', '.join(f'{kind} ({_ABOUT[kind]})' for kind in KINDS)}.",
-    "--seed S": "Seed of the random scenes, any text (default: the present year and week, as in "
-    "2026-W47).",
-    "--draws N": f"Number of random scenes, up to 1000000 (default {DRAWS}, or 0 with --port); "
-    "with --integrator, for each kind of torque, 1 to 1000 (default 2).",
-    "--external FILE": "Only compare our methods with the published results in this file (format: "
+    "--seed S": "Seed of random scenes, any text (default: this week, as 2026-W47).",
+    "--draws N": f"Number of random scenes (default {DRAWS}; with --port, 0; with --integrator, "
+    "2 for each kind of torque).",
+    "--external FILE": "Check our methods against published results (format: "
     "docs/how-to/external.md).",
-    "--listing-output FILE": "Find the floating-point arithmetic of an unknown computer from a "
-    "page that one of the three programs printed there (only with --format table or json).",
-    "--port COMMAND": "Compare our Python programs bit for bit with your port of them, which "
-    "COMMAND starts (protocol: docs/how-to/ports.md).",
-    "--integrator COMMAND": "Compare your integrator of rigid-body motion, which COMMAND starts, "
-    "with true solutions, and name its faults (protocol: docs/how-to/integrators.md).",
-    "--order P": "With --integrator, lowest order of convergence that passes, above 0, up to 40 "
-    "(default 1).",
-    "--program P": "Only this program: two-term, four-term or runge-kutta (not with --integrator; "
-    "default: all three).",
-    "--case N": "Only this case of Table 1 of the thesis, 1 to 7 (not with --integrator; default: "
-    "all).",
-    "--cell NAME,...": "With --port, only these runs, as in two-term/case-3, or random scenes, as "
-    "in random/7. With --integrator, only these scenes, as in wave-1, or kinds of torque: free "
-    "(none), constant, wave.",
-    "--self-test": "Plant known faults in our software, or in the answers of your port or "
-    "integrator, and report which checks detect each fault.",
-    "--update": "Compute the stored trajectories (kind golden) again, write them, and report "
-    "which changed.",
-    "--record DIR": "Folder of the stored trajectories (default: tests/golden of the source "
-    "checkout).",
+    "--listing-output FILE": "Identify a computer's arithmetic from a page that a thesis program "
+    "printed there.",
+    "--port COMMAND": "Check bit for bit the port that COMMAND starts (docs/how-to/ports.md).",
+    "--integrator COMMAND": "Check the integrator that COMMAND starts "
+    "(docs/how-to/integrators.md).",
+    "--order P": "With --integrator, lowest order of convergence that passes (default 1).",
+    "--program P": "Only this program: two-term, four-term, runge-kutta (not with --integrator).",
+    "--case N": "Only this case of the thesis, 1 to 7 (not with --integrator).",
+    "--cell NAME,...": "With --port, only these runs (as two-term/case-3, random/7); with "
+    "--integrator, scenes (as wave-1) or torques (free, constant, wave).",
+    "--self-test": "Plant known faults, and report which are detected (also with --port or "
+    "--integrator).",
+    "--update": "Recompute and write the stored trajectories (golden), and report changes.",
+    "--record DIR": "Folder of the stored trajectories (default: tests/golden in the checkout).",
     **shared.outputs(FORMATS, plot="the errors of --integrator"),
     **shared.ALSO,
 }

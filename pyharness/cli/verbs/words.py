@@ -12,16 +12,16 @@ from pyharness.thesis.vectors import answers
 
 FORMATS = ("table", "json", "csv", "markdown")
 OPTIONS = {
-    "--case N": "Run only this case of Table 1 of the thesis, 1 to 7 (default: all).",
+    "--case N": "Run only this case of the thesis, 1 to 7 (default: all).",
     "--program P": f"Run only this program: {', '.join(PROGRAMS)} (default: all three).",
     "--lengths": f"Show each run in selected precisions from {LENGTHS[0]} to {LENGTHS[-1]} bits; "
-    "takes about two minutes. Without --lengths or --all, show only whether CDC arithmetic changes "
-    "results. Formats other than table, and --plot, imply --lengths.",
+    "takes about two minutes (implied by --plot and by formats other than table; default: show "
+    "only whether CDC arithmetic changes results).",
     "--all": f"Show each run in every precision from {LENGTHS[0]} to {LENGTHS[-1]} bits; takes "
     "about twelve minutes.",
-    "--vectors FILE": "Instead of running programs, check our emulation of CDC arithmetic against "
-    "the operations and results in this JSON file.",
-    **shared.outputs(FORMATS, plot="the error as a function of the precision (needs --case)"),
+    "--vectors FILE": "Check our CDC arithmetic against the results in this file (format: "
+    "docs/explanation/words.md).",
+    **shared.outputs(FORMATS, plot="the error in one --case as a function of the precision"),
 }
 EXAMPLE = "words --case 2 --program runge-kutta"
 

@@ -38,7 +38,7 @@ SCENE = {
     "--steps N": "Replace the number of steps.",
 }
 LISTING = {
-    "--listing L": "Version: original (default), or corrected (without defects).",
+    "--listing L": "Version: original (default), or corrected (without the author's defects).",
     "--fix NAME,...": "Correct only these defects (`pyharness defects --all` lists all names).",
     "--keep NAME,...": "Correct all other defects.",
     "--reading NAME,...": "Use the rejected reading of these doubtful lines.",

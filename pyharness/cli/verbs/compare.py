@@ -17,7 +17,7 @@ from pyharness.thesis.programs import BINARY64, WORD_NAMES
 OPTIONS = {
     **shared.SCENE,
     **shared.LISTING,
-    "--listing L": "Only this version: original, or corrected (without defects).",
+    "--listing L": "Only this version: original, or corrected (without the author's defects).",
     "--program P": f"Only this program: {', '.join(PROGRAMS)}.",
     "--method M,...": "Compare methods instead of programs (names: docs/reference/methods.md).",
     "--word W": f"Arithmetic of programs: {', '.join(WORD_NAMES)} (default {WORD_NAMES[0]}; "
@@ -26,8 +26,8 @@ OPTIONS = {
     "solve_ivp (default: each method's own).",
     "--attitude": "Compare the attitude (orientation) too, by an angle in rad.",
     "--ablate": "Run each program with every subset of its defects.",
-    "--numerics": "Show also drifts, differences between Fortran and Python, error amplification, "
-    "solve_ivp and run times.",
+    "--numerics": "Show also drifts of energy and momentum, differences between Fortran and "
+    "Python, error amplification, solve_ivp and run times.",
     **shared.STRICT,
     **shared.EFFORT,
     **shared.outputs(),

@@ -32,7 +32,7 @@ OPTIONS = {
     "--program P": f"Program: {', '.join(PROGRAMS)}.",
     "--implementation I": "Language: fortran (default with binary64) or python.",
     "--word W": f"Arithmetic: {', '.join(WORD_NAMES)} (default {WORD_NAMES[0]}; cdc48: CDC "
-    f"computers). Fortran: {', '.join(COMPILED_WORDS)}.",
+    f"computers). In Fortran only {', '.join(COMPILED_WORDS)}.",
     "--method M": "Method (list: docs/reference/methods.md; with --scene, default auto).",
     **shared.LISTING,
     "--times T1,T2,...": "Times of the results (s), ascending or descending (default: the scene's "

@@ -13,7 +13,7 @@ FORMATS = ("table", "json", "junit")
 _FOLDER = "worst"
 OPTIONS = {
     "--only ID,...": f"Run only these trials: {', '.join(TRIALS)}; or only the checks whose ids "
-    "begin so, as in shapes/auto.",
+    "begin with ID, as in shapes/auto.",
     "--scene FILE": f"Run only the trials {', '.join(SCENE_TRIALS[:-1])} and {SCENE_TRIALS[-1]}, "
     "with the scene in this TOML file instead of the built-in one. Its torque may depend on omega "
     "or attitude.",

@@ -31,7 +31,7 @@ _ABOUT = {
     "schemes": "single steps",
     "stops": "stop test",
     "methods": "errors of omega",
-    "prepared": "repeated calls",
+    "prepared": "solvers for many calls",
     "attitudes": "errors of attitudes",
     "orders": "orders of convergence",
     "random": "programs and methods in random scenes",
@@ -39,8 +39,8 @@ _ABOUT = {
     "golden": "stored trajectories",
 }
 OPTIONS = {
-    "--only ID,...": "Only checks of these kinds, or whose ids begin so, as in cells/two-term. "
-    "Kinds: "
+    "--only ID,...": "Only checks of these kinds, or whose ids begin with ID, as in "
+    "cells/two-term. Kinds: "
     f"{', '.join(f'{kind} ({_ABOUT[kind]})' for kind in KINDS)}.",
     "--seed S": "Seed of random scenes, any text (default: this week, as 2026-W47).",
     "--draws N": f"Number of random scenes (default {DRAWS}; with --port, 0; with --integrator, "

@@ -17,7 +17,7 @@ from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.thesis.programs import PROGRAM_REGISTRY
 
-# Three per decade: methods are compared at equal error, which may be far from the tolerance.
+# Three per decade, to compare methods at nearly equal errors, which may be far from the tolerance.
 TOLERANCES = tuple(float(f"{part}e-{digits}") for digits in range(1, 16) for part in (5, 2, 1))
 Maker = Callable[[float, float], Ready]
 
@@ -26,7 +26,7 @@ Maker = Callable[[float, float], Ready]
 class Contender:
     name: str
     setting: str  # "tolerance", "steps" or "none"
-    package: str = field(default="", kw_only=True)  # empty for ours
+    package: str = field(default="", kw_only=True)  # third-party package, or empty
 
     @property
     def is_installed(self) -> bool:
@@ -37,9 +37,9 @@ class Contender:
 class SceneContender(Contender):
     """A contender that integrates omega and, if it can, the attitude of one scene."""
 
-    # Prepares what does not depend on the end time and the setting.
+    # Prepares all that does not depend on the end time and the setting.
     prepare: Callable[[Scene], Maker]
-    settings: tuple[float, ...] = ()  # empty for a fixed step: `ladder` chooses numbers of steps
+    settings: tuple[float, ...] = ()  # empty for fixed steps, whose number `ladder` chooses
     order: int = 0  # order of convergence of a method with a fixed step
     attitude: bool = False
 
@@ -62,7 +62,7 @@ def list_own_contenders() -> list[SceneContender]:
 
 
 def refuse_rounding(solver: str, setting: float) -> None:
-    """Raise InputError for a tolerance below 100 eps, which SciPy replaces and LSODA refuses."""
+    """Raise InputError for a tolerance below 100 eps, which SciPy changes and LSODA refuses."""
     limit = 100 * 2.0**-52
     if setting < limit:
         raise InputError(f"{solver} takes no tolerance below 100 eps = {limit:.2g}")

@@ -19,7 +19,7 @@ MOMENTS: Triple = (40.0, 30.0, 20.0)  # kg m2
 HORIZON = 3.0  # end time (s)
 SAMPLE = 200  # number of bodies whose error is measured
 _FASTEST = 2.0  # largest component of the initial omega, rad/s
-_HARDEST = 1.0  # largest torque about an axis over the moment about this axis, rad/s2
+_HARDEST = 1.0  # largest torque about an axis divided by this axis's moment, rad/s2
 
 
 def coefficients() -> list[float]:
@@ -33,7 +33,7 @@ class EnsembleLoad:
     name: str
     omega0: Array  # (n, 3), rad/s
     torque: Array | None  # (n, 3), N m about the body's axes; None without torque
-    # (n, 4), unit quaternions; None if attitudes are not requested
+    # (n, 4): unit quaternions; None if attitudes are not requested
     attitude0: Array | None = field(default=None, kw_only=True)
     horizon: float = field(default=HORIZON, kw_only=True)  # end time, s
 
@@ -47,7 +47,7 @@ class EnsembleLoad:
 
     @property
     def acceleration(self) -> Array:
-        """Return torques divided by moments (rad/s2), shape (n, 3)."""
+        """The torques divided by the moments (rad/s2), shape (n, 3)."""
         if self.torque is None:
             return np.zeros_like(self.omega0)
         return np.asarray(self.torque / np.array(MOMENTS))
@@ -59,7 +59,7 @@ class EnsembleLoad:
         return replace(self, **own)
 
     def ends(self) -> Array:
-        """Return omega (rad/s) or the requested attitude of all bodies at the end time."""
+        """Return all bodies' omega (rad/s) or, if requested, attitudes at the end time."""
         found = []
         for scene in self.scenes():
             attitude = scene.attitude is not None
@@ -75,8 +75,8 @@ class EnsembleLoad:
 
 
 # A function of the load, the setting and the number of threads. It returns a function that
-# integrates to the end time and returns omega, shape (n, 3), or the attitudes, shape (n, 4), if the
-# load requests them.
+# integrates to the end time, and returns omega, shape (n, 3), or the requested attitudes, shape
+# (n, 4).
 EnsembleMaker = Callable[[EnsembleLoad, float, int], Callable[[], Array]]
 
 
@@ -86,7 +86,7 @@ class EnsembleContender(Contender):
     threads: tuple[int, ...] = (1, 2)  # numbers of threads to measure with
     torque_free: bool = False  # solves only bodies without torque
     attitude: bool = False
-    # Several ways to prepare the solver, by a note on each. All are timed; the fastest counts.
+    # Ways to prepare the solver, by notes on them. All are timed; the fastest counts.
     variants: Mapping[str, EnsembleMaker] = field(default_factory=dict, kw_only=True)
 
     @property
@@ -121,7 +121,7 @@ def own_ensembles(compiled: bool = False) -> list[EnsembleContender]:
 
 def _make_own(method: str, compiled: bool = False) -> EnsembleMaker:
     def prepare(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-        # Each call of the solver writes its results into the arrays of the previous call.
+        # Each call reuses the arrays of the previous call's results.
         tolerance = setting if method == "taylor" else None
         step = load.horizon / setting if method == "rk4" else None
         kept = None

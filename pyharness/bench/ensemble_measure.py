@@ -35,30 +35,30 @@ from pyharness.model.trajectory import Array
 TARGETS = (1e-6, 1e-12)
 STEPS = 300  # number of RK4 steps, where the rate is in steps per second
 ROUNDS = 9
-# Durations of a call (s). The number of bodies is increased after a call shorter than `_CALL`, or
-# shorter than `_LONG_CALL` if the last increase raised the bodies per second by more than half.
+# Durations (s). The number of bodies is increased after a call shorter than `_CALL`, or shorter than
+# `_LONG_CALL` if the last increase raised the bodies per second by more than half.
 _CALL, _LONG_CALL = 0.03, 0.5
-SLOW = 0.3  # s; calls slower than this are timed in fewer rounds
+SLOW = 0.3  # s; slower calls are timed in fewer rounds
 _BATCH = 0.02  # s; duration of the calls in a round
 _MOST_STEPS = 1 << 14
-# Tolerances, and the number of steps of RK4.
+# Tolerance of each method, or number of steps of RK4.
 SETTINGS = {"closed-form": 1e-12, "taylor": 1e-12, "rk4": float(STEPS)}
 _GROWTH_ROUNDS = 5
 
 
 @dataclass(frozen=True)
 class Rate:
-    """The speed of one contender on one load."""
+    """The speed of a contender on a load."""
 
     load: str
-    target: float | None  # None where the steps were prescribed
+    target: float | None  # target error; None if the number of steps was prescribed
     method: str
     threads: int
     setting: float | None  # tolerance or number of steps; None for a closed form
     bodies: int  # number of bodies in a call
     seconds: float  # the shortest time of a call
-    error: float  # largest in the sample: of omega, relative, or of the attitude, rad
-    note: str = ""  # names the fastest of several variants
+    error: float  # largest error in the sample: of omega (relative) or of the attitude (rad)
+    note: str = ""  # the fastest of several variants
 
     @property
     def bodies_a_second(self) -> float:
@@ -66,7 +66,7 @@ class Rate:
 
     @property
     def rate(self) -> float:
-        """Return bodies per second or, without a target error, steps of all bodies per second."""
+        """The bodies per second or, without a target error, steps of all bodies per second."""
         return self.bodies_a_second * (1 if self.target is not None else STEPS)
 
 
@@ -75,7 +75,7 @@ class Rates:
     seed: str
     bodies: int
     rows: list[Rate] = field(default_factory=list)
-    # Of contenders not measured: task, contender, reason.
+    # Task, contender and reason, for contenders that were not measured.
     refused: list[tuple[str, str, str]] = field(default_factory=list)
 
 
@@ -86,7 +86,7 @@ class _Task:
     load: EnsembleLoad
     target: float | None
     sample: EnsembleLoad
-    ends: Array  # sample at the horizon: omega, (n, 3), or attitude, (n, 4)
+    ends: Array  # true omega, (n, 3), or attitude, (n, 4), of the sample at the end time
 
     @property
     def place(self) -> str:
@@ -99,7 +99,7 @@ class _Task:
         return self.target is not None or each.setting == "steps"
 
     def error(self, omega: Array) -> float:
-        """Return the largest error of all bodies: of omega (relative) or of the attitude (rad)."""
+        """Return the largest error of omega (relative) or of the attitude (rad) in the sample."""
         n = min(len(omega), len(self.ends))
         ends, starts = self.ends[:n], self.sample.omega0[:n]
         if self.load.attitude0 is not None:
@@ -110,7 +110,7 @@ class _Task:
         return float(np.where(np.isfinite(errors), errors, np.inf).max())
 
     def setting(self, each: EnsembleContender) -> float | None:
-        """Return the coarsest setting that reaches the target, or None; without target, `STEPS`."""
+        """Return the coarsest setting that reaches the target error, or None; without target, STEPS."""
         if self.target is None:
             return float(STEPS)
         for setting in _ladder(each, self.target):
@@ -130,9 +130,9 @@ def measure_ensembles(
     progress: Progress = no_progress,
     least: int = 64,
 ) -> Rates:
-    """Return each contender's speed on each load, at each target error.
+    """Return each contender's speed on each load at each target error.
 
-    `seed` is only recorded; a call solves at least `least` bodies, or all if fewer.
+    `seed` is only recorded. A call solves at least `least` bodies, or all if there are fewer.
     """
     found = Rates(seed, loads[0].n)
     tasks: list[_Task] = []
@@ -176,7 +176,7 @@ def _ladder(each: EnsembleContender, target: float) -> Iterator[float]:
     if each.setting == "none":
         yield 1.0
     elif each.setting == "tolerance":
-        # Errors were between 1e-4 and 1e3 times the tolerance.
+        # Because errors were between 1e-4 and 1e3 times the tolerance.
         for digits in range(-5, 4):
             if target * 10.0**-digits >= FINEST:
                 yield float(f"{target * 10.0**-digits:.0e}")
@@ -207,7 +207,7 @@ def clock_of(threads: int) -> Clock:
 
 @dataclass(frozen=True)
 class Size:
-    """The run times per body (s) by method, for `bodies` bodies on one core."""
+    """The run times per body (s) by method, on one core."""
 
     bodies: int
     seconds: dict[str, float]
@@ -218,7 +218,7 @@ class Memory:
     method: str
     bodies: int
     arrays: int  # bytes of initial omegas, torques and results
-    peak: int | None  # most bytes added, with the arrays; None where the system does not report it
+    peak: int | None  # increase of peak memory in bytes, including `arrays`; None if unknown
 
     @property
     def ratio(self) -> float | None:
@@ -226,7 +226,7 @@ class Memory:
 
 
 def sizes(seed: str, most: int, progress: Progress = no_progress) -> list[Size]:
-    """Return the run times per body (s) for 1, 10, ... up to `most` bodies."""
+    """Return run times for 1, 10, ... up to `most` bodies."""
     free, pushed = draw(seed, most)
     found: list[Size] = []
     n = 1
@@ -251,9 +251,9 @@ def _prepared(load: EnsembleLoad) -> Callable[[], object]:
 
 
 def memory(bodies: int) -> list[Memory]:
-    """Return the memory that a call of each of our methods takes."""
+    """Return the memory (bytes) that a call of each of our methods needs."""
     found = []
-    # A process's peak memory never decreases, so each method needs a new process.
+    # Each method needs a new process, because a process's peak memory never decreases.
     for method in own_ensembles():
         command = f"from pyharness.bench.ensemble_measure import needed; needed({method.name!r}, "
         call = [sys.executable, "-c", f"{command}{bodies})"]
@@ -264,7 +264,7 @@ def memory(bodies: int) -> list[Memory]:
 
 
 def needed(method: str, bodies: int) -> None:
-    """Print the size of a call's arrays, and the increase of peak memory, in bytes."""
+    """Print the size of a call's arrays and the increase of peak memory, in bytes."""
     own = next(each for each in own_ensembles() if each.name == method)
     load = draw("memory", 512)[0 if own.torque_free else 1]
     own.prepare(load, SETTINGS[method], 1)()
@@ -281,7 +281,7 @@ def needed(method: str, bodies: int) -> None:
 
 
 def _resident(name: str) -> int:
-    """Return this process's ``VmRSS`` (memory now) or ``VmHWM`` (peak), bytes; 0 if unknown."""
+    """Return this process's ``VmRSS`` (current memory) or ``VmHWM`` (peak) in bytes; 0 if unknown."""
     with suppress(OSError), open("/proc/self/status", encoding="ascii") as file:
         for line in file:
             if line.startswith(name + ":"):

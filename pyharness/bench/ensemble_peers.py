@@ -26,8 +26,8 @@ from pyharness.model.trajectory import Array
 
 # Numbers of bodies in a batch. heyoka recommends 4, even if a register holds 8 numbers.
 BATCHES = (4, 8, 16)
-LANES = 64  # bodies in a block
-_BLOCK = 4096  # bodies whose arrays fit into the cache
+LANES = 64  # number of bodies in a block
+_BLOCK = 4096  # number of bodies whose arrays fit into the cache
 
 
 def ensemble_peers() -> list[EnsembleContender]:
@@ -121,7 +121,7 @@ def _integrator(
 
 
 def _batches(rows: Array, size: int) -> Array:
-    """Return `rows`, shape (n, k), as (batches, k, size), padded with copies of the last row."""
+    """Return `rows`, shape (n, k), in the shape (batches, k, size), padded with the last row."""
     lacking = -len(rows) % size
     filled = np.concatenate([rows, np.repeat(rows[-1:], lacking, axis=0)])
     return np.ascontiguousarray(filled.reshape(-1, size, rows.shape[1]).transpose(0, 2, 1))
@@ -251,8 +251,7 @@ def _numba_kernels() -> tuple[Any, Any]:
             z + sixth * (z1 + 2.0 * (z2 + z3) + z4),
         )
 
-    # As in our kernels, the compiler may contract a product and a sum into one operation, but
-    # change nothing else.
+    # As in our kernels, the compiler may only contract a product and a sum into one operation.
     step = numba.njit(inline="always", fastmath={"contract"})(step)
 
     def blocks(

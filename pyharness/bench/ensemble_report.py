@@ -33,7 +33,7 @@ def ensemble_report(found: Ensembles, packages: Iterable[str], command: str) -> 
 
 
 def ours_over(rows: Sequence[Rate], row: Rate) -> float | None:
-    """Return our highest speed on as many threads over the speed in `row`, or None."""
+    """Return our highest speed with as many threads, divided by the speed in `row`, or None."""
     rates = [each.rate for each in rows if each.method in _STYLES and each.threads == row.threads]
     return max(rates) / row.rate if rates else None
 

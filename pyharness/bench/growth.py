@@ -1,6 +1,6 @@
-"""Growth of errors with time: the Taylor method against the closed form, up to 1e5 s.
+"""Growth of the Taylor method's error with time, against the closed form, up to 1e5 s.
 
-Errors are compared with 2**-53 t |omega'|, the change of omega if the time t (s) is rounded.
+The error is compared with 2**-53 t |omega'|, the change of omega if the time t (s) is rounded.
 """
 
 from collections.abc import Sequence
@@ -24,8 +24,8 @@ class Growth:
 
     time: float  # s
     # Relative to the largest omega: `error` is the largest difference from the closed form, for
-    # `_STARTS` initial states on one trajectory; `conditioning` is the change of omega by
-    # a rounding error of the time.
+    # `_STARTS` initial states on one trajectory; `conditioning` is the change of omega from
+    # rounding the time.
     error: float
     conditioning: float
     steps: int  # number of steps of one integration
@@ -41,7 +41,7 @@ def growth(
     series = prepare(scene, "taylor", tolerance)
     exact = prepare(scene, "closed-form")
     rate = scene.right_hand_side()
-    # A single initial state might have a favourable phase.
+    # Several initial states, because a single one might have a favourable phase.
     omega = np.array(scene.omega)
     starts = np.array([exact(omega, 0.37 * k).copy() for k in range(_STARTS)])
     found = []

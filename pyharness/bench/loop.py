@@ -1,4 +1,4 @@
-"""The loop of all measurements: calls are prepared, then timed in interleaved rounds."""
+"""Timing of prepared calls in interleaved rounds."""
 
 import statistics
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -13,7 +13,7 @@ Say = Callable[[str], None]  # receives the name of the current part
 
 
 class Task(Protocol):
-    """Something to measure, such as a workload; messages name it by `place`."""
+    """A task to measure, as a workload; messages name it by `place`."""
 
     @property
     def place(self) -> str: ...
@@ -28,7 +28,7 @@ class Call(Generic[_Row]):
 
     run: Callable[[], object] | None  # None if the call failed and is not timed
     clock: Clock
-    row: Callable[..., _Row]  # makes the row from the keyword `seconds` (s or None)
+    row: Callable[..., _Row]  # returns the row from the keyword argument `seconds` (s or None)
 
 
 def timed(
@@ -40,7 +40,7 @@ def timed(
     statistic: Callable[[Sequence[float]], float] = statistics.median,
     slow: float = SLOW,
 ) -> Iterator[_Row]:
-    """Yield a row for each call that `calls` prepares for each task.
+    """Yield a row for each call that `calls` prepares for a task.
 
     The arguments from `length` on are as in `checks.compare.timing.seconds`.
     """

@@ -35,13 +35,13 @@ from pyharness.thesis.programs import BINARY64, PROGRAM_REGISTRY, run_program
 from pyharness.thesis.vectors import answers
 from pyharness.thesis.word import WORDS
 
-# Evaluations of the right-hand sides in a step. Collocation evaluates them at the start and at each
-# collocation point. The step that overflows counts too.
+# Evaluations of the right-hand sides in a step: collocation evaluates them at the start and at each
+# collocation point. Also for the step that overflows.
 _EVALUATIONS = {"two-term": 3, "four-term": 5, "runge-kutta": 4}
 
 
 def cells(chosen: Selection) -> Iterator[Attempt]:
-    """Yield checks that Fortran and Python agree in each cell (in few cells if `chosen.thin`)."""
+    """Yield checks that Fortran and Python agree in each cell, or in a few if `chosen.thin`."""
     divergences = facts("divergences")["divergence"]
     listed = {entry["cell"] for entry in divergences if entry["kind"] == "cross-language"}
     for listing, case in all_cells():
@@ -70,8 +70,8 @@ def _of_draw(seed: str, number: int, name: Name) -> Check:
 def _agreement(
     listing: Listing, scene: Scene, is_listed: bool, options: Sequence[Any], name: Name
 ) -> Check:
-    """Return the check that Fortran and Python agree or, for a known divergence, differ."""
-    # The options are the constant of the stop test (1/s), and whether the test may end the run.
+    """Return the check that Fortran and Python agree or, if `is_listed`, differ."""
+    # `options`: the constant of the stop test (1/s), and whether the test may end the run.
     run = PROGRAM_REGISTRY[listing.program].run
     compiled, twin = (run(scene, listing, language, *options) for language in ("fortran", "python"))
     found = differences(compiled, twin)
@@ -96,7 +96,7 @@ _VECTORS = Basis(
 
 
 def words(chosen: Selection) -> Iterator[Attempt]:
-    """Yield bit-for-bit checks of simulated machine arithmetic, in instructions and programs."""
+    """Yield checks of simulated CDC arithmetic: test vectors, and runs of the programs."""
     yield Attempt(Name("words", "vectors"), _vectors)
     for listing, case in all_cells():
         has_all_or_none = listing.label != "custom" and not listing.readings
@@ -117,7 +117,7 @@ def _vectors(name: Name) -> Check:
 
 
 def _in_word(listing: Listing, case: int, word: str | None, name: Name) -> Check:
-    """Return the check of Python against Fortran in `word`; if None, of our binary64 and floats."""
+    """Return the check of simulated against compiled arithmetic; if None, binary64 against ours."""
     scene = case_scene(case)
     ours = in_word.run(scene, listing, WORDS[word or BINARY64])
     if word is None:
@@ -133,7 +133,7 @@ _THIN = ("two-term/case-3/original", "four-term/case-7/corrected", "runge-kutta/
 
 
 def listings(program: str) -> list[Listing]:
-    """Return the original and corrected program, and each with one defect or reading changed."""
+    """Return the original and corrected program, and both with one defect or reading changed."""
     names = frozenset(switches(program))
     found = [Listing.original(program), Listing.corrected(program)]
     found += [Listing(program, frozenset([name])) for name in switches(program)]
@@ -172,7 +172,7 @@ def _compared(folder: Path, asked: tuple[Name, Listing, int]) -> Check:
     overflowed = port.ended == "overflow"
     if not (deck.page.startswith(whole) if overflowed else deck.page == whole):
         faults.append("the page differs")
-    # The records that the deck writes after our version's last row.
+    # Records after our version's last row.
     rest = deck.tape5[port.steps :]
     if not overflowed:
         faults += [f"{len(rest)} records more"] if len(rest) else []

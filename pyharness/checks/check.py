@@ -36,14 +36,14 @@ BITS = Basis(
 
 @dataclass(frozen=True)
 class Name:
-    """The name of a check; its id joins the first five fields by slashes, if not empty."""
+    """The name of a check; its id joins the non-empty fields among the first five by slashes."""
 
     suite: str  # kind of check of `verify`, or trial of `stress`
     subject: str = ""  # program or method
     circumstance: str = ""  # problem
     setting: str = ""  # tolerance, step size or listing
     quantity: str = ""  # compared number
-    # Command (``verify`` or ``stress``) and options that repeat the check.
+    # Command, verify or stress, and options that repeat the check.
     command: str = field(default="verify", kw_only=True)
     options: str = field(default="", kw_only=True)
     scene: Scene | None = field(default=None, kw_only=True, compare=False, repr=False)
@@ -67,7 +67,7 @@ class Name:
 
     def bounded(self, value: float, limit: float, basis: Basis, note: str = "") -> "Check":
         """Return the check that `value` is at most `limit`; NaN fails."""
-        # NumPy's numbers can't be written as JSON.
+        # NumPy's numbers cannot be written as JSON.
         found, allowed = float(value), float(limit)
         return Check(self, not math.isnan(found) and found <= allowed, found, allowed, basis, note)
 
@@ -83,7 +83,7 @@ class Name:
         return Check(self, bool(passed), value, limit, basis, note)
 
     def described(self, value: float | None, note: str = "") -> "Check":
-        """Return a check without limit, which can't fail."""
+        """Return a check without a limit, which cannot fail."""
         return Check(self, True, None if value is None else float(value), None, None, note)
 
 
@@ -96,8 +96,8 @@ class Check:
     basis: Basis | None  # why the limit has this value
     note: str = ""  # fault or observation, in a few words
     again: str = ""  # command that repeats the check, if not `name.replay`
-    # Returns the error bound of the reference solution in the unit of `value`, or None without
-    # one. It is called only when the check is reported.
+    # Returns the reference solution's error bound in the unit of `value`, or None; called only
+    # when the check is reported.
     reference_bound: Callable[[], ErrorBound | None] | None = field(
         default=None, compare=False, repr=False
     )
@@ -138,7 +138,7 @@ _OF_ANY = len(fields(Check))
 
 @dataclass(frozen=True)
 class Sample(Check):
-    """A check in a random scene, with fields by which a report groups checks."""
+    """A check in a random scene, with fields by which reports group checks."""
 
     entrance: str = ""  # call that solved the scene, as in ``solve-taylor``
     tolerance: float = math.nan
@@ -147,21 +147,21 @@ class Sample(Check):
 
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """A deferred computation of all checks whose ids begin with the id of `name`."""
+    """A deferred computation of the checks whose ids begin with the id of `name`."""
 
     name: Name
     make: Callable[[Name], "Check | Iterable[Check | Attempt]"]
 
 
 Attempts = Iterable[Check | Attempt]
-# Quantity of a check that raised, instead of those that it would have had.
+# Quantity of a check that raised an exception.
 _RAISED = "exception"
 
 
 def make_checks(
     attempts: Attempts, only: Sequence[str], raised: tuple[type[Exception], ...] = (NotBuiltError,)
 ) -> Iterator[Check]:
-    """Yield finished checks, and the deferred ones that `only` requests.
+    """Yield the finished checks, and the deferred checks that `only` selects.
 
     An exception becomes a failed check, unless its type is in `raised`.
     """
@@ -194,7 +194,7 @@ def run_suites(
     command: str,
     of_the_user: Sequence[str] = (),  # suites that read the user's files
 ) -> Iterator[Check]:
-    """Yield the requested checks of all `suites`.
+    """Yield the checks of all `suites` that `only` selects.
 
     An exception becomes a failed check, except NotBuiltError and, in suites `of_the_user`,
     InputError.
@@ -209,7 +209,7 @@ def run_suites(
 
 
 def timed(checks: Iterable[Check]) -> Iterator[Check]:
-    """Yield the checks with run times; the first of several made together has all their time."""
+    """Yield the checks with run times (s), each measured since the previous check."""
     begin = time.perf_counter()
     for check in checks:
         yield replace(check, took=time.perf_counter() - begin)
@@ -221,11 +221,11 @@ def requested_suites(suites: Iterable[str], only: Sequence[str]) -> list[str]:
 
 
 def severity(check: Check) -> tuple[bool, float]:
-    """Return a sort key: passed before failed, then the ratio of value to limit."""
+    """Return a sort key: passed before failed, then by the ratio of value to limit."""
     if check.value is None or check.limit is None or check.value == check.limit == 0.0:
         return not check.passed, 0.0
     ratio = abs(check.value) / check.limit if check.limit else math.inf
-    # NaN can't be ordered.
+    # NaN cannot be ordered.
     return not check.passed, math.inf if math.isnan(ratio) else ratio
 
 
@@ -250,13 +250,13 @@ def without_check(only: Sequence[str], checks: Sequence[Check]) -> list[str]:
 
 @dataclass(frozen=True)
 class Selection:
-    """The choice of the checks that one run of `verify` makes."""
+    """The choice of the checks for a run of `verify`."""
 
     only: Sequence[str] = ()  # beginnings of ids, as in ``cells/two-term``; empty: all
     seed: str = field(default_factory=weekly_seed)  # seed of the random draws
     draws: int = DRAWS
     record: Path = RECORD  # folder of the golden record
-    # None selects the published problems of the package
+    # None: the package's published problems
     problems: Sequence["Problem"] | None = None
     thin: bool = False  # a few checks of every kind, for `verify --self-test`
 

@@ -1,8 +1,7 @@
 """Amplification of perturbations by the programs, and step sizes at which runs diverge.
 
 The amplification by a step, measured in runs, may differ from the matrix of `theory.amplification`
-by rounding errors only. The step size at which a run diverges is compared with the
-prediction of linear stability theory.
+by rounding errors only. The step size of divergence is compared with linear stability theory.
 """
 
 import math
@@ -37,14 +36,13 @@ from pyharness.thesis.programs import PROGRAM_REGISTRY
 # doubles the degree.
 _DEGREE = {"two-term": 4, "four-term": 4, "runge-kutta": 16}
 # Number of roundings along the longest chain of operations in a step, without linear systems: seven
-# in each of four stages (a rate and a sum), and the rest in the result.
+# in each of four stages (a rate and a sum), twelve in the result.
 _LONGEST = 40.0
-# A derivative is computed from neighbours of omega. This is their largest distance relative to
-# omega.
+# Largest distance, relative to omega, of the points from which a derivative is computed.
 _REACH = 2.0**-2
 _GROWTH_STEPS = 64
-# Bounds on the sum of the rates' absolute weights, for any collocation points. The sum is largest
-# for points far beyond the step, with the weights 2, -1 or 4, -6, 4, -1.
+# Bounds on the sum of the rates' absolute weights. The sum is largest for collocation points far
+# beyond the step, with the weights 2, -1 or 4, -6, 4, -1.
 _WEIGHTS = {"two-term": 3.0, "four-term": 15.0}
 
 ROUNDED = Basis(
@@ -78,7 +76,7 @@ def steady_scene(coefficients: Triple, omega: Triple, step: float) -> Scene:
 
 
 def jacobian(scene: Scene, omega: Sequence[float]) -> Exact:
-    """Return the exact 3 x 3 Jacobian of Euler's equations at `omega`, times the step size."""
+    """Return the step size times the exact 3 x 3 Jacobian of Euler's equations at `omega`."""
     a, b, c = (Fraction(each) * Fraction(scene.step_size) for each in scene.euler_coefficients)
     x, y, z = map(Fraction, omega)
     return [[Fraction(0), a * z, a * y], [b * z, Fraction(0), b * x], [c * y, c * x, Fraction(0)]]
@@ -89,7 +87,7 @@ def eigenvalues(scene: Scene) -> Array:
 
 
 def first_step(scene: Scene, listing: Listing) -> Probe:
-    """Return the 3 x 3 derivative of omega after a first step with respect to initial omega.
+    """Return the 3 x 3 derivative of omega after one step with respect to the initial omega.
 
     The rotation must be steady.
     """
@@ -164,7 +162,7 @@ def observed_boundary(listing: Listing, direction: complex) -> Probe:
         if len(rows) <= _GROWTH_STEPS:
             return True
         if matrix.size > 1:
-            # With `base-not-restored`, a constant part might hide the growth.
+            # With the defect `base-not-restored`, a constant part might hide the growth.
             rows = np.diff(rows, axis=0)
         return bool(np.square(rows[-1]).sum() > np.square(rows[0]).sum())
 
@@ -185,7 +183,7 @@ def _moved(listing: Listing, step: int) -> float:
 
 
 def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
-    """Return the derivative of a collocation step with respect to omega, in unsteady rotation."""
+    """Return the 3 x 3 derivative of a collocation step's result with respect to omega."""
     program, h = listing.program, scene.step_size
     moved = _moved(listing, step)
     coefficients, torque = scene.euler_coefficients, scene.normalized_torque(0.0)
@@ -198,10 +196,9 @@ def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
         return np.array(end)
 
     found, limit = _differentiated(stepped, scene, program, moved)
-    # A step takes omega to omega + h F + h**2/2 J F + w h**3 Q(F), with the value F of the
-    # right-hand side, its Jacobian J, and its quadratic part Q at F. Only the weight w depends on
-    # the collocation points.
-    # J at omega, and at the value of F:
+    # A step takes omega to omega + h F + h**2/2 J F + w h**3 Q(F), with the right-hand side F at
+    # omega, its Jacobian J, and its quadratic part Q. Only the weight w depends on the collocation
+    # points. Here are J at omega, and J with F in place of omega:
     slope = scene.right_hand_side()(0.0, scene.omega)
     j, along_rate = jacobians(scene, np.array([scene.omega, slope]))
     third = float(weight_of_squares(listing, step)) * h**3 * (along_rate @ j)
@@ -212,7 +209,7 @@ def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
 def _differentiated(
     stepped: Callable[[Array], Array], scene: Scene, program: str, moved: float = 1.0
 ) -> tuple[Array, float]:
-    """Return the derivative of a step at the initial omega, and its rounding error bound."""
+    """Return the derivative of a step at the initial omega, and a bound on its rounding error."""
     base, count = np.array(scene.omega), _DEGREE[program] // 2
     reach = _REACH * float(np.abs(base).max())
     spread = reach / count
@@ -231,16 +228,16 @@ def _differentiated(
 
 
 def _units(scene: Scene, program: str, sizes: Array, moved: float = 1.0) -> Array:
-    """Return a bound on omega's rounding error in a step, in 2**-53 rad/s; `sizes` bound omega."""
+    """Return a bound on omega's rounding error in a step (2**-53 rad/s); `sizes` bound omega."""
     on = Numbers(scene, scene.step_size, sizes=True)
     if program == "runge-kutta":
-        # In the original program each stage starts from the previous one, so the terms are larger.
+        # The original program, where each stage starts from the previous one, has larger terms.
         return _LONGEST * runge_kutta_punched(on, sizes)
     first = on.times_step(on.rate(sizes))
     estimate = sizes + moved * first
     rate = on.times_step(on.rate(estimate))
     _, varying = solver_roundings(program)
-    # The first system's solution has a similar error, which the rates propagate.
+    # The first linear system's solution has a similar error, which the rates propagate.
     wrong = varying * moved * first
     carried = 0.5 * on.times_step(on.rate(estimate + wrong) - on.rate(estimate - wrong))
     weights = _WEIGHTS[program]
@@ -267,9 +264,9 @@ DOUBLING = Basis(
 def divergence(
     scene: Scene, time: float, matrix: Amplification, runner: Runner, smallest: float
 ) -> tuple[float, float, float]:
-    """Return measured and predicted step size (s) of divergence.
+    """Return the measured and predicted smallest step size (s) of divergence.
 
-    The third number bounds their relative difference. Rotation about axis 3 must be stable.
+    A third number bounds their relative difference. Rotation about axis 3 must be stable.
     """
     found = smallest_divergent(scene, time, runner, smallest)
     a, b, c = scene.euler_coefficients
@@ -284,7 +281,7 @@ def divergence(
         wobble = 2.0 * max(bounds[:2])
         change = abs(c) / min(abs(a), abs(b)) * wobble**2 / (2.0 * spin * spin)
     low = _doubling(matrix, rate * (1.0 + change), time, smallest)
-    # The wobble may peak between two steps, up to half the angle of a step from both.
+    # The wobble may peak between two steps, at most half the phase of a step from either.
     missed = -math.log(math.cos(min(1.5, 0.5 * rate * predicted)))
     high = _doubling(matrix, rate * (1.0 - change), time, smallest, missed)
     limit = max(predicted - low, high - predicted) / predicted + 2.0 * predicted / time
@@ -316,7 +313,7 @@ def smallest_divergent(scene: Scene, time: float, runner: Runner, smallest: floa
 def _doubling(
     matrix: Amplification, rate: float, time: float, smallest: float, missed: float = 0.0
 ) -> float:
-    """Return the smallest step (s) with which, by theory, a wobble grows 2 exp(`missed`) times."""
+    """Return the smallest step size (s) at which a wobble should grow 2 exp(`missed`) times."""
     # `rate` is the wobble's angular frequency (1/s); `missed` allows for a peak between two steps.
     wanted, low, high = math.log(2.0) + missed, smallest, time
     for _ in range(200):

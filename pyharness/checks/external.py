@@ -1,4 +1,4 @@
-"""Checks of every method against results published by others.
+"""Checks of every method against published results.
 
 The limit is the sum of the published number's accuracy, a bound on the method's error, and the
 effect of rounding the problem's numbers to binary64.
@@ -34,7 +34,7 @@ from pyharness.thesis.programs import PROGRAM_REGISTRY
 
 __all__ = ["external_checks", "problems"]
 
-# The finest tolerances of these methods would take too long.
+# These methods' finest tolerances would take too long.
 _TOLERANCES = {"radau": 1e-8, "rk45": 1e-11, "quick": 1e-9}
 _SOLVED = (
     "reference", "auto", "taylor", "closed-form", *(f"gauss-{stages}" for stages in range(1, 9)),
@@ -42,11 +42,10 @@ _SOLVED = (
 )  # fmt: skip
 _FEWEST_STEPS, _MOST_STEPS = 4, 2**16
 _HALF_ULP = 2.0**-53
-# Two roundings: a number is rounded when it is read, and again when a method uses it.
+# Two roundings: when a number is read, and when a method uses it.
 _ROUNDING = 2.0 * _HALF_ULP
-_STEP_ASIDE = 2.0**-30  # relative change of a number, by which its effect is measured
-# These methods must solve users' problems too: `auto` chooses a suitable method, and `closed-form`
-# evaluates a formula.
+_STEP_ASIDE = 2.0**-30  # relative change of a number, to measure its effect
+# These methods must solve users' problems too.
 _MAY_NOT_REFUSE = ("auto", "closed-form")
 
 _PUBLISHED = Basis(
@@ -87,9 +86,9 @@ def _triples(triple: Triple | None, part: float) -> Iterator[Triple]:
 
 
 def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> Iterator[Check]:
-    """Yield checks of methods that accept a problem: ``external/<problem>/<time>/<method>``."""
+    """Yield checks of methods and programs, with ids ``external/<problem>/<time>/<method>``."""
     for problem in problems:
-        # Values are always solved together, so that repeating one check gives the same bits.
+        # Values are always solved together, so that a repeated check gives the same bits.
         for side in (1.0, -1.0):
             values = [value for value in problem.values if float(value.time) * side > 0.0]
             values.sort(key=lambda value: abs(float(value.time)))
@@ -118,7 +117,7 @@ def _names(
 
 
 def _without(problem: Problem, name: Name, refusal: str, value: Value) -> Check:
-    """Return a check without result, which passes only if a user's problem was refused."""
+    """Return the check of a missing result, which passes only if a user's problem was refused."""
     given = problem.path is not None and name.subject not in _MAY_NOT_REFUSE
     if refusal:
         return name.judged(given, f"{REFUSED}{refusal}")
@@ -126,7 +125,7 @@ def _without(problem: Problem, name: Name, refusal: str, value: Value) -> Check:
 
 
 def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -> Iterator[Check]:
-    """Yield checks of the published attitudes; value and limit are angles (rad)."""
+    """Yield checks of published attitudes; value and limit are angles (rad)."""
     scene, times = problem.scene, [float(value.time) for value in values]
     for method in (name for name in _SOLVED if REGISTRY[name].attitude and values):
         asked = _names(problem, values, method, only, "attitude")
@@ -152,8 +151,8 @@ def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -
 
 
 def _turns(scene: Scene, times: Sequence[float]) -> Array:
-    """Return the change of the attitude (rad) at each time by rounding the scene's numbers."""
-    # The rounding of quaternions; the changes that follow are added with positive signs.
+    """Return the change of the attitude (rad) at each time from rounding the scene's numbers."""
+    # Start with the rounding of quaternions, and add the absolute effects of the numbers.
     turned = np.full(len(times), 8.0 * _HALF_ULP)
     run = method_candidate("auto", METHODS["auto"].finest).rows
     try:
@@ -183,7 +182,7 @@ def _side(problem: Problem, values: Sequence[Value], only: Sequence[str]) -> Ite
             elif (result := results[row]) is not None:
                 yield _check(name, problem.unit, value, result, rounding[value.time])
             else:
-                # In the package's problems LEQT1F solves the equations of the longest steps.
+                # In the package's problems LEQT1F can solve the equations of the longest steps.
                 note = "no step long enough for the linear equations"
                 yield name.judged(problem.path is not None, note)
 
@@ -191,7 +190,7 @@ def _side(problem: Problem, values: Sequence[Value], only: Sequence[str]) -> Ite
 def _as_far_as_solved(
     solve: Callable[[Sequence[Value]], list[_Row]], values: Sequence[Value]
 ) -> tuple[list[_Row], str]:
-    """Return the results of the first values that `solve` accepts, and the first refusal or ""."""
+    """Return the results of the leading values that `solve` accepts, and its refusal or ""."""
     try:
         return solve(values), ""
     except InputError as refusal:
@@ -210,7 +209,7 @@ def _as_far_as_solved(
 
 
 def _results(problem: Problem, method: str, values: Sequence[Value]) -> list[_Result | None]:
-    """Return omega and its error bound (rad/s) for each value; None where a matrix is singular."""
+    """Return omega and its error bound (rad/s) at each value's time, or None."""
     if method in PROGRAMS:
         return [_program(problem, value, method) for value in values]
     scene, times = problem.scene, [float(value.time) for value in values]
@@ -227,7 +226,10 @@ def _results(problem: Problem, method: str, values: Sequence[Value]) -> list[_Re
 
 
 def _program(problem: Problem, value: Value, program: str) -> _Result | None:
-    """Return a corrected program's omega at the time of `value`, and its error bound, or None."""
+    """Return a corrected program's omega and its estimated error (rad/s) at the time of `value`.
+
+    Return None if no two successive runs were complete.
+    """
     scene, time = problem.scene, float(value.time)
     finest_print = min(figure.accuracy for figure in value.omega if figure is not None)
     accuracy = finest_print * UNITS[problem.unit]
@@ -237,7 +239,7 @@ def _program(problem: Problem, value: Value, program: str) -> _Result | None:
     while steps <= _MOST_STEPS:
         rows = run(replace(scene, step_size=time / steps, steps=steps))
         if rows.ier is not None and rows.ier.any():
-            # LEQT1F finds the matrices of tiny steps singular; the program then has order 1.
+            # LEQT1F finds the matrices of small steps singular; the program then has order 1.
             break
         ended = rows.ended
         omega = rows.omega[-1] if ended == "complete" else None
@@ -245,8 +247,7 @@ def _program(problem: Problem, value: Value, program: str) -> _Result | None:
             halving = 2.0 * float(np.abs(omega - before).max()) / (2.0**order - 1.0)
             rounding = steps * _HALF_ULP * _scale(scene, omega)
             result = omega, halving + rounding
-            # Two coarse runs may agree by chance, so the estimate counts only if halving reduces
-            # it.
+            # Two coarse runs may agree by chance, so the estimate must also decrease.
             if halving <= max(0.1 * accuracy, rounding) and 2.0 * halving <= previous:
                 break
             previous = halving
@@ -264,7 +265,7 @@ def _check(name: Name, unit: str, value: Value, result: _Result, rounding: Array
             distance = abs(float(Decimal(float(omega[axis]) / factor) - figure.value))
             limit = figure.accuracy + float(error + rounding[axis]) / factor
             judged.append((distance, limit, f"w{axis + 1}, {unit}"))
-    # NaN counts as the largest.
+    # NaN counts as the largest distance.
     distance, limit, note = max(judged, key=lambda each: (math.isnan(each[0]), each[0] / each[1]))
     return name.bounded(distance, limit, _PUBLISHED, note)
 
@@ -274,7 +275,7 @@ def _scale(scene: Scene, omega: Array) -> float:
 
 
 def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
-    """Return, by printed time, the change of omega (rad/s) by rounding the scene's numbers."""
+    """Return, by printed time, the change of omega (rad/s) from rounding the scene's numbers."""
 
     def solve(values: Sequence[Value]) -> list[Array]:
         times = [float(value.time) for value in values]

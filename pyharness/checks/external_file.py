@@ -1,4 +1,4 @@
-"""Results published by others, and the files that describe them.
+"""Published results, and their files.
 
 A file has a scene, the results' source, and their printed digits, which determine the accuracy.
 """
@@ -33,7 +33,7 @@ class Figure:
 
     print: str  # digits as printed
     value: Decimal
-    # error bound: half a unit of the last printed digit, or more if the source says so
+    # error bound in the printed unit: half a unit of the last digit, or more if the source says so
     accuracy: float
 
 
@@ -62,7 +62,7 @@ class Problem:
 
 
 def figure(where: str, text: object, good_to: float = 0.0) -> Figure:
-    """Return the published number with the digits `text`.
+    """Return the published number printed as `text`.
 
     Its accuracy is half a unit of the last digit or, if larger, `good_to`.
     """
@@ -175,7 +175,7 @@ def _pointing(
     count, prints = {"attitude": 4, "angles_deg": 3}[key], entry[key]
     if not isinstance(prints, list) or len(prints) != count:
         raise InputError(f"{where}: {key} must be a list of {count} texts")
-    # If an omega is given too, `good_to` is the accuracy of omega, not of the attitude.
+    # If an omega is given too, `good_to` is its accuracy, not the attitude's.
     alone = 0.0 if "omega" in entry else good_to
     figures = [figure(f"{where}: {key}", text, alone) for text in prints]
     values = [float(each.value) for each in figures]

@@ -1,8 +1,7 @@
-"""The golden record: trajectories of an earlier version, as exact text.
+"""The golden record: an earlier version's trajectories, in a file for each program or method.
 
-Each program or method has a file. An entry has the command that prints a trajectory, its ending, a
-digest of all rows, and four rows of hexadecimal floats: the first, tenth and last, and the mean of
-all.
+An entry has the command that prints a trajectory, its ending, a digest of all rows, and four rows
+of hexadecimal floats: the first, tenth and last, and the mean of all.
 """
 
 import hashlib
@@ -87,7 +86,7 @@ def recorded() -> Iterator[Recorded]:
 
 
 def golden(chosen: Selection) -> Iterator[Attempt]:
-    """Yield comparisons with the golden record, if its folder exists."""
+    """Yield checks against the golden record, if its folder exists."""
     if not chosen.record.is_dir():
         return
     known = read_record(chosen.record)
@@ -134,7 +133,7 @@ def _compared(
 
 
 def read_record(folder: Path) -> dict[str, dict[str, Any]]:
-    """Return the record's files by program or method; raise InputError if one is invalid."""
+    """Return the record's parsed files by program or method; raise InputError if one is invalid."""
     found = {}
     places: dict[str, str] = {}
     for path in sorted(folder.glob("*.toml")):
@@ -203,7 +202,7 @@ def _entry(each: Recorded, run: Trajectory) -> dict[str, Any]:
     n = len(rows)
     shown = sorted({step for step in (*_STEPS, n) if 1 <= step <= n})
     stop = run.stop
-    # Added one after another, so that the mean is the same on every processor.
+    # Cumulative sums, so that the mean has the same bits on every processor.
     means = np.cumsum(rows / max(1, n), axis=0)[-1:]
     digest = hashlib.sha256(np.where(np.isnan(rows), np.nan, rows).astype("<f8").tobytes())
     if run.ier is not None:
@@ -223,7 +222,7 @@ def _entry(each: Recorded, run: Trajectory) -> dict[str, Any]:
 
 
 def _rows(entry: dict[str, Any]) -> Array:
-    """Return rows of step, time, printed time, omega and, for programs, velocity."""
+    """Return an entry's rows: step, time, printed time, omega and, for programs, velocity."""
     return np.array(
         [
             [0.0 if row[0] == _MEAN else float(row[0]), *map(float.fromhex, row[1:])]

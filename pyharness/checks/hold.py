@@ -1,7 +1,7 @@
-"""Checks of methods against the true solution of a scene, within bounds derived beforehand.
+"""Checks of methods against a scene's true solution, within bounds derived beforehand.
 
 Errors of the thesis's programs are reported without a bound. `auto`, `quick` and methods without a
-tolerance run as prepared solvers, which report a refusal; other methods raise InputError.
+tolerance run as prepared solvers.
 """
 
 import math
@@ -51,10 +51,10 @@ STEPS = Basis(
     "the tolerance, or a majorant series for fixed steps (`checks/hold.py`); first-order "
     "perturbations (`theory/conditioning.py`)",
 )
-"""Basis of limits from the promised errors of the steps."""
+"""Basis of limits from the steps' promised errors."""
 
 
-# Methods that run at two tolerances: a middling one, and one near the finest, where rounding shows.
+# Methods that run at two tolerances: a medium one, and one near the finest, where rounding shows.
 OURS = ("closed-form", "taylor", "gauss-2", "gauss-4", "gauss-8")
 ALL = ("closed-form", "auto", "taylor", "quick", *GAUSS, *SCIPY_METHODS, *FIXED_STEP)
 _SERIES = ("taylor", "auto", "prepared-auto")
@@ -65,7 +65,7 @@ FORMS = ("closed-form", "auto")
 
 @cache
 def _series(name: str) -> tuple[float, ...]:
-    """Return a method's step for y' = y**2, y(0) = 1, as a power series in the step size."""
+    """Return a method's y after a step of y' = y**2, y(0) = 1, as a power series in the step."""
     # With A = B = C = 1 and equal components, each of Euler's equations is y' = y**2.
     ones = np.ones(3)
     equal = Scene("equal", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))
@@ -90,8 +90,8 @@ def _is_free(scene: Scene) -> bool:
     return scene.torque.is_zero and scene.moments is not None
 
 
-# Returns the checks of one method from the true solution, a tolerance (None for the scene's step
-# size) and the name of the checks.
+# Returns the checks of a method from the true solution, a tolerance (None for the scene's step
+# size) and the checks' name.
 Judged = Callable[[Truth, float | None, Name], Iterable[Check]]
 
 
@@ -117,7 +117,7 @@ def check_methods(
 ) -> Iterator[Attempt]:
     """Yield checks of each method's error at `time` (s) in the scene of `name`.
 
-    By default, the limits are from `DERIVED`.
+    The default limits are from `DERIVED`.
     """
     scene = scene_of(name)
     known = cache(partial(truth, scene, time))
@@ -134,7 +134,7 @@ def check_methods(
 
 
 def run_method(name: str, scene: Scene, time: float, tolerance: float | None) -> End:
-    """Return the state at `time` (s); without tolerance, a method uses the scene's step size."""
+    """Return the state at `time` (s); without a tolerance, by the scene's step size."""
     if name in ("auto", "quick") or tolerance is None:
         return prepared_candidate(name, tolerance or 1.0).end(scene, time)
     return method_candidate(name, tolerance).end(scene, time)
@@ -158,11 +158,10 @@ def _derived(truth: Truth, tried: MethodRun) -> float | None:
     """Return the limit of the relative error, or None if the steps' errors have no bound."""
     made = promised_sum(tried, truth)
     if truth.exact and tried.method in FORMS:
-        # A closed form has no steps; only the rounding of A, B and C is added.
+        # A closed form has no steps, only the rounding of A, B and C.
         return min(MOST, (made or 0.0) + truth.data + truth.relative_error)
     if made is None:
-        # Gauss collocation in steps of this size only conserves energy and momentum; other fixed
-        # steps under a torque have no bound.
+        # Fixed steps under a torque have no bound.
         return None
     growth, steps = truth.flow.amplification, _roundings(tried, truth)
     return linear(allowed(truth, made, growth, steps=steps))
@@ -173,7 +172,7 @@ DERIVED = Policy(_derived, STEPS, refusable)
 
 
 def _roundings(tried: MethodRun, truth: Truth) -> float:
-    """Return the number of uncompensated roundings of omega; estimated for SciPy's methods."""
+    """Return the number of uncompensated roundings of omega, estimated for SciPy's methods."""
     method, answer = tried.method, tried.answer
     if tried.tolerance is None:
         return 0.0 if method in GAUSS else float(_steps(tried.scene, truth.end))
@@ -193,10 +192,10 @@ def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check
         made = promised_sum(tried, truth)
         lost = truth.flow.unamplified + _roundings(tried, truth) * ROUNDING
         if made is None:
-            # Each step rounds omega, the sums in the step, and the last iteration.
+            # In each step omega, its sums and the last iteration are rounded.
             lost += 4.0 * ROUNDING * _steps(scene, truth.end)
         total = (made or 0.0) + lost
-        # `conserved` returns at most the error of omega.
+        # The result of `conserved` is at most the error of omega.
         limit = DERIVED.limit(truth, tried)
         most = min(math.inf if limit is None else limit, total + total * total)
         found = conserved(scene, answer.omega[-1], truth.flow.largest)
@@ -209,7 +208,7 @@ def scene_of(name: Name) -> Scene:
 
 
 def promised_sum(tried: MethodRun, truth: Truth) -> float | None:
-    """Return a bound on the steps' summed errors relative to the largest omega, or None."""
+    """Return a bound on the sum of the steps' errors, relative to the largest omega, or None."""
     method = tried.method
     if method not in FIXED_STEP or not truth.exact:
         return tried.tolerance
@@ -245,7 +244,7 @@ def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:
 
 
 def describe_programs(name: Name) -> Iterator[Attempt]:
-    """Yield reports, without limits, of the programs' largest relative errors."""
+    """Yield the programs' largest relative errors, without limits."""
     scene = scene_of(name)
     every = max(1, scene.steps // _ROWS)
     rows = slice(every - 1, None, every)

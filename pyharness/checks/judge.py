@@ -25,8 +25,7 @@ from pyharness.truth.reference import Reference, reference
 
 # Relative error above which the linearised flow does not predict the error.
 LINEAR = 0.01
-# Largest possible difference of two vectors, divided by the largest omega; a larger limit restricts
-# nothing.
+# Largest possible difference of two vectors, relative to the largest omega.
 MOST = 2.0
 
 
@@ -35,7 +34,7 @@ class Answer:
     """A method's results at all times or at the last time, or its refusal."""
 
     omega: Array = field(default_factory=lambda: np.empty((0, 3)))  # shape (n, 3), rad/s
-    attitude: Array | None = None  # shape (n, 4), if requested
+    attitude: Array | None = None  # quaternions, shape (n, 4), if requested
     ended: str = "complete"
     steps: int = 0
     evaluations: int | None = None  # of right-hand sides, if counted
@@ -69,7 +68,7 @@ class MethodRun:
 
 
 def by_rows(method: str, tolerance: float, scene: Scene, times: Sequence[float]) -> MethodRun:
-    """Return a deferred run of a method by `solve` at all `times` (s)."""
+    """Return a deferred run of a method that returns its results at all `times` (s)."""
     candidate = method_candidate(method, tolerance)
 
     def ask() -> Answer:
@@ -85,13 +84,13 @@ def by_rows(method: str, tolerance: float, scene: Scene, times: Sequence[float])
 def by_end(
     method: str, candidate: Candidate, tolerance: float, scene: Scene, time: float
 ) -> MethodRun:
-    """Return a deferred run of a candidate to `time` (s); its limits are as for `method`."""
+    """Return a deferred run of a candidate to `time` (s); its limits are those for `method`."""
     return MethodRun(method, tolerance, scene, lambda: of_end(method, candidate.end(scene, time)))
 
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """The true solution of a scene at some times, and its sensitivity until the last time."""
+    """The true solution of a scene at some times, and the error amplification until the last."""
 
     time: Array  # shape (n,), s
     omega: Array  # shape (n, 3), rad/s
@@ -101,15 +100,15 @@ class Truth:
     angle_error: float = 0.0  # bound on the error of the attitude, rad
     is_signed: bool = False  # whether the sign of a quaternion counts
     data: float = 0.0  # change of omega by rounding A, B and C, relative to the largest omega
-    exact: bool = False  # torque-free closed form, with known `data`
-    # The reference solution, its scene and its factor on the work limit, if one was used.
+    exact: bool = False  # whether it is the torque-free closed form, with known `data`
+    # Scene, solution and factor on the work limit, if `omega` is from the reference.
     scene: Scene | None = None
     reference: Reference | None = None
     effort: float | None = None
 
     @cached_property
     def bound(self) -> ErrorBound | None:
-        """Return the error bound of the reference, relative or in rad; None without a reference."""
+        """The error bound of the reference, relative or in rad; None without a reference."""
         if self.scene is None or self.reference is None:
             return None
         bound = bound_of(self.scene, self.reference, any_torque=True, effort=self.effort)
@@ -124,7 +123,7 @@ class Truth:
         return self.error / (self.flow.largest or 1.0)
 
     def error_of(self, answer: Answer) -> float:
-        """Return the largest error of an answer: an angle (rad), or omega's relative error."""
+        """Return an answer's largest error: attitude's (rad) if known, else omega's (relative)."""
         if self.attitude is None:
             difference = float(np.abs(answer.omega - self.omega[-len(answer.omega) :]).max())
             if self.flow.largest == 0.0:
@@ -138,7 +137,7 @@ class Truth:
 
 
 def unknown_flow(largest: float) -> Conditioning:
-    """Return a conditioning of infinite amplification, for a closed form's `Truth`."""
+    """Return a conditioning of unknown, so infinite, amplification; `largest` is in rad/s."""
     return Conditioning(math.inf, MOST, MOST, MOST, largest)
 
 
@@ -149,8 +148,7 @@ def reference_truth(
     flow: Conditioning | None = None,
 ) -> Truth:
     flow = flow or conditioning_at(scene, times)
-    # The usual reference has errors of 1e-22 in its steps, too large for an amplification above
-    # 1e3.
+    # For an amplification above 1e3, the usual reference's step errors of 1e-22 are too large.
     known = reference(scene, times, precise=flow.amplification > 1e3, effort=effort)
     if len(known.time) < len(times):
         raise InputError("the solution grows without bound")
@@ -162,7 +160,7 @@ def reference_truth(
 
 @dataclass(frozen=True)
 class Policy:
-    """A rule for judging methods: limit of the error, and permitted refusals."""
+    """A rule for judging methods: their error limits and permitted refusals."""
 
     limit: Callable[[Truth, MethodRun], float | None]
     basis: Basis
@@ -170,7 +168,7 @@ class Policy:
 
 
 def allowed(truth: Truth, made: float, growth: float, steps: float = 0.0) -> float:
-    """Return an error's limit: step errors `made` times `growth`, plus rounding and truth's error.
+    """Return a limit: the steps' errors `made` times `growth`, plus rounding and the truth's error.
 
     `steps` counts uncompensated roundings of omega.
     """
@@ -180,12 +178,12 @@ def allowed(truth: Truth, made: float, growth: float, steps: float = 0.0) -> flo
 
 
 def lively(growth: float) -> float:
-    """Return the factor on the tolerance: the error amplification `growth` if large, else 1."""
+    """Return the error amplification `growth` if it exceeds LIVELY, else 1."""
     return growth if growth > LIVELY else 1.0
 
 
 def linear(limit: float) -> float:
-    """Return `limit`, or infinity above 0.01, where linearised equations fail."""
+    """Return `limit`, or infinity if it exceeds 0.01, where linearised equations fail."""
     return limit if limit <= LINEAR else math.inf
 
 
@@ -195,7 +193,7 @@ def tolerance_of(tried: MethodRun) -> float:
 
 
 def has_no_form(tried: MethodRun, truth: Truth, why: str) -> bool:
-    """Return whether `closed-form` or `quick` refused a scene to which its formula can't apply."""
+    """Return whether `closed-form` or `quick` refused a scene for which it has no formula."""
     if tried.method == "quick":
         return why == "quick: refused" and not all(tried.scene.euler_coefficients)
     return tried.method == "closed-form" and closed_form(tried.scene) is None

@@ -26,12 +26,12 @@ _THIN_EXTERNAL = [
 
 _RANDOM = (random_programs, random_methods, random_attitudes, random_torques)
 KINDS: dict[str, Callable[[Selection], Attempts]] = {
-    # Fortran against the Python twin: all bits of the trajectory, the counters, and the stop.
+    # Fortran against Python: all bits of the trajectory, the counts, and the stop.
     "cells": cells,
-    # Arithmetic of machine words: test vectors of the CDC; our binary64 against the processor's;
-    # for the other words, compiled programs against their twins.
+    # Simulated machine arithmetic: CDC test vectors, our binary64 against the processor's, and
+    # compiled programs against Python.
     "words": words,
-    # The decks, compiled from the author's cards, against the Fortran port: TAPE5 and the page.
+    # Decks, compiled from the author's cards, against the Fortran port: TAPE5 and printed page.
     "decks": decks,
     # Each step of the corrected programs against its scheme, within rounding.
     "schemes": schemes,
@@ -42,18 +42,16 @@ KINDS: dict[str, Callable[[Selection], Attempts]] = {
     "prepared": prepared,
     # The attitude against the reference, by `solve` and by prepared solvers.
     "attitudes": attitudes,
-    # Orders, from errors as the step is halved: corrected programs against `solve_ivp`, fixed-step
-    # methods against the reference.
+    # Orders of convergence, as the step size is halved.
     "orders": orders,
-    # Programs and methods in scenes drawn from a seed, half of them of the difficult kinds in
-    # `NASTY`. Methods also under torques that depend on omega or attitude.
+    # Programs and methods in random scenes, half of them of the difficult kinds in `NASTY`.
     "random": lambda chosen: chain.from_iterable(each(chosen) for each in _RANDOM),
-    # Programs and methods against results published by others.
+    # Programs and methods against published results.
     "external": _external,
     # Programs and methods against trajectories of an earlier run.
     "golden": golden,
 }
-# These kinds read files that the user may specify.
+# Kinds that read files which the user may specify.
 _OF_THE_USER = ("external", "golden")
 
 

@@ -47,11 +47,10 @@ from pyharness.thesis.programs import PROGRAM_REGISTRY
 from pyharness.truth.reference import Reference, reference
 
 START: Quaternion = (0.5, -0.1, 0.7, 0.5)
-# Times (s): one that is long after the end of the cases, and those for prepared solvers.
+# Times (s): one long after the end of the cases, and those for prepared solvers.
 _LATER = 3.0
 _ENDS = (1.0, 3.0, -1.0)
-# Methods with a tolerance, and those among them that propagate the attitude. Methods for weak
-# torques, which no case has, are omitted.
+# Methods with a tolerance, without those for weak torques, which no case has.
 _TOLERANT = {x: each for x, each in METHODS.items() if each.finest < 1.0 and x != "reference"}
 _SOLVED = tuple(name for name, each in _TOLERANT.items() if not each.weak_torque)
 _TURNED = tuple(name for name in _SOLVED if METHODS[name].attitude)
@@ -60,14 +59,14 @@ _PREPARED_TURNED = ("auto", "taylor")
 
 
 def methods(chosen: Selection) -> Iterator[Attempt]:
-    """Yield checks of omega by every method, at a case's times and a later time."""
+    """Yield checks of omega by every method, at each case's times and at 3 s."""
     for case in cases(chosen):
         scene = case_scene(case)
         yield from _solved("methods", case, scene, (*scene.times(), _LATER), _SOLVED, chosen.thin)
 
 
 def prepared(chosen: Selection) -> Iterator[Attempt]:
-    """Yield checks of prepared solvers; with a fixed step they must equal the unprepared method."""
+    """Yield checks of prepared solvers, with a fixed step against the method, bit for bit."""
     for case in cases(chosen):
         scene = case_scene(case)
         forms = _PREPARED if closed_form(scene) else _PREPARED[:-1]
@@ -119,13 +118,13 @@ def _prepared(
 def run_of_solve(method: str, tolerance: float, scene: Scene, times: Sequence[float]) -> MethodRun:
     """Return a deferred run by `solve` at `times` (s), at a tolerance that SciPy meets."""
     if method in SCIPY_METHODS and scene.attitude:
-        # SciPy's methods can't meet a smaller tolerance over a long time.
+        # SciPy's methods cannot meet a smaller tolerance over a long time.
         tolerance = max(tolerance, 1.01 * finest(method, scene, times[-1]))
     return by_rows(method, tolerance, scene, times)
 
 
 def run_of_call(method: str, tolerance: float, scene: Scene, time: float) -> MethodRun:
-    """Return a deferred call of a prepared solver to `time` (s) after one with another omega."""
+    """Return a deferred call of a prepared solver to `time` (s), after one with another omega."""
     candidate = prepared_candidate(method, tolerance, primed=True, attitude=bool(scene.attitude))
     return by_end(method, candidate, tolerance, scene, time)
 
@@ -135,7 +134,7 @@ def _judged(tried: Callable[[], MethodRun], truth: Callable[[], Truth], name: Na
 
 
 def _same_steps(scene: Scene, name: Name) -> Check:
-    """Return the check that 100 steps of a prepared solver equal those of `solve` or the kernel."""
+    """Return the check that a prepared solver equals `solve`, or the kernel, after 100 steps."""
     method, time = name.subject, 100.0 * scene.step_size
     found = prepared_candidate(method, 1.0).end(scene, time).omega
     if method in FIXED_STEP:
@@ -147,10 +146,10 @@ def _same_steps(scene: Scene, name: Name) -> Check:
     return name.bounded(ulps(found, np.ascontiguousarray(wanted)), 0.0, BITS)
 
 
-# The method of solve_ivp that serves as true solution, at its finest tolerance.
+# The method of SciPy's solve_ivp that serves as true solution, at its finest tolerance.
 _IVP = "dop853"
-# Number of successive halvings of the step that must show the order, and how much the last measured
-# order may be too low.
+# Number of successive halvings of the step size that must show the order, and largest allowed
+# deficit of the last measured order.
 _PAIRS = 4
 _ORDER_SLACK = 0.2
 _SLACK = Basis(
@@ -158,12 +157,12 @@ _SLACK = Basis(
     "order of a method with a fixed step: at most 0.2 below the theoretical one",
     "`pyharness verify --only orders`, where the largest deficit is .006",
 )
-# Steps in the coarsest and the finest run.
+# Numbers of steps in the coarsest and the finest run.
 _FEWEST, _MOST = 16, 4096
 
 
 def orders(chosen: Selection) -> Iterator[Attempt]:
-    """Yield checks of convergence orders; the value is the theoretical minus the measured order."""
+    """Yield checks of orders of convergence: a value is the theoretical minus the measured one."""
     for case in cases(chosen, (5,)):
         scene = case_scene(case)
         known = cache(partial(reference, scene, scene.times()))
@@ -187,7 +186,7 @@ def _of_velocity(scene: Scene, truth: Callable[..., Reference], name: Name) -> C
 
     def velocity(scene: Scene) -> Array:
         found = run(scene).velocity
-        # If the reference has no velocity, the order is undecided, as if there were no rows.
+        # Without a velocity the order is undecided, as without rows.
         return np.empty((0, 3)) if found is None else found
 
     due, known = PROGRAM_REGISTRY[name.subject].order, truth(velocity=True)
@@ -205,19 +204,18 @@ def _order_of_method(scene: Scene, method: str, truth: Reference, **limits: Any)
 
 
 def in_few_steps(scene: Scene, time: float) -> Scene:
-    """Return the scene in 16 steps until `time` (s), enough to measure orders."""
+    """Return the scene in 16 steps until `time` (s)."""
     return replace(scene, step_size=time / _FEWEST, steps=_FEWEST)
 
 
 def order_if_seen(scene: Scene, truth: Callable[[], Reference], name: Name) -> Check:
-    """Return the check of a fixed-step method's order.
+    """Return the check of a fixed-step method's order of convergence.
 
-    It always passes if the order is undecided, or the torque has a table.
+    It passes if the order is undecided or the torque has a table, which lowers the order.
     """
     method = name.setting or name.subject
     found = _order_of_method(scene, method, truth(), most_steps=_MOST)
     tape = scene.torque.tape if isinstance(scene.torque, StateTorque) else None
-    # A table lowers the order.
     has_tables = tape is not None and any(each.table for each in tape.operations)
     if found.is_judged and not has_tables:
         return judged_order(name, found)
@@ -225,7 +223,7 @@ def order_if_seen(scene: Scene, truth: Callable[[], Reference], name: Name) -> C
 
 
 def judged_order(name: Name, found: Order) -> Check:
-    """Return the check that an order is at most 0.2 too low, or all errors are rounding errors."""
+    """Return the check that `found` is at most 0.2 too low, or that all errors are rounding."""
     missing = None if found.value is None else found.due - found.value
     passed = found.state in ("as due", "rounding") and (missing or 0.0) <= _ORDER_SLACK
     return name.judged(passed, str(found), missing, _ORDER_SLACK, _SLACK)

@@ -1,7 +1,7 @@
-"""Checks of a port of the programs, in any language, against our Python versions.
+"""Bit-for-bit checks of a port of the programs, in any language, against our Python versions.
 
-Results must agree bit for bit in random scenes and in all cells (combinations of program, case,
-defects and readings). Protocol: `docs/how-to/ports.md`.
+The port runs random scenes and all cells (combinations of program, case, defects and readings) by
+the protocol in `docs/how-to/ports.md`.
 """
 
 import math
@@ -42,7 +42,7 @@ class Cell:
 
     name: str
     of: Name  # name of the check
-    options: str  # of ``verify --port``, to request this run alone
+    options: str  # options of ``verify --port`` that request this run alone
     listing: Listing
     scene: Scene
     lipschitz: float = _DECK_LIPSCHITZ  # constant of the stop test, 1/s
@@ -61,12 +61,12 @@ class Cell:
 class PortCheck(Check):
     """The comparison of a port with the Python version in one run."""
 
-    seconds: float | None = None  # time until the port's answer, s
-    difference: dict[str, Any] | None = None  # all variables in the first step that differs
+    seconds: float | None = None  # time until the port's answer (s)
+    difference: dict[str, Any] | None = None  # values of all variables in the first differing step
 
 
 def port_cells(programs: Sequence[str], cases: Sequence[int], cells: Sequence[str]) -> list[Cell]:
-    """Return runs of `programs` in `cases`; `cells`, if any, are the beginnings of their names."""
+    """Return runs of `programs` in `cases`; if `cells`, only those whose names begin so."""
     found = []
     for listing, case in all_cells():
         name, of = cell_name(listing, case), of_cell("port", listing, case)
@@ -78,9 +78,9 @@ def port_cells(programs: Sequence[str], cases: Sequence[int], cells: Sequence[st
 def random_cells(
     seed: str, draws: int, cells: Sequence[str] = (), programs: Sequence[str] = PROGRAMS
 ) -> list[Cell]:
-    """Return runs in random scenes, ordered by number and named as in ``random/7/two-term``.
+    """Return runs in random scenes by number, named as in ``random/7/two-term``.
 
-    Beginnings of names in `cells` select runs.
+    If `cells`, only those whose names begin so.
     """
     named = {int(match[1]) for each in cells if (match := _DRAWN.match(each))}
     found = []
@@ -98,7 +98,7 @@ def random_cells(
 def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Iterator[PortCheck]:
     """Yield checks that a port agrees bit for bit with the Python version.
 
-    They end without a valid answer within `patience` (s).
+    The checks end if a valid answer does not come within `patience` (s).
     """
     name, again, begin = Name("port", "start"), replay_command(command), time.perf_counter()
     try:
@@ -115,7 +115,7 @@ def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Ite
 
 
 def refuse_port(command: str) -> None:
-    """Raise InputError that advises `--port` if `command` answers as a port."""
+    """Raise an InputError that advises `--port` if `command` starts a port."""
     cell = port_cells(PROGRAMS, (1,), ())[0]
     read = partial(read_answer, steps=cell.scene.steps)
     refuse_other(command, "--integrator", "--port", cell.request, read)
@@ -129,7 +129,7 @@ def replay_command(command: str, cell: Cell | None = None) -> str:
 def compared(
     cell: Cell, twin: Trajectory, line: bytes, again: str = "", seconds: float | None = None
 ) -> PortCheck:
-    """Return the check that an answer agrees with `twin`; raise PortError for an invalid one."""
+    """Return the check that an answer agrees with `twin`; raise PortError if it is invalid."""
     answer = read_answer(line, cell.scene.steps)
     found = differences(twin, answer)
     wanted = _rows(twin)
@@ -144,7 +144,7 @@ def compared(
 
 
 def differences(twin: Trajectory, answer: Answer) -> list[str]:
-    """Return the answer's differences from `twin`, the Python version's run."""
+    """Return texts on the answer's differences from `twin`, the Python version's run."""
     wanted, given = _rows(twin), answer.rows
     found = []
     if difference := _difference(wanted, given):
@@ -164,7 +164,7 @@ def _difference(wanted: Array, given: Array) -> dict[str, Any] | None:
         if ulps(due, row):
             values = []
             for name, x, y in zip(VARIABLES, due.tolist(), row.tolist(), strict=True):
-                # Hexadecimal, because JSON has no inf and nan.
+                # Hexadecimal text, because JSON has no inf and nan.
                 pair = {"ours": x.hex(), "theirs": y.hex(), "ulps": ulps(x, y)}
                 values.append({"variable": name, **pair})
             return {"step": step, "values": values}
@@ -195,7 +195,7 @@ _TIMES = (
 
 
 def port_report(command: str, checks: Sequence[PortCheck], asked: int, seed: str) -> Report:
-    """Return the report of a port's `checks`, at least one; `asked` runs were requested."""
+    """Return the report of a port's `checks` (at least one) for `asked` requested runs."""
     title = [f"{command}: against the twins, bit for bit"]
     title += [f"seed of the random scenes: {seed}"] if seed else []
     if checks[-1].value is None:
@@ -203,7 +203,7 @@ def port_report(command: str, checks: Sequence[PortCheck], asked: int, seed: str
     seconds = sum(check.seconds or 0.0 for check in checks)
     steps = [step_section(check) for check in checks if check.difference][:_MOST_STEPS]
     text = summary(title, checks, depth=2, more=_times(checks))
-    # The tables of steps follow the second section, the list of failures.
+    # Insert the tables of steps after the title and the list of failures.
     text[2:2] = steps
     page = summary_page("verify --port", checks, title, depth=2, more=[*steps, _times(checks)])
     known = {"seed": seed} if seed else {}
@@ -211,7 +211,7 @@ def port_report(command: str, checks: Sequence[PortCheck], asked: int, seed: str
 
 
 def step_section(check: PortCheck) -> Section:
-    """Return a table of the exact values in the first step that differs."""
+    """Return a table of the values in the first step that differs."""
     assert check.difference is not None
     rows = []
     for each in check.difference["values"]:

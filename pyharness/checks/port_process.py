@@ -1,4 +1,4 @@
-"""The process of a port or integrator, which answers line by line in limited time."""
+"""The process of a port or integrator, which answers each line in limited time."""
 
 import contextlib
 import os
@@ -13,11 +13,11 @@ from typing import Self
 
 from pyharness.model.errors import InputError, printable
 
-PATIENCE = 60.0  # s, including the start of an interpreter that compiles
+PATIENCE = 60.0  # s, enough for an interpreter that compiles first
 _LARGEST = 1 << 26  # most bytes of an answer
 _PIECE = 1 << 16
-_TO_END = 1.0  # time (s) in which a process must end after it closed input or output
-# Rounds of searching for child processes, and of reading the last output.
+_TO_END = 1.0  # time (s) in which a process must end after it closed its input or output
+# Number of searches for child processes, and of reads of the last output.
 _ROUNDS = 100
 _PROBE = 10.0  # time limit (s) for one request of the other protocol
 _EXAMPLES = {"--port": "node web/port.js", "--integrator": "python3 mine.py"}
@@ -29,7 +29,7 @@ class PortError(Exception):
 
 
 def split_command(command: str, option: str = "--port") -> list[str]:
-    """Return program and arguments, split as by a shell; raise InputError naming `option`."""
+    """Return program and arguments, split as by a shell, or raise an InputError naming `option`."""
     try:
         words = shlex.split(command)
     except ValueError as error:
@@ -45,7 +45,7 @@ def split_command(command: str, option: str = "--port") -> list[str]:
 def refuse_other(
     command: str, option: str, instead: str, line: bytes, read: Callable[[bytes], object]
 ) -> None:
-    """Raise InputError that advises option `instead` if `command` answers `line`, its request."""
+    """Raise an InputError that advises option `instead` if `command` answers its request `line`."""
     with contextlib.suppress(PortError), PortProcess(command, _PROBE, option) as process:
         read(process.ask(line))
         raise InputError(
@@ -54,10 +54,10 @@ def refuse_other(
 
 
 def _processes_with(mark: str) -> list[int]:
-    """Return the live processes with `mark` in their environment; none without /proc."""
+    """Return the ids of processes with `mark` in their environment; none without /proc."""
     found = []
     for folder in Path("/proc").glob("[1-9]*"):
-        # The process found may have ended, or belong to another user.
+        # The process may have ended, or belong to another user.
         with contextlib.suppress(OSError):
             if mark.encode() in (folder / "environ").read_bytes().split(b"\0"):
                 found.append(int(folder.name))
@@ -65,7 +65,7 @@ def _processes_with(mark: str) -> list[int]:
 
 
 class PortProcess:
-    """The process of a port, as a context manager; entering raises PortError if it can't start."""
+    """A port's process as a context manager; entering raises PortError if it cannot start."""
 
     def __init__(self, command: str, patience: float = PATIENCE, option: str = "--port") -> None:
         self._words = split_command(command, option)
@@ -101,7 +101,7 @@ class PortProcess:
         # All processes may have ended; macOS then raises PermissionError.
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(self._process.pid, signal.SIGKILL)
-        # A process may have left the group, and may be starting another.
+        # A process that left the group may be starting another.
         for _ in range(_ROUNDS):
             marked = _processes_with(self._mark)
             if not marked:
@@ -117,7 +117,7 @@ class PortProcess:
     def ask(self, line: bytes) -> bytes:
         """Send a request and return the answer, both without line feed.
 
-        Raise PortError if no valid answer comes in time.
+        Raise PortError if no answer comes in time.
         """
         end = time.monotonic() + self._patience
         rest = line + b"\n"
@@ -166,7 +166,7 @@ class PortProcess:
         except subprocess.TimeoutExpired:
             return "it closed its input or output before it had answered"
         how = f"by signal {-code}" if code < 0 else f"with exit code {code}"
-        # The ended process may have left output in the pipe; a child process may continue to write.
+        # The ended process may have left output; a child process may continue to write.
         for _ in range(_ROUNDS):
             if not self._hear():
                 break

@@ -1,4 +1,4 @@
-"""The lines that a port reads and writes, described in docs/how-to/ports.md."""
+"""Requests to a port and its answers, described in docs/how-to/ports.md."""
 
 import json
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ from pyharness.model.values import parsed_float
 from pyharness.thesis.equations import card_torque
 
 VARIABLES = ("TIME", "U1", "U2", "U3", "V1", "V2", "V3")
-"""Columns of each row of results, in the order of TAPE5: s, rad/s and m/s."""
+"""Columns of a row of results, as in TAPE5: TIME (s), omega (rad/s), velocity (m/s)."""
 ENDINGS = ("complete", "stopped", "overflow")
 
 
@@ -34,10 +34,7 @@ class Answer:
 def request(
     scene: Scene, listing: Listing, lipschitz: float | None = None, may_stop: bool = True
 ) -> bytes:
-    """Return the JSON line that requests a run; its decimals represent floats exactly.
-
-    `lipschitz` is the stop test's constant (1/s).
-    """
+    """Return the JSON line that requests a run; `lipschitz` is the stop test's constant (1/s)."""
     asked = {
         "schema": SCHEMAS["port request"],
         "program": listing.program,
@@ -129,7 +126,7 @@ def read_whole(where: str, value: object) -> int:
 
 
 def read_number(where: str, value: object) -> float:
-    """Return a number from JSON, or from decimal or hexadecimal text; else raise PortError."""
+    """Return a number from JSON or from decimal or hexadecimal text, or raise PortError."""
     if type(value) is float:
         return value
     try:

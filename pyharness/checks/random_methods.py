@@ -2,7 +2,7 @@
 
 The true omega is from `integer_series`, the true attitude from `reference`. An entry point is
 `solve` or a prepared solver, with one method. The tolerance limits the error of the attitude (rad),
-or of omega relative to its largest component until the last time.
+or of omega relative to its largest component.
 
 Torques that depend on omega or attitude are sums of recorded functions or ready-made terms. The
 reference's series for them (`truth.tape_series`) shares no code with the methods.
@@ -46,16 +46,15 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import WITH_ALL_ROWS
 from pyharness.truth.integer_series import integer_series
 
-# A pair of draws has a plain scene and a scene of a kind in `NASTY`. Because the true solution
-# takes long, methods run in only one of 4 pairs, methods in Python or decimal arithmetic in one of
-# 60. Attitudes are checked in one of 20 draws. Torques that depend on the state are checked in one
-# of 20 draws, and methods in Python under such torques in one of 80.
+# A pair of draws has a plain scene and a scene of a kind in `NASTY`. Because true solutions take
+# long, methods run in one of 4 pairs, and slow ones (in Python or decimal arithmetic) in one of 60.
+# Attitudes are checked in one of 20 draws. Torques that depend on the state are checked in one of
+# 20 draws, and by slow methods in one of 80.
 _EVERY, _EVERY_SLOW, _EVERY_ATTITUDE = 4, 60, 20
 _EVERY_TORQUE, _EVERY_SLOW_TORQUE = 20, 80
-# Factors on the work limit of the reference: for an attitude, and for a torque that depends on the
-# state.
+# Factors on the reference's work limit: for attitudes, and for torques that depend on the state.
 _EFFORT, _EFFORT_TORQUE = 0.05, 0.2
-ROUNDING = 2e-15  # relative error by rounding, for an error amplification of 1
+ROUNDING = 2e-15  # relative error from rounding if the error amplification is 1
 CAMPAIGN = Basis(
     "measured",
     "error in random scenes: tolerance plus 2e-15 K, where K is the error amplification",
@@ -63,18 +62,18 @@ CAMPAIGN = Basis(
 )
 """Basis of the limits in random scenes."""
 _CALM = 10.0  # error amplification below which a series has no reason to refuse
-# Motions in scenes of these kinds may diverge, or be too fast for a true solution or a series.
+# Kinds of scenes whose motions may diverge, or be too fast for a true solution or a series.
 _MAY_REFUSE = ("extreme", "coefficients", "violent torque")
 # Below this tolerance, methods in Python or decimal arithmetic take too long.
 _FINE = 1e-9
 _MORE_WORK = "allow more work"
-_EARLIER = 0.4  # fraction of the last time, to judge intermediate output too
+_EARLIER = 0.4  # fraction of the last time at which results are judged too
 
 Entrances = dict[str, Callable[[], MethodRun]]
 
 
 def truth_of(drawn: Draw) -> Truth:
-    """Return a draw's true omega, before and at its end.
+    """Return a draw's true omega at an earlier and at its last time.
 
     Raise InputError if the motion is unbounded, too fast or too sensitive.
     """
@@ -88,12 +87,12 @@ def truth_of(drawn: Draw) -> Truth:
 
 
 def may_refuse(tried: MethodRun, truth: Truth, why: str) -> bool:
-    """Return whether a method may refuse its run `tried` with the message `why`."""
+    """Return whether the method of `tried` may refuse with the message `why`."""
     method, kind = tried.method, tried.scene.name
     if method == "auto":
         return False
     if method == "closed-form":
-        # Far from ordinary scales, the square of a perturbation may underflow.
+        # The square of an extremely small perturbation may underflow.
         return kind == "extreme"
     if kind in _MAY_REFUSE or truth.flow.amplification > _CALM or method == "quick":
         return True
@@ -117,17 +116,16 @@ def _limit(truth: Truth, tried: MethodRun) -> float:
 
 
 POLICY = Policy(_limit, CAMPAIGN, may_refuse)
-"""Policy whose limit adds tolerance, amplified rounding and the error of the true solution.
+"""Policy whose limit adds tolerance, amplified `ROUNDING` and the error of the true solution.
 
-The rounding is `ROUNDING` times the error amplification. The tolerance is amplified too if the
-error amplification exceeds `LIVELY`.
+The tolerance is amplified too if the error amplification exceeds `LIVELY`.
 """
 TORQUE_POLICY = replace(POLICY, may_refuse=_may_refuse_torque)
-"""The policy under torques that depend on the state."""
+"""Policy under torques that depend on the state."""
 
 
 def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
-    """Yield checks of omega by every entry point; `_MAY_REFUSE` scenes may lack a true solution."""
+    """Yield checks of omega by each entry point."""
     for number in range(chosen.draws):
         if number // 2 % _EVERY or not chosen.may_ask(f"random/{number}"):
             continue
@@ -182,7 +180,7 @@ def _requested(is_asked: Callable[[str], bool], number: int, entrances: Entrance
 
 
 def _entrances(drawn: Draw, number: int, thin: bool) -> Entrances:
-    """Return deferred runs by entry point; slow methods run in few draws."""
+    """Return deferred runs by entry point, with slow methods in few draws."""
     forms = ["closed-form"] if closed_form(drawn.scene) else []
     names = ["auto", "taylor", f"gauss-{drawn.stages}", *forms]
     if number // 2 % _EVERY_SLOW == 0 and not thin:
@@ -227,7 +225,7 @@ def random_torques(chosen: Selection) -> Iterator[Attempt]:
         if not chosen.may_ask(f"random/{number}"):
             continue
         source = Random(f"torque {chosen.seed}/{number}")
-        # Chosen so that both kinds of torque occur in the draws that run all methods.
+        # So that both kinds of torque occur in the draws with slow methods.
         kind = (number // _EVERY_TORQUE + number // _EVERY_SLOW_TORQUE) % 2
         scene, time = (state_scenes.draw, state_scenes.draw_ready)[kind](source)
         is_slow = number % _EVERY_SLOW_TORQUE == 0 and not chosen.thin

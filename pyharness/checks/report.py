@@ -1,4 +1,4 @@
-"""The report of checks, as text, Markdown page, JSON record and JUnit cases."""
+"""Reports of checks as text, Markdown page, JSON record and JUnit cases."""
 
 import math
 from collections import Counter
@@ -14,7 +14,7 @@ from pyharness.truth.bounded import ESTIMATED, PROVED, joined
 
 _MOST_FAILURES = 50
 _MOST_ON_PAGE = 10
-_FEW = 10  # if there are at most so many checks, passed ones are shown too
+_FEW = 10  # most checks of which passed ones are shown too
 _GROUPS = (
     *words("checks"), Column("made"), Column("failed"), Column("worst/limit", short),
     *words("basis"),
@@ -28,7 +28,7 @@ def checks_report(
     page: Sequence[Section] | None = None,
     **extra: Any,
 ) -> Report:
-    """Return the report of a command's checks; `extra` has further JSON fields."""
+    """Return the report of a command's checks; `extra` are further JSON fields."""
     return Report(
         verb,
         text,
@@ -50,7 +50,7 @@ def summary_page(
     depth: int = 1,
     more: Sequence[Section] = (),
 ) -> list[Section]:
-    """Return a Markdown page: verdict, table by the first `depth` parts of ids, and failures."""
+    """Return a Markdown page: verdict, table of checks by `depth` parts of their ids, failures."""
     failed = [check for check in checks if not check.passed]
     lines: list[str] = []
     for check in failed[:_MOST_ON_PAGE]:
@@ -65,7 +65,7 @@ def summary_page(
 
 
 def _code(text: str) -> str:
-    """Return Markdown code, so that a port's text can't contain links or tags."""
+    """Return Markdown code, because a port's text might contain links or tags."""
     return f"`{text.replace('`', chr(39))}`"
 
 
@@ -80,13 +80,13 @@ def _failure(check: Check) -> str:
 
 
 def marks(checks: Sequence[Check]) -> str:
-    """Return how limits were set, as in ``proved, derived``, or a dash without limits."""
+    """Return how the limits were set, as in ``proved, derived``, or "-" without limits."""
     found = {check.mark for check in checks}
     return ", ".join(mark for mark in MARKS if mark in found) or "-"
 
 
 def basis_note(checks: Sequence[Check]) -> list[str]:
-    """Return a legend of the marks, with the number of limits of each; empty without limits."""
+    """Return a legend of the marks with the number of limits of each, or [] without limits."""
     counts = Counter(check.mark for check in checks if check.mark)
     told = ", ".join(f"{counts[mark]} {mark}" for mark in MARKS)
     legend = (
@@ -99,7 +99,7 @@ def basis_note(checks: Sequence[Check]) -> list[str]:
 def summary(
     title: Sequence[str], checks: Sequence[Check], depth: int = 1, more: Section = ()
 ) -> list[Section]:
-    """Return the text: title, failures, a table by the first `depth` parts of ids, verdict."""
+    """Return a text: title, failures, table of checks by `depth` parts of their ids, verdict."""
     table: Section = [*basis_note(checks), _groups(checks, depth)]
     return [title, listed_singly(checks), table, more, [verdict(checks)]]
 
@@ -117,7 +117,7 @@ def _groups(checks: Sequence[Check], depth: int) -> Table:
 
 
 def listed_singly(checks: Sequence[Check]) -> list[str]:
-    """Return lines on the failed checks and commands to repeat them, or on all checks if few."""
+    """Return lines on failed checks with commands to repeat them and, if few, on passed checks."""
     failed = [check for check in checks if not check.passed]
     lines = []
     for check in failed[:_MOST_FAILURES]:
@@ -132,7 +132,7 @@ def listed_singly(checks: Sequence[Check]) -> list[str]:
 def _format_outcome(check: Check, against: str) -> str:
     found = "" if check.value is None else f" {short(check.value)}"
     if check.value is not None and check.limit is not None and check.value <= check.limit:
-        against = ", limit "  # another fault than the value, which `note` tells
+        against = ", limit "  # the fault is not the value, but described in `note`
     allowed = "" if check.limit is None else f"{against}{short(check.limit)}"
     told = "; ".join(filter(None, (check.mark, check.note)))
     return f"{found}{allowed}" + (f" ({told})" if told else "")
@@ -147,7 +147,7 @@ _SAMPLES = (
 
 
 def samples(checks: Sequence[Check], rounding: float) -> Section:
-    """Return the largest ratios of error to tolerance, by entry point and error amplification."""
+    """Return a table of the largest ratios of error, without amplified rounding, to tolerance."""
     cells: dict[tuple[str, str], list[list[float]]] = {}
     for check in checks:
         if isinstance(check, Sample) and check.value is not None:
@@ -167,7 +167,7 @@ def samples(checks: Sequence[Check], rounding: float) -> Section:
 
 
 def references(checks: Sequence[Check]) -> Section:
-    """Return lines on the references' largest proved and estimated errors, and warnings."""
+    """Return lines on the references' largest proved and largest estimated error, and warnings."""
     bounds = [each.reference_bound() for each in checks if each.reference_bound is not None]
     known = [each for each in bounds if each is not None]
     lines = []

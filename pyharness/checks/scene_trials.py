@@ -1,6 +1,6 @@
-"""Stress trials of a user's scene, with any torque whose arithmetic can be recorded.
+"""Stress trials of a user's scene against the reference and against transformed scenes.
 
-Results are compared with the reference, and with results in transformed scenes.
+The torque may be any whose arithmetic can be recorded.
 """
 
 from collections.abc import Callable, Iterator
@@ -37,19 +37,19 @@ from pyharness.model.trajectory import Array
 from pyharness.truth.reference import reference
 
 _METHODS = ("auto", "taylor", "gauss-4", "gauss-8", *SCIPY_METHODS)
-# Methods that run also at their finest tolerance; methods in Python would take too long.
+# Methods that run at their finest tolerance too; others would take too long.
 _FINE = ("auto", "taylor", "closed-form")
 _PARTS = (0.125, 0.25, 0.5, 1.0)  # fractions of the last time
 _CUT = 0.37  # fraction of the last time at which a motion is divided
 _REPEATS = 4
 
 Attempting = Callable[[Scene, Name], Attempts]
-# Omega (rad/s, shape (3,)) and the attitude (shape (4,)), or None without one.
+# Omega (rad/s), shape (3,), and attitude, shape (4,), or None.
 State = tuple[Array, Array | None]
 
 
 def scene_trials(scene: Scene, options: str) -> dict[str, Trial]:
-    """Return the trials of a scene by name; `options` end the command that repeats them."""
+    """Return a scene's trials by name; the command that repeats them ends with `options`."""
     if isinstance(scene.torque, StateTorque):
         system_of(scene)  # raises InputError for an opaque torque
         if scene.torque.needs_attitude and scene.attitude is None:
@@ -146,8 +146,8 @@ def _invariance(scene: Scene, name: Name) -> Iterator[Attempt]:
             yield Attempt(own, partial(_compared, scene, tolerance, make))
 
 
-# Returns, from a scene, a method and its tolerance, two states that must agree, and a bound on
-# their relative difference.
+# Returns, from a scene, a method and a tolerance, two states that must agree, and a bound on their
+# relative difference.
 Way = Callable[[Scene, str, float], tuple[State, State, float]]
 
 
@@ -200,7 +200,7 @@ def _back(scene: Scene, method: str, tolerance: float) -> tuple[State, State, fl
     start = _from(scene, there, time)
     again = _end(start, -time, method, tolerance)
     back = conditioning_at(start, [-time])
-    # The error of the forward run is an initial error of the backward run.
+    # The forward run's error is an initial error of the backward run.
     limit = conditioning_at(scene, [time]).limit(tolerance) * back.amplification
     limit += back.limit(tolerance)
     attitude = None if scene.attitude is None else np.array(scene.attitude)

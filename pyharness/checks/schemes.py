@@ -1,8 +1,7 @@
 """Checks of the programs' steps and stops, by recomputing every step from its scheme.
 
 Each step of the corrected programs is recomputed from the previous state, and must agree within
-rounding errors. This detects faults that Fortran and Python share, even if too small to change the
-order.
+rounding errors. This detects even small faults that Fortran and Python share.
 
 The stop test of the Runge-Kutta program (equation 19 of the thesis) divides the change of K
 (right-hand side) in a step by the change of U (state). A quotient above the stop constant ends the
@@ -28,7 +27,7 @@ from pyharness.model.trajectory import STOP_VARIABLES, Array, Stop, Trajectory
 from pyharness.thesis.cells import listing_name, subsets
 from pyharness.thesis.programs import PROGRAM_REGISTRY
 
-# Roundings of a rate with its stages, and of the sum to which it is added.
+# Number of roundings of a rate with its stages, and of the sum to which it is added.
 _ROUNDINGS = 32.0
 _ONE_STEP = Basis(
     "derived",
@@ -39,9 +38,9 @@ _ONE_STEP = Basis(
 
 @dataclass(frozen=True, eq=False)
 class _Stage:
-    """Omega and velocity at a stage, or collocation point, of every step."""
+    """Omega and velocity at a stage or collocation point of each of n steps."""
 
-    # shape (n, 6); arguments (rad/s, m/s) and values (rad/s2, m/s2) of the right-hand sides
+    # shape (n, 6): arguments (rad/s, m/s) and values (rad/s2, m/s2) of the right-hand sides
     state: Array
     rate: Array
     rounding: Array  # shape (n, 6): bound on the difference of two computations of the rate
@@ -53,7 +52,7 @@ _Stages = tuple[_Stage, _Stage, _Stage, _Stage]
 def schemes(chosen: Selection) -> Iterator[Attempt]:
     """Yield checks of the programs' steps.
 
-    The value is the largest difference from the recomputed step, divided by its rounding bound.
+    A value is the largest difference from the recomputed step, divided by its rounding bound.
     """
     for case in cases(chosen, (7,)):
         compare = partial(_compare_steps, case_scene(case))
@@ -121,7 +120,7 @@ def _beginning(scene: Scene, run: Trajectory) -> _Stage:
 
 
 def _stage(scene: Scene, part: float, state: Array) -> _Stage:
-    """Return rates, with rounding error bounds, at the fraction `part` of every step."""
+    """Return the rates, with rounding error bounds, at the fraction `part` of every step."""
     # Equations 16-18 of the thesis, and dV/dt = F/m - omega x V.
     omega, velocity = state[:, :3], state[:, 3:]
     times = scene.step_size * (np.arange(len(state), dtype=np.float64) + part)
@@ -146,7 +145,7 @@ _QUOTIENT = Basis(
 
 @dataclass(frozen=True, eq=False)
 class _Quotients:
-    """The quotients that the program compares with its stop constant, in the program's order."""
+    """The quotients that the program compares with its stop constant, in its order."""
 
     values: Array  # shape (n, m) for n steps, 1/s
     rounding: Array  # shape (n, m): bound on a quotient's difference in two computations, 1/s
@@ -154,9 +153,9 @@ class _Quotients:
 
 
 def stops(chosen: Selection) -> Iterator[Attempt]:
-    """Yield checks of stops, for every combination of the stop test's defects.
+    """Yield checks of stops for every combination of the stop test's defects.
 
-    Values are differences from recomputed quotients, divided by rounding bounds.
+    A value is the difference from the recomputed quotient, divided by its rounding bound.
     """
     ways = tuple(name for name in names_of("defect", _PROGRAM) if name.startswith("lipschitz"))
     for case in cases(chosen, (3,)):
@@ -204,7 +203,7 @@ def _quotients(scene: Scene, run: Trajectory, kutta: _Stages, listing: Listing) 
     columns = [3, 4, 5, 0, 1, 2] if velocity else [0, 1, 2]
     k, u = np.abs(fourth.rate - first.rate)[:, columns], np.abs(after - first.state)[:, columns]
     k_rounding = (first.rounding + fourth.rounding)[:, columns]
-    # The sum of the previous state and an increment, each rounded.
+    # Rounding errors of the previous state and of its sum with an increment.
     stored = 2.0 * ROUNDING * (np.abs(first.state) + np.abs(after))
     u_rounding = (stored + scene.step_size * (first.rounding + fourth.rounding))[:, columns]
     names = [STOP_VARIABLES[column] for column in columns]
@@ -214,14 +213,14 @@ def _quotients(scene: Scene, run: Trajectory, kutta: _Stages, listing: Listing) 
             np.linalg.norm(each, axis=1, keepdims=True) for each in (k, u, k_rounding, u_rounding)
         )
     with np.errstate(divide="ignore", invalid="ignore"):
-        # 0 over 0 never stops a run.
+        # A quotient 0 / 0 never stops a run.
         values = np.where(k > 0.0, k / u, 0.0)
         relative = np.where(k > 0.0, k_rounding / k + u_rounding / u, 0.0)
     return _Quotients(values, values * relative, names)
 
 
 def _constants(quotients: _Quotients) -> list[float]:
-    """Return stop constants (1/s) around each new largest quotient, beyond its rounding error."""
+    """Return stop constants (1/s) just below and above each new largest quotient."""
     constants = []
     below = 0.0
     for values, rounding in zip(quotients.values, quotients.rounding, strict=True):

@@ -8,18 +8,18 @@ from importlib import import_module
 from pyharness.checks.check import Attempts, Check, Name, run_suites, severity
 from pyharness.model.listing import PROGRAMS, Listing
 
-# Each trial is in the module of pyharness.checks.trials that has its name, except these two.
+# These two trials are not in a module of their name.
 _ELSEWHERE = {"near-symmetry": "separatrix", "shapes": "separatrix"}
 TRIALS = (
     *("separatrix", "near-symmetry", "shapes", "scales", "torque", "length", "step-size"),
     *("regions", "invariance", "attitude", "matrices", "threads"),
 )
-# For any scene (`pyharness.checks.scene_trials`).
+# Trials for any scene (`pyharness.checks.scene_trials`).
 SCENE_TRIALS = ("length", "step-size", "invariance", "threads")
 LISTINGS = tuple(f(program) for program in PROGRAMS for f in (Listing.original, Listing.corrected))
 
 named = partial(Name, command="stress")
-"""Return a `Name` with the command `stress`, and with the given other fields."""
+"""Return a `Name` with the command `stress`."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Trial:
     name: str
     title: str
     bound: str  # describes the limits
-    # From the requested beginnings of ids; other checks may be omitted.
+    # Returns the checks whose ids have the requested beginnings, and possibly others.
     attempts: Callable[[Sequence[str]], Attempts]
 
 
@@ -48,7 +48,7 @@ def stress(only: Sequence[str] = (), trials: Mapping[str, Trial] | None = None) 
 
 
 def worst(checks: Iterable[Check]) -> dict[str, Check]:
-    """Return, for each ``trial/method``, the worst check with a limit and a scene."""
+    """Return the worst check with a limit and a scene, by ``trial/method``."""
     found: dict[str, Check] = {}
     for check in checks:
         if check.name.scene is None or check.limit is None:

@@ -1,4 +1,4 @@
-"""The report of `stress`: for each trial a description, a table and a picture."""
+"""The report of `stress`: a description, a table and a picture for each trial."""
 
 import re
 import textwrap
@@ -103,7 +103,7 @@ def _mark(check: Check) -> _Mark:
     kind = re.split(r"[-^]?\d", name.circumstance, maxsplit=1)[0].rstrip("-")
     rank = name.setting or name.quantity
     with suppress(ValueError):
-        # One series for all coarse, another for all fine tolerances.
+        # One series has all coarse tolerances, another all fine ones.
         rank = "coarse" if float(rank) >= _COARSE else "fine"
     what = name.quantity if name.quantity in _MARKERS else ""
     return _Mark(name.subject, kind, name.circumstance, rank, what, check)
@@ -130,7 +130,7 @@ def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
         _panel(axes, name, [mark for mark in marks if mark.method == name], places)
     for axes in grid.flat[len(methods) :]:
         axes.set_visible(False)
-    # The name of the kind, omitted here, is above its problems.
+    # Without the kind, whose name is above its problems.
     labels = [name[len(kind) :].lstrip("-") or name for kind, name in places]
     for axes in grid[-1]:
         axes.set_xticks(list(places.values()), labels, rotation=90)
@@ -190,7 +190,7 @@ def _panel(
             at = [places[kind, mark.circumstance] for mark in own]
             axes.plot(at, [_inside(mark.check.limit) for mark in own], **line)
     axes.set_yscale("log")
-    # The pad leaves space for the names of the kinds.
+    # Leave space for the names of the kinds.
     axes.set_title(name, fontsize=9, loc="left", fontweight="bold", pad=14)
     axes.grid(visible=True, axis="y", linewidth=0.3)
     axes.tick_params(labelsize=7)
@@ -229,7 +229,7 @@ def length_picture(found: Sequence["Drift"]) -> Picture:
             for each in own:
                 style, many = _OF_METHODS[each.method], each.starts > 1
                 marked = {"label": each.method, "markersize": 4, **style}
-                # A single start: open markers, not joined to errors over several starts.
+                # Open markers, not joined, for errors of a single start.
                 alone = style | {"markersize": 5, "linestyle": "", "markerfacecolor": "none"}
                 for shown, look in ((many, marked), (~many, alone)):
                     one.loglog(each.steps[shown], each.error[shown], **look)
@@ -256,7 +256,7 @@ def length_picture(found: Sequence["Drift"]) -> Picture:
     return Picture(figure, numbers("motion method what steps error limit starts", rows))
 
 
-# Styles that differ without colour too.
+# The line styles differ even without colour.
 _OF_REGIONS: tuple[dict[str, Any], ...] = (
     {"color": "#000000", "linestyle": "solid", "linewidth": 2.2},
     {"color": "#1040a0", "linestyle": (0, (1, 1.2)), "linewidth": 2.2},

@@ -86,7 +86,7 @@ def _drift_in_space(scene: Scene, trajectory: Trajectory) -> float:
 
 
 def _scaled(vector: Array) -> Array:
-    """Return a vector times a power of 2, less than 1 in magnitude, so that no square overflows."""
+    """Return a vector scaled by a power of 2 to components below 1, so that no square overflows."""
     return np.asarray(np.ldexp(vector, -_exponent(vector)))
 
 
@@ -95,7 +95,7 @@ def _exponent(vector: ArrayLike) -> int:
 
 
 def distance(first: Trajectory, second: Trajectory) -> float:
-    """Return the largest difference in units in the last place; infinite if row counts differ."""
+    """Return the largest difference in units in the last place; infinite for unequal lengths."""
     if len(first.time) != len(second.time):
         return math.inf
     names = ("recorded_time", "omega", "velocity")
@@ -103,7 +103,7 @@ def distance(first: Trajectory, second: Trajectory) -> float:
 
 
 def differences(first: Trajectory, second: Trajectory) -> list[str]:
-    """Return the names of counts and endings that differ or, if none do, of arrays that differ."""
+    """Return the names of counts and endings that differ or, if all agree, of differing arrays."""
     names = {"steps": "steps", "evaluations": "evaluations", "ended": "ending", "stop": "stop"}
     found = [told for name, told in names.items() if getattr(first, name) != getattr(second, name)]
     if found:
@@ -114,7 +114,7 @@ def differences(first: Trajectory, second: Trajectory) -> list[str]:
         found.append("IER")
     if first.exact is not None and second.exact is not None:
         pairs = zip(first.exact.ravel().tolist(), second.exact.ravel().tolist(), strict=True)
-        # As text, because nan is not equal to nan, and 0.0 is equal to -0.0.
+        # As text, because nan differs from nan, and 0.0 equals -0.0.
         if any(x.m != y.m or str(x.e) != str(y.e) for x, y in pairs):
             found.append("numbers of the word")
     return found
@@ -126,9 +126,9 @@ def _rows(trajectory: Trajectory, name: str) -> Array:
 
 
 def ulps(x: Array | float, y: Array | float) -> float:
-    """Return the largest distance between corresponding elements, counted in floats.
+    """Return the largest distance between corresponding elements, in units in the last place.
 
-    It is 0 between two NaNs, infinite between NaN and a number.
+    The distance is 0 between two NaNs, infinite between NaN and a number.
     """
     both_nan = np.isnan(x) & np.isnan(y)
     one_nan = np.isnan(x) ^ np.isnan(y)

@@ -1,4 +1,4 @@
-"""Batches of scenes, with arrays of the quantities that differ."""
+"""Batches of scenes with arrays of the quantities in which they differ."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -26,7 +26,7 @@ from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
 from pyharness.thesis.many import ProgramEnsemble, run_many
 
-# Arrays for a program, but not for a method.
+# Arrays that only programs use.
 OF_PROGRAMS = ("step_size", "lipschitz")
 _EFFORT = 1e9  # factor on the work limit; so large because the caller requested the whole batch
 
@@ -54,13 +54,13 @@ class Solver:
 class Batch:
     """Many scenes, solved by one method or program when a result is first read."""
 
-    # Checks of the thesis's claims may use only `omega0`, `omega`, `status`, `n_rows`, `rows`,
+    # Checks of the thesis's claims use only `omega0`, `omega`, `status`, `n_rows`, `rows`,
     # `stop_variable` and `by_method`.
     scene: Scene  # the shared quantities
     solver: Solver
     listing: Listing | None  # None for a method
     t_end: Array  # s, shape (n,)
-    # Quantities that differ, a row for each scene, named as in `solve_many` and `run_many`.
+    # Quantities in which scenes differ, a row for each scene, named as in `solve_many`, `run_many`.
     arrays: Mapping[str, Array]
     attitude: bool = False  # whether a method computes attitudes
     # Results by number of samples.
@@ -98,7 +98,7 @@ class Batch:
 
     @property
     def leaves(self) -> str | None:
-        """The code that computed a recorded torque's Taylor series (`Ensemble.leaves`)."""
+        """The code that computed a recorded torque's Taylor series, as in `Ensemble.leaves`."""
         return self._ends.leaves
 
     @property
@@ -108,7 +108,7 @@ class Batch:
 
     @property
     def stop_variable(self) -> NDArray[np.int8]:
-        """The number in STOP_VARIABLES of the variable that stopped each run, or 0."""
+        """The number in STOP_VARIABLES of the variable that stopped each run, or 0, shape (n,)."""
         return self._program.stop_variable
 
     def sample_steps(self, samples: int) -> list[int]:
@@ -117,7 +117,7 @@ class Batch:
         return [max(1, round(steps * (i + 1) / samples)) for i in range(samples)]
 
     def rows(self, samples: int) -> Array:
-        """Return omega (rad/s) after `samples` equal parts of a run, shape (n, samples, 3)."""
+        """Return omega (rad/s) at the ends of equal parts of each run, shape (n, samples, 3)."""
         if not self.is_program:
             return np.stack([each.omega for each in self._samples(samples)], axis=1)
         if samples not in self._rows:
@@ -125,9 +125,9 @@ class Batch:
         return self._rows[samples]
 
     def attitudes(self, samples: int) -> Array:
-        """Return scalar-first quaternions after equal parts of a run, shape (n, samples, 4).
+        """Return scalar-first quaternions at the ends of parts of a run, shape (n, samples, 4).
 
-        They rotate from body axes to initial body axes.
+        They rotate from body axes to the initial body axes.
         """
         ends = [each.attitude for each in self._samples(samples) if each.attitude is not None]
         found = np.stack(ends, axis=1)
@@ -150,26 +150,23 @@ class Batch:
         return replace(self, arrays={**self.arrays, "omega": omega0})
 
     def run(self, at: list[int]) -> ProgramEnsemble:
-        """Return a program's results at the ascending steps `at`.
-
-        The error codes IER are missing if scenes run one by one.
-        """
-        if "torque_rate" not in self.arrays:  # `run_many` takes one rate for all bodies
+        """Return a program's results at the ascending steps `at`; `ier` is None for single runs."""
+        if "torque_rate" not in self.arrays:  # `run_many` takes one rate for all scenes
             try:
                 return self._run(self.scene, self.arrays, at)
-            except InputError:  # raised by at least one scene
+            except InputError:  # at least one scene is refused
                 pass
         return self._run_each(at)
 
     def scene_of(self, i: int) -> Scene:
-        """Return scene `i` (from 0), with an attitude only if the torque needs it."""
+        """Return scene `i` (from 0); it has an attitude only if the torque needs one."""
         own = {name: array for name, array in self.arrays.items() if name != "lipschitz"}
         return scene_of_row(self._shared, own, i)
 
     @property
     def _needs_attitude(self) -> bool:
         torque = self.scene.torque
-        # A torque in space may be 0 in `scene`, and another in `arrays`.
+        # A torque in space axes may be 0 in `scene`, but not in `arrays`.
         in_space = isinstance(torque, TorqueLaw) and torque.frame == "space"
         return in_space or torque.needs_attitude
 
@@ -204,7 +201,7 @@ class Batch:
         return self._solve(method, tolerance, t_end, **more)
 
     def _solve(self, method: str, tolerance: float, t_end: Array, **more: Any) -> Ensemble:
-        """Return the states at `t_end` (s), scene by scene if the method has no kernel for many."""
+        """Return the states at `t_end` (s), scene by scene if no kernel integrates many."""
         by_state = isinstance(self.scene.torque, StateTorque)
         tolerance = max(tolerance, REGISTRY[method].finest)
         if method not in (PREPARED_FOR_STATE if by_state else PREPARED):

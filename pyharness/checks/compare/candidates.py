@@ -1,4 +1,4 @@
-"""A common interface, `Candidate`, to methods, prepared solvers and programs.
+"""`Candidate`, a common interface to methods, prepared solvers and programs.
 
 A prepared solver, from `prepare`, solves one scene by one method, from many initial states.
 Tolerances are relative to the largest omega; `effort` multiplies the work limit.
@@ -23,7 +23,7 @@ from pyharness.model.trajectory import STOP_VARIABLES, WITH_ALL_ROWS, Array, Tra
 from pyharness.thesis.compiled import program_arguments
 from pyharness.thesis.programs import BINARY64, PROGRAM_REGISTRY
 
-_SAME = 1e-9  # relative difference up to which two times are equal; the step size is rounded
+_SAME = 1e-9  # relative difference up to which two times count as equal; step sizes are rounded
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,11 +59,11 @@ class Candidate:
     """A method with its tolerance, a prepared solver, or a program."""
 
     name: str
-    # Returns an integration of the scene to the time (s). Raises InputError if the candidate can't
-    # solve the scene, or has no result at the time, as a program whose steps end at other times.
+    # Returns an integration of the scene to the time (s). Raises InputError if the candidate cannot
+    # solve the scene or has no result at this time (a program has results only after whole steps).
     ready: Callable[[Scene, float], Ready]
-    # Returns the trajectory at the times of the scene's steps or, for a method, at those in an
-    # optional second argument. A prepared solver has no trajectory and raises InputError.
+    # Returns the trajectory at the ends of the scene's steps or, for a method, at the times in an
+    # optional second argument. Raises InputError for a prepared solver, which has no trajectory.
     rows: Callable[..., Trajectory]
 
     def end(self, scene: Scene, time: float) -> End:

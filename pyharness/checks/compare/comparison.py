@@ -1,4 +1,4 @@
-"""Comparisons of programs (original and corrected) and methods on one scene.
+"""Comparisons of programs, original and corrected, and methods on one scene.
 
 Errors (rad/s) below the error of the reference have no meaning. Differences between Fortran and
 Python are in units in the last place.
@@ -146,9 +146,9 @@ def listings_for(
     readings: Sequence[str] = (),
     conjectures: Sequence[str] | None = None,
 ) -> list[Listing]:
-    """Return each program's original, changed (by `fix`, `keep`) and corrected listing.
+    """Return each program's original and corrected listing and, between them, a changed one.
 
-    Without `fix` and `keep`, a specified `base` is the only listing.
+    `fix` and `keep` change `base`; without both, a specified `base` is the only listing.
     """
     chosen = list(programs)
     assumed = [name for name in conjectures or () if name != "none"]

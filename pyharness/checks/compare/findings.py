@@ -17,7 +17,7 @@ from pyharness.thesis.programs import BINARY64
 from pyharness.truth.bounded import ErrorBound
 from pyharness.truth.reference import Reference
 
-# Relative error that rounding causes in any method for an error amplification of 1.
+# Relative error of any method that rounding causes if the error amplification is 1.
 _ROUNDING = 4e-15
 
 
@@ -90,7 +90,7 @@ class Comparison:
 
     @property
     def digits(self) -> float | None:
-        """Return the number of decimal digits that amplified binary64 rounding leaves, or None."""
+        """Return the decimal digits that amplified binary64 rounding leaves; None if unknown."""
         return None if self.growth is None else digits_left(ROUNDING * self.growth)
 
     @property
@@ -105,7 +105,7 @@ class Comparison:
 
     @property
     def is_complete(self) -> bool:
-        """Return whether every method reached all times; true if programs were compared."""
+        """Return whether every method reached all times; True if programs were compared."""
         found = [] if self.programs else [each.trajectory for each in self.methods]
         return all(each is not None and each.has_all_rows for each in found)
 
@@ -113,8 +113,8 @@ class Comparison:
     def unexpected(self) -> tuple[str, ...]:
         """Return a sentence for each unexpected result.
 
-        Programs: differences between Fortran and Python, missed orders. Methods alone: missed
-        tolerances or times.
+        For programs: differences between Fortran and Python, and missed orders of convergence.
+        Without programs: the methods' missed tolerances or times.
         """
         found = [] if self.programs else [*filter(None, map(self._excess, self.methods))]
         if not self.programs and all(each.trajectory is None for each in self.methods):
@@ -148,6 +148,6 @@ class Comparison:
 
     @property
     def not_judged(self) -> tuple[str, ...]:
-        """Return a sentence for each corrected program of undecided order."""
+        """Return a sentence for each corrected program whose order of convergence is undecided."""
         orders = [(each.who, each.order) for each in self.programs if each.order is not None]
         return tuple(f"{who}: {order}" for who, order in orders if not order.is_judged)

@@ -19,24 +19,24 @@ from pyharness.model.trajectory import Array
 from pyharness.thesis.programs import Program
 from pyharness.truth.reference import Reference
 
-# How much a measured order may be below the theoretical one.
+# Largest allowed amount by which a measured order is below the theoretical one.
 ORDER_SLACK = 0.5
-# Conditions for a measurement. Halving the step must change the result by less than
+# Conditions for a measurement. Halving the step size must change the result by less than
 # `_SMALL_CHANGE`, relative to the largest value. In a step the phases of the body's motion and of
 # the torque may change by at most `_SMALL_ANGLE` (rad), because steps that skip whole periods of
 # the torque also seem to converge.
 _SMALL_CHANGE = 1e-3
 _SMALL_ANGLE = 0.5
-# The step is halved at least eight times, and until a run takes this many steps.
+# The step size is halved at least `_HALVINGS` times, and until a run takes `_MOST_STEPS` steps.
 _MOST_STEPS = 2**18
 _HALVINGS = 8
-# A program that does not converge is incorrect if a textbook method of the same order converges,
-# even with fewer steps by this factor.
+# A program that does not converge is incorrect if a textbook method of the same order converges
+# with `_MARGIN` times fewer steps.
 _MARGIN = 4
 _TEXTBOOK = {2: "improved-euler", 4: "rk4"}
-# Assumed number of rounding errors of omega in a step.
+# Assumed number of rounding errors of omega per step.
 _ROUNDINGS = 8.0
-# LEQT1F may report a matrix with a larger condition number as singular.
+# The linear solver LEQT1F may report a matrix with a larger condition number as singular.
 _CONDITION = 1e15
 
 State = Literal["as due", "rounding", "misses", "unsettled", "singular", "sensitive", "unbounded"]
@@ -47,13 +47,13 @@ class Order:
     """A method's measured order of convergence, or why it is undecided."""
 
     due: int  # order expected by theory
-    # `as due`: as expected. `rounding`: the error reached rounding before the order showed.
-    # `misses`: the error decreases too slowly. Else undecided: no step was small enough
-    # (`unsettled`), the program found its matrix singular (`singular`), the motion amplifies
-    # rounding errors too much (`sensitive`), or the solution is unbounded (`unbounded`).
+    # `as due`: as expected. `rounding`: the error reached rounding errors before the order showed.
+    # `misses`: the error decreases too slowly. In the other states the order is undecided: no step
+    # was small enough (`unsettled`), the program found its matrix singular (`singular`), the motion
+    # amplifies rounding errors too much (`sensitive`), the solution is unbounded (`unbounded`).
     state: State
     value: float | None  # measured order, if any
-    step_size: float  # smallest tried (s); if `singular`, the largest singular one
+    step_size: float  # smallest tried (s); if `singular`, the largest with a singular matrix
     steps: int = 0  # steps of the finest run compared with the reference
     error: float = math.inf  # largest error of that run (rad/s)
     time: float = math.nan  # time of that error (s)
@@ -80,7 +80,7 @@ class _SingularError(Exception):
 def measured_order(
     scene: Scene, program: Program, listing: Listing, truth: Reference, pairs: int = 2
 ) -> Order:
-    """Return the measured order of convergence of a compiled program's omega to `truth`."""
+    """Return the measured order with which a compiled program's omega converges to `truth`."""
 
     def omega(finer: Scene) -> Array:
         run = program.run(finer, listing, may_stop=False, velocity=False)
@@ -108,10 +108,10 @@ def order_of(
     due: int,
     truth: Reference,
     quantity: Literal["omega", "velocity"] = "omega",
-    pairs: int = 2,  # successive orders that must agree
+    pairs: int = 2,  # number of successive measured orders that must agree
     most_steps: int | None = None,
 ) -> Order:
-    """Return the order of a numerical solution, measured by halving the step size.
+    """Return the order of convergence of `solution`, measured by halving the step size.
 
     `solution` returns `quantity` after each step, until an overflow.
     """
@@ -144,7 +144,7 @@ def order_of(
         steps = finer.steps
         if state != "singular":
             step_size = finer.step_size
-        if len(found) < n:  # overflow: the step is far too large
+        if len(found) < n:  # overflow: the step size is far too large
             previous = None
             continue
         errors = np.abs(found - right).max(axis=1)
@@ -190,7 +190,7 @@ def _fastest(scene: Scene, omega: Array) -> float:
 
 
 def _is_grown_rounding(scene: Scene, found: Order) -> bool:
-    """Return whether the error may be amplified rounding; True without a bound."""
+    """Return whether the error may be amplified rounding; True if no bound is known."""
     if not found.steps or not math.isfinite(found.error):
         return False
     with suppress(InputError):

@@ -14,14 +14,14 @@ from pyharness.model.trajectory import WITH_ALL_ROWS, Trajectory
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Distinct without colour.
+# The line styles differ even without colour.
 _STYLES: dict[str, dict[str, Any]] = {
     "original": {"color": "#c02020", "linestyle": (0, (5, 2)), "linewidth": 1.4},
     "custom": {"color": "#107040", "linestyle": (0, (6, 1, 1, 1)), "linewidth": 1.4},
     "corrected": {"color": "#1040a0", "linestyle": (0, (1, 1.2)), "linewidth": 2.0},
 }
 _REFERENCE: dict[str, Any] = {"color": "#b8b8b8", "linestyle": "-", "linewidth": 3.5}
-# Markers for trajectories of one time, which a line does not show; distinct even at the same point.
+# Markers for trajectories of a single time, which have no line; distinct even at the same point.
 _MARKERS: dict[str, dict[str, Any]] = {
     "reference": {"marker": "s", "markersize": 11.0},
     "original": {"marker": "o", "markersize": 8.0, "markerfacecolor": "none"},

@@ -189,8 +189,7 @@ def _data(comparison: Comparison) -> Table:
         }
         rows.append(each | row)
     for each in map(_method, comparison.methods):
-        # A method chooses its own steps, whose number is not written. A failure is written as its
-        # ending.
+        # A method chooses its own steps: their number is not comparable. A failure is its ending.
         row = {"steps": None, "ended": each["failure"] or each.get("ended", "")}
         rows.append(each | row | ({"seconds": None} if each["failure"] else {}))
     for each in rows:

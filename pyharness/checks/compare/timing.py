@@ -18,14 +18,14 @@ Clock = Callable[[], float]
 
 def seconds(
     runs: Sequence[Run],
-    length: float,  # of the calls of one function in a round (s)
+    length: float,  # duration of one function's calls in a round (s)
     rounds: int,
     say: Callable[[str], None] = lambda _: None,
     statistic: Callable[[Sequence[float]], float] = statistics.median,
     clocks: Sequence[Clock] | None = None,
-    slow: float = SLOW,  # a first call of this length (s) reduces the rounds
+    slow: float = SLOW,  # first calls of at least this duration (s) reduce the rounds
 ) -> list[float]:
-    """Return the time (s) of one call of each function, a `statistic` of several `rounds`."""
+    """Return the time (s) of one call of each function, as a `statistic` over `rounds`."""
     clocks = [perf_counter] * len(runs) if clocks is None else clocks
     timed = list(zip(runs, clocks, strict=True))
     enabled = gc.isenabled()
@@ -38,7 +38,7 @@ def seconds(
                 say(f"round {number} of {rounds}")
                 for (run, clock), times, most in zip(timed, seen, due, strict=True):
                     if number <= most:
-                        # The first call may have been slow.
+                        # Use the last time, as the first call may have been slow.
                         calls = max(1, round(length / max(times[-1], 1e-9)))
                         times.append(batch_seconds(run, calls, clock))
     finally:

@@ -1,7 +1,7 @@
 """Known faults of integrators, each with the motion that a faulty integrator computes.
 
-The motion is computed from a changed scene, or by changing the true states. An integrator that
-converges to it has the fault.
+This motion comes from a changed scene, or from changed true states. An integrator that converges
+to it has the fault.
 """
 
 import math
@@ -35,17 +35,17 @@ class Fault:
     """A fault of an integrator, with the changes that it makes to a motion."""
 
     name: str
-    says: str  # a sentence on the fault
-    # Returns the scene that the faulty integrator solves, or None without effect.
+    says: str  # a sentence that describes the fault
+    # Returns the scene that the faulty integrator solves, or None if the fault has no effect.
     scene: Callable[[Scene], Scene | None] = lambda scene: scene
-    # Returns the times (s) of its states, from the requested times and the step size (s).
+    # Returns the times (s) of the answered states, from the requested times and step size (s).
     times: Callable[[Array, float], Array] = lambda times, step: times
-    # Returns the faulty states, from the states at these times and the unchanged scene.
+    # Returns the faulty states from the states at these times and the unchanged scene.
     state: Callable[[State, Scene], State] = lambda state, scene: state
-    of_step: bool = False  # whether the states approach the true ones as the step decreases
+    of_step: bool = False  # whether the error of the states decreases with the step size
 
     def motion(self, scene: Scene, times: Array, step: float) -> State | None:
-        """Return the faulty states for `times` (s) and a step size (s); None without effect."""
+        """Return the faulty states at `times` (s), or None if the fault has no effect."""
         other = self.scene(scene)
         if other is None:
             return None
@@ -71,7 +71,7 @@ def _gyroscopic(scene: Scene, omega: Any) -> list[Any]:
 
 
 def _with_gyroscopic(*factors: float, applied: float = 1.0) -> Callable[[Scene], Scene]:
-    """Return a function that scales the torque by `applied` and -omega x (I omega) by `factors`."""
+    """Return a change of scenes: torque times `applied`, -omega x (I omega) times `factors`."""
 
     def changed(scene: Scene) -> Scene:
         def torque(t: Any, omega: Any) -> list[Any]:
@@ -117,7 +117,7 @@ def _in_order(*order: int) -> Callable[[Scene], Scene]:
 
 
 def in_space(attitude: Array, vectors: Array) -> Array:
-    """Return the components along the axes of space, shape (n, 3), of vectors in body axes."""
+    """Return the components along space axes, shape (n, 3), of `vectors` in body axes."""
     q = attitude.T
     turned = product(product(q, (np.zeros(len(vectors)), *vectors.T)), _conjugate(q))
     return np.array(turned[1:]).T
@@ -128,16 +128,16 @@ def _conjugate(q: Any) -> Any:
 
 
 def _with_space_rates(scene: Scene) -> Scene:
-    """Return the scene of -omega and the conjugate of q, for the wrong q' = (0, omega) q/2."""
-    # Correct is q' = q (0, omega)/2. The conjugate p of q satisfies p' = p (0, -omega)/2, and
-    # -omega satisfies Euler's equations with the opposite gyroscopic term and torque.
+    """Return a scene for -omega and the conjugate of q, for the wrong q' = (0, omega) q/2."""
+    # Correct is q' = q (0, omega)/2. With the wrong rate the conjugate p of q satisfies the correct
+    # p' = p (0, -omega)/2, and -omega satisfies Euler's equations with both terms negated.
     start, back = _conjugate(scene.attitude), np.negative(scene.omega).tolist()
     opposite = _with_gyroscopic(-1.0, -1.0, -1.0, applied=-1.0)(scene)
     return replace(opposite, omega=back, attitude=start)
 
 
 def _with_doubled_rates(scene: Scene) -> Scene:
-    """Return the scene with doubled omega, for the wrong q' = q (0, omega)."""
+    """Return a scene for twice omega, for the wrong q' = q (0, omega)."""
     halved = _with_gyroscopic(0.5, 0.5, 0.5, applied=2.0)(scene)
     return replace(halved, omega=np.multiply(2.0, scene.omega).tolist())
 
@@ -150,7 +150,7 @@ def _with_fast_torque(scene: Scene) -> Scene:
 
 
 def _of_thesis(half: State, scene: Scene) -> State:
-    """Return 2 y(t/2) - y(0), where y is omega or the attitude, from the states `half` at t/2."""
+    """Return 2 y(t/2) - y(0) for y = omega and attitude, from the states `half` at t/2."""
     attitude = 2.0 * half.attitude - np.array(scene.attitude)
     return State(
         2.0 * half.omega - np.array(scene.omega),
@@ -224,11 +224,11 @@ FAULTS = (
 """The known faults; faults of omega are first."""
 
 OUTPUTS = ("quaternion-transposed", "scalar-last", "attitude-from-identity")
-"""The faults of the attitude alone, whose `state` can change any states."""
+"""Faults of the attitude alone; their `state` applies to any states."""
 
 
 def motions(scene: Scene, times: Array, step: float) -> Iterator[tuple[Fault, State]]:
-    """Yield each fault with an effect, and its states; NaN if the last time is not reached."""
+    """Yield each fault that has an effect, and its states, NaN if the motion overflows."""
     for fault in FAULTS:
         with np.errstate(all="ignore"):
             try:

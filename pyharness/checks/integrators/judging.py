@@ -36,7 +36,7 @@ from pyharness.model.attitude import angle_between
 from pyharness.model.basis import Basis
 from pyharness.model.trajectory import Array
 
-_CONSERVED = 8.0  # rounding errors in a step of a reversible integrator
+_CONSERVED = 8.0  # most rounding errors per step of a reversible integrator
 _NORM = 1e-3
 
 _SLACK = Basis(
@@ -68,20 +68,20 @@ _FINITE = Basis(
 @dataclass(eq=False)
 class Verdict:
     command: str
-    again: Callable[[str], str] = lambda name: ""  # the command that repeats the checks in a scene
+    again: Callable[[str], str] = lambda name: ""  # returns the command to repeat a scene's checks
     checks: list[Check] = field(default_factory=list)
     judged: list[Judged] = field(default_factory=list)
     drift: Drift | None = None
     findings: list[Finding] = field(default_factory=list)
-    begin: float = field(default_factory=time.perf_counter)  # of the checks to be added next
+    begin: float = field(default_factory=time.perf_counter)  # start (s) of the next checks
 
     @property
     def control(self) -> str:
-        """The field of the requests that sets the accuracy; empty without answers."""
+        """The request field that sets the accuracy, or "" without answers."""
         return self.judged[-1].finest.control if self.judged else ""
 
     def add(self, scene: str, *checks: Check) -> None:
-        # The first of several checks made together has all their time.
+        # The first of several checks gets the time of all.
         now = time.perf_counter()
         times = [now - self.begin, *[0.0] * len(checks)]
         self.begin = now
@@ -95,10 +95,10 @@ def judge_integrator(
     chosen: Sequence[Problem],
     again: Callable[[str], str],  # returns the command that repeats a scene's checks
     due: float = 1.0,  # required order of convergence
-    # Receives the number of finished problems and the name of the next.
+    # Receives the number of finished problems and the next problem's name.
     told: Callable[[int, str], None] = lambda done, what: None,
 ) -> Verdict:
-    """Return the results of all checks of an integrator, started by `command`.
+    """Return the results of all checks of the integrator that `command` starts.
 
     An invalid answer ends the checks.
     """
@@ -122,8 +122,7 @@ def judge_integrator(
     found.findings = recognised(found.judged)
     for each in found.findings:
         name = Name("integrator", "fault", each.name)
-        # A low order is a fault only if a higher one was requested, which the checks of the order
-        # decide.
+        # Whether order 1 is too low, the checks of the order decide.
         found.add("", name.judged(each.name in FIRST_ORDER, each.text))
     if found.judged and (unexplained := _unexplained(found)):
         says = "no known fault explains the failed checks"
@@ -133,7 +132,7 @@ def judge_integrator(
 
 def _unexplained(found: Verdict) -> tuple[str, ...]:
     """Return the problems with failed checks that no recognised fault explains."""
-    # A fault also explains an overflow of its motion and, if it lowers the order, too low an order.
+    # A fault also explains an overflow of its motion and, if it lowers the order, a low order.
     faults = {x.name: x.problems for x in found.findings if x.name not in FIRST_ORDER}
     explained = {*chain.from_iterable(faults.values()), *(["long"] if faults else [])}
     remarked = {problem for each in found.findings for problem in each.problems}
@@ -218,7 +217,7 @@ def _same(one: Array, other: Array) -> Any:
 
 
 def _returned(ask: Ask, judged: Judged) -> list[Check]:
-    """Return checks that a free body returns to its start after omega is reversed."""
+    """Return a check whether a free body returns to its initial state after omega is reversed."""
     problem, level = judged.problem, LEVELS // 2
     forth = judged.answers[level]
     if not problem.scene.torque.is_zero or forth.attitude is None:

@@ -25,19 +25,19 @@ _STATES = {each.name: each.state for each in FAULTS}
 _STEP_AXIS = np.array([0.6, 0.0, 0.8])  # axis of the rotation that a first-order fault adds
 
 
-# A function of a quaternion, omega at both ends of a step, and the size of the step (s).
+# Returns a quaternion after a step from that before, omega at both ends, and the step size (s).
 Advance = Callable[[Any, Array, Array, float], Any]
 
 
 @dataclass(frozen=True)
 class IntegratorPlant:
-    """A fault planted in an integrator, which must be recognised by its name."""
+    """A fault planted in an integrator, to be recognised by its name."""
 
     name: str
     request: Callable[[dict[str, Any]], object] | None = None  # changes the request
     state: Callable[[State, Scene], State] | None = None  # changes the answered states
     advance: Advance | None = None  # computes the attitude after each step
-    # Properties of integrator and scenes, as in `_possible`, without which the fault has no effect.
+    # Properties, as in `_possible`, without which the fault has no effect.
     needs: tuple[str, ...] = ()
 
 
@@ -79,7 +79,7 @@ def _held(asked: dict[str, Any]) -> None:
 
 
 def _turned_start(asked: dict[str, Any]) -> None:
-    """Rotate the initial angular momentum by an angle (rad) equal to the step size (s)."""
+    """Rotate the requested initial angular momentum by h rad, where h is the step size in s."""
     moments, h = np.array(asked["moments"]), asked["step_size"]
     vector = moments * np.array(asked["omega"])
     across = np.cross(_STEP_AXIS, vector)
@@ -168,7 +168,7 @@ def with_plant(ask: Ask, plant: IntegratorPlant, scene: Scene) -> Ask:
         motion = ask(json.dumps(asked).encode(), rows)
         if plant.state is None or (motion.attitude is None and "attitude" in plant.needs):
             return motion
-        # Without attitudes the fault is of omega alone.
+        # Without attitudes, `state` changes only omega.
         state: Any = State(motion.omega, motion.attitude)  # type: ignore[arg-type]
         return replace(motion, **plant.state(state, scene)._asdict())
 
@@ -178,11 +178,11 @@ def with_plant(ask: Ask, plant: IntegratorPlant, scene: Scene) -> Ask:
 def self_test(command: str, chosen: Sequence[Problem], due: float = 1.0) -> Iterator[Outcome]:
     """Yield the outcome without a fault (the control), then with each planted fault.
 
-    An invalid answer yields a failed control.
+    After an invalid answer the control fails.
     """
 
     def judge(plant: IntegratorPlant | None = None) -> tuple[Verdict, list[str], int]:
-        """Return results, recognised faults, and the count of failed checks."""
+        """Return the results, the names of recognised faults, and the number of failed checks."""
         found = Verdict(command)
         for problem in chosen:
             asking = with_plant(ask, plant, problem.scene) if plant else ask
@@ -213,7 +213,7 @@ def _note(names: Sequence[str]) -> str:
 
 
 def _possible(right: Verdict) -> set[str]:
-    """Return the elements of `IntegratorPlant.needs` that integrator and scenes have."""
+    """Return the properties in `IntegratorPlant.needs` that the integrator and the scenes have."""
     kinds = {each.problem.kind for each in right.judged}
     found = {
         "steps": right.control != "tolerance",

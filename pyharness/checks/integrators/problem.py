@@ -2,7 +2,7 @@
 
 The drift is the change of conserved quantities in a long torque-free motion: relative for energy
 and |L|, an angle (rad) for the direction of the angular momentum L in space. A level, from 0 to
-`LEVELS` - 1, sets a step size (s) and a tolerance, which decrease as the level increases.
+`LEVELS` - 1, sets a step size (s) and a tolerance; both decrease with the level.
 """
 
 import math
@@ -27,23 +27,22 @@ from pyharness.truth.reference import Reference, reference
 LEVELS = 8
 """The number of levels."""
 DRAWS = 2
-"""The default number of random scenes of each kind of torque."""
+"""Default number of random scenes of each kind of torque."""
 PARTS = ("omega", "attitude")
 """The parts of a state whose errors are measured."""
 _COARSEST, _PER_LEVEL = 1e-3, 0.1  # tolerance of level 0, and factor from level to level
-_EACH = 2  # number of coarsest steps between requested times
+_EACH = 2  # number of the largest steps between requested times
 _ORDER_ONE = 1.5  # a smaller measured order counts as 1
 _SEVERAL = 4  # number of step sizes that must show the order 1
-_LATE = 3  # earlier tolerances that must show the order too
-_LEAST = 1e-300  # replaces an error of 0, to compute an order
-# An error larger than this many roundings, times the square root of the number of steps, is due to
-# the method.
+_LATE = 3  # number of earlier tolerances over which the order is measured too
+_LEAST = 1e-300  # replaces an error of 0 in the computation of an order
+# A larger error, in roundings times the square root of the number of steps, is the method's.
 _ROUNDINGS = 240.0
 _BETWEEN = 8.0  # time (s) between states of the long motion
 _ROWS, _FEWEST, _FEWEST_COARSE = 64, 16, 4
 # Levels of the largest step size (1/32 s) and tolerance (1e-6) of the long motion.
 _FIRST = {"step_size": 4, "tolerance": 3}
-_MARGIN, _WITHOUT_ATTITUDE = 16.0, 64.0  # smaller with an attitude, which has a larger error
+_MARGIN, _WITHOUT_ATTITUDE = 16.0, 64.0  # factors on an error; an attitude's error is larger
 _TOTAL = 3.0  # largest sum of the limits of all rows: errors of explicit methods may grow
 _MOST = 0.9  # a larger limit would pass a body that stops
 
@@ -58,7 +57,7 @@ CHANGE = Basis(
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A random scene to judge an integrator, named as in ``wave-1``."""
+    """A random scene for an integrator, named as in ``wave-1``."""
 
     scene: Scene
 
@@ -105,7 +104,7 @@ class Problem:
 
     @property
     def most_steps(self) -> float:
-        """The number of smallest steps until the last time."""
+        """The number of steps of the smallest size until the last time."""
         return float(self.times[-1] / self.step_size(LEVELS - 1))
 
     def floor(self, rounding: float) -> float:
@@ -117,7 +116,7 @@ class Problem:
         return request(scene or self.scene, asked, self.step_size(level), self.tolerance(level))
 
     def errors(self, motion: Motion) -> tuple[float, float | None]:
-        """Return the errors of omega (relative) and any attitude (rad), possibly infinite."""
+        """Return the largest errors of omega (relative) and attitude (rad), possibly infinite."""
         assert self.truth.attitude is not None
         return errors_between(State(self.truth.omega, self.truth.attitude), motion)
 
@@ -143,7 +142,7 @@ class Convergence:
     part: str  # "omega" or "attitude"
     settings: tuple[float, ...]
     errors: tuple[float, ...]
-    # Power of the setting to which the errors are proportional; None if all are rounding errors.
+    # Power of the settings to which the errors are proportional; None if all are rounding errors.
     order: float | None
 
     @property
@@ -166,7 +165,7 @@ class Convergence:
         return self.order is None or self.order >= _ORDER_ONE
 
     def predicted(self, level: int) -> float:
-        """Return a level's error, extrapolated from the error of the next level by the order."""
+        """Return a level's error, extrapolated from the next level's error by the order."""
         ratio = self.settings[level] / self.settings[level + 1]
         return self.errors[level + 1] * math.pow(ratio, self.order or 0.0)
 
@@ -182,7 +181,7 @@ def convergence(
     order = None
     if seen:
         last = seen[-1]
-        # The last settings alone show an error that ceases to decrease.
+        # Only the last settings show an error that stops decreasing.
         firsts = {0, max(0, last - _LATE)} if overall else {last - 1}
         known = [k for k in firsts if math.isfinite(errors[k])]
         powers = [_power(errors[k] / errors[last], settings[k] / settings[last]) for k in known]
@@ -208,12 +207,12 @@ class Judged:
 
     @cached_property
     def lost(self) -> int:
-        """The number of states that should be finite and are not."""
+        """The number of states that are not finite, although they should be."""
         rows = self.finest.lost
         for level in range(LEVELS - 2, -1, -1):
             lost, next_lost = (each.lost for each in self.answers[level : level + 2])
             predicted = max(each.predicted(level) for each in self.convergences)
-            # A coarse step or tolerance may overflow.
+            # With a large step or tolerance an overflow may be expected.
             if lost and not next_lost and predicted >= 1.0:
                 break
             rows += lost
@@ -222,7 +221,7 @@ class Judged:
     def error(self, level: int) -> float:
         """Return the larger of the errors of omega (relative) and attitude (rad).
 
-        It is at least the tolerance or rounding error.
+        The result is at least the tolerance or, with a fixed step, a bound on rounding errors.
         """
         problem, finest = self.problem, self.finest
         by_tolerance = finest.control == "tolerance"
@@ -234,7 +233,7 @@ class Judged:
 
 
 def problems(seed: str, draws: int, names: Sequence[str] = ()) -> list[Problem]:
-    """Return `draws` random scenes of each kind, or those in `names` (``wave-1`` or a kind)."""
+    """Return `draws` random scenes of each kind; if `names` (scenes or kinds), only these."""
     pairs = product(range(draws), MODERATE)
     drawn = (Problem(draw_moderate(seed, kind, number)) for number, kind in pairs)
     return [each for each in drawn if not names or each.name in names or each.kind in names]
@@ -245,14 +244,14 @@ class Drift:
     """Drifts of a long motion since time 0."""
 
     times: Array  # s, shape (n,)
-    # "energy", "momentum" (relative) and, with attitudes, "direction" (of the angular momentum in
-    # space, rad), shape (n,)
+    # Drifts by "energy", "momentum" (both relative) and, with attitudes, "direction" (of the
+    # angular momentum in space, rad), each of shape (n,)
     named: dict[str, Array]
     change: float  # largest change of a drift between successive times
 
 
 def long_motion(free: Judged) -> tuple[int, Array, float | None]:
-    """Return level, times (s) and limit of drift between times for a long motion.
+    """Return a long motion's level, times (s) and limit of drift between successive times.
 
     The limit is None if errors are too large.
     """
@@ -260,7 +259,7 @@ def long_motion(free: Judged) -> tuple[int, Array, float | None]:
     levels = range(_FIRST[control], LEVELS)
     margin = _WITHOUT_ATTITUDE if free.finest.attitude is None else _MARGIN
     limits = [margin * free.error(k) * _BETWEEN / free.problem.times[-1] for k in levels]
-    # The coarsest level whose limit allows enough times.
+    # The first level whose limit allows enough times.
     number = next((n for n, limit in enumerate(limits) if _TOTAL / limit >= _FEWEST), -1)
     most = max(_FEWEST, _ROWS if control == "tolerance" or number < 0 else _ROWS >> number)
     if number < 0 and limits[-1] > 0.5 * limits[0]:
@@ -283,7 +282,7 @@ def drift_of(scene: Scene, times: Array, motion: Motion) -> Drift:
             there = in_space(np.vstack([[scene.attitude], motion.attitude]), vectors)
             named["direction"] = _angle(there[1:], there[:1])
             changes.append(_angle(there[1:], there[:-1]))
-        # From a row that is 0 or not finite the change is NaN, which is ignored.
+        # After a row that is 0 or not finite, the change may be NaN; it is ignored.
         change = np.fmax.reduce(np.concatenate(changes), initial=0.0)
     return Drift(times, named, float(change))
 
@@ -294,7 +293,7 @@ def _angle(first: Array, second: Array) -> Array:
 
 
 def growth_power(times: Array, drift: Array) -> float | None:
-    """Return the power of time with which the largest drift grows; None if unknown."""
+    """Return the power of time to which the largest drift is proportional; None if unknown."""
     quarter = times <= times[-1] / 4.0
     early, late = float(np.abs(drift[quarter]).max()), float(np.abs(drift).max())
     if not math.isfinite(late) or early <= 0.0:

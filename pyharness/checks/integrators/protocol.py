@@ -1,4 +1,4 @@
-"""The lines that an integrator reads and writes; docs/how-to/integrators.md has the fields."""
+"""Requests to an integrator and its answers; docs/how-to/integrators.md describes the fields."""
 
 import json
 import math
@@ -18,7 +18,7 @@ from pyharness.model.trajectory import Array
 CONTROLS = ("step_size", "tolerance")
 """The fields of a request by which an integrator may control its accuracy."""
 ROUNDINGS = {"binary64": 2.0**-53, "binary32": 2.0**-24}
-"""The relative rounding error of each arithmetic that an answer may name."""
+"""Relative rounding error of each arithmetic that an answer may name."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class Motion:
 
 
 def request(scene: Scene, times: Sequence[float], step_size: float, tolerance: float) -> bytes:
-    """Return the JSON line that requests states at `times` (s), multiples of `step_size` (s).
+    """Return the JSON line that requests states at `times`, multiples of `step_size` (both in s).
 
     `tolerance` is relative to the largest omega.
     """
@@ -54,7 +54,7 @@ def request(scene: Scene, times: Sequence[float], step_size: float, tolerance: f
 
 
 Ask = Callable[[bytes, int], Motion]
-"""A function that sends a request for a number of states, and returns the answer."""
+"""A function of a request and its number of times that returns the answer."""
 
 
 def asking_of(process: PortProcess) -> Ask:
@@ -62,7 +62,7 @@ def asking_of(process: PortProcess) -> Ask:
 
 
 def refuse_integrator(command: str) -> None:
-    """Raise InputError that advises `--integrator` if `command` answers as an integrator."""
+    """Raise an InputError that advises `--integrator` if `command` starts an integrator."""
     line = request(draw_moderate("", MODERATE[0], 0), [1.0], 0.5, 1e-3)
     refuse_other(command, "--port", "--integrator", line, lambda answer: read_motion(answer, 1))
 
@@ -84,7 +84,7 @@ def read_motion(line: bytes, rows: int) -> Motion:
         return Motion(omega, control=control, rounding=rounding)
     attitude = _rows("attitude", given["attitude"], rows, 4)
     with np.errstate(all="ignore"):
-        norms = np.hypot.reduce(attitude, axis=1)  # squares would overflow earlier
+        norms = np.hypot.reduce(attitude, axis=1)  # because sums of squares overflow earlier
         unit = attitude / norms[:, None]
     if not norms.all():
         raise PortError(f"attitude, row {int((norms == 0.0).argmax()) + 1}: all four numbers are 0")

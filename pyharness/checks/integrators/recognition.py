@@ -1,4 +1,4 @@
-"""Recognition of an integrator's known faults, by its errors and orders of convergence."""
+"""Recognition of an integrator's known faults by its errors and orders of convergence."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -11,12 +11,12 @@ from pyharness.checks.compare.orders import ORDER_SLACK
 from pyharness.checks.integrators.faults import FAULTS, OUTPUTS, Fault, State
 from pyharness.checks.integrators.problem import Judged, convergence, drift_of, errors_between
 
-# A fault is recognised if it explains the error except for the part `_UNEXPLAINED`, and if the rest
-# decreases at least with the power `_FALLS` of the step size or tolerance.
+# A fault is recognised if it explains all but the part `_UNEXPLAINED` of the error, and if this
+# part decreases at least with the power `_FALLS` of the step size or tolerance.
 _UNEXPLAINED = 0.1
 _FALLS = 1.0 - ORDER_SLACK
-_OF_MOTIONS = 1e-10  # errors of the motions of faults
-_CONSERVED = 8.0  # rounding errors in a step, of a conserved quantity
+_OF_MOTIONS = 1e-10  # relative error of the computed faulty motions
+_CONSERVED = 8.0  # most rounding errors per step of a conserved quantity
 
 FIRST_ORDER = {
     "first-order": "omega converges with order 1 only",
@@ -28,11 +28,11 @@ FIRST_ORDER = {
     "torque-held": "the order is 1 under a torque that varies with time, and higher otherwise: "
     "the torque of a step is that at one end of the step, or at another wrong time",
 }
-"""The faults that measured orders reveal, with a sentence on each."""
+"""Sentences on the faults that measured orders of convergence reveal."""
 SAYS = {each.name: each.says for each in FAULTS} | FIRST_ORDER
-"""A sentence on each known fault."""
+"""Sentences on all known faults."""
 UNKNOWN = "unknown"
-"""The name of any unknown fault."""
+"""Name of an unknown fault."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Finding:
 
 
 def recognised(results: Sequence[Judged]) -> list[Finding]:
-    """Return the faults that explain errors or, failing that, fit the orders of convergence."""
+    """Return the faults that explain the errors or, without any, the orders of convergence."""
     explained = [(judged, _explained(judged)) for judged in results]
     pairs = [(name, judged.problem.name) for judged, names in explained for name in names]
     pairs += _by_orders([judged for judged, names in explained if not names])
@@ -57,7 +57,7 @@ def recognised(results: Sequence[Judged]) -> list[Finding]:
 
 
 def _explained(judged: Judged) -> list[str]:
-    """Return a fault that explains all errors, else a fault of omega and faults of the output."""
+    """Return a fault that explains all errors, or else one of omega and those of the output."""
     true = judged.convergences
     if judged.lost or all(each.is_higher for each in true):
         return []
@@ -69,7 +69,7 @@ def _explained(judged: Judged) -> list[str]:
     both = _best(judged, known, range(len(true)))
     if both is not None:
         return [both.name]
-    # If there is no such fault, at most one fault of omega, and one of the attitude, is sought.
+    # Without such a fault, seek one of omega, and those of the attitude.
     base = None if true[0].is_higher or len(true) == 1 else _best(judged, known, range(1))
     if base is None:
         return []

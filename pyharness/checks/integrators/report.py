@@ -1,4 +1,4 @@
-"""The report of `verify --integrator`: orders, errors, drifts, recognised faults, a picture."""
+"""The report of `verify --integrator`."""
 
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any

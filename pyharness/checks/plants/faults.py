@@ -1,7 +1,7 @@
 """Faults of a chosen size, planted in the running process within a context.
 
 A fault replaces a function, or changes its result. A program's Python version (twin) becomes faulty
-by one replacement in a copy of its source.
+by one replacement in a copied source.
 """
 
 import importlib
@@ -28,13 +28,13 @@ from pyharness.model.trajectory import Trajectory
 from pyharness.thesis.programs import PROGRAM_REGISTRY, Program
 
 Fault = Callable[[float], AbstractContextManager[Any]]
-"""A function from the size of a fault to a context in which the fault is present.
+"""A function of a fault's size that returns a context with this fault.
 
 A fault of size 0 changes no result.
 """
 
 Change = Callable[[Any, float], Any]
-"""A function from a right result and the size of a fault to the wrong result."""
+"""A function of a right result and a fault's size that returns the wrong result."""
 
 Faulty = Callable[..., Any]
 """A function that replaces a right function.
@@ -71,7 +71,7 @@ def change_result(target: str, change: Change) -> Fault:
 
 
 def change_at(path: str, change: Callable[[Any], Any]) -> Callable[[dict[str, Any]], None]:
-    """Return a function that changes the value at `path`, as in ``scene.run``, unless empty."""
+    """Return a function that changes a record's value at `path`, as in ``scene.run``, if any."""
     *outer, last = path.split(".")
 
     def changed(record: dict[str, Any]) -> None:
@@ -92,7 +92,7 @@ def change_attribute(name: str, change: Change) -> Change:
 
 
 class TwinFault(NamedTuple):
-    """Entry of `data/plants.toml`: `wrong` replaces `right` in a `file` of the Python versions."""
+    """An entry of `data/plants.toml`: `wrong` replaces `right` in a `file` of the twins."""
 
     file: str
     right: str
@@ -103,7 +103,7 @@ class TwinFault(NamedTuple):
 
 
 TWIN_FAULTS = {name: TwinFault(*row) for name, *row in facts("plants")["twin"]}
-"""The faults of the twins, by name."""
+"""Faults of the twins by name."""
 
 _COUNT = itertools.count()
 
@@ -127,7 +127,7 @@ class PlantedTwin(Program):
 
 
 def twin(program: str, name: str, both: bool = True) -> Fault:
-    """Return the fault `name` of a program's Python version and, if `both`, of Fortran."""
+    """Return the fault `name` of a program's twin and, if `both`, of its Fortran version."""
     fault = TWIN_FAULTS[name]
 
     @contextmanager

@@ -18,10 +18,10 @@ class Outcome:
 
     name: str
     fault: str
-    passed: bool  # fault detected or without effect; in the control, no check failed
+    passed: bool  # the fault was detected or had no effect; in the control, no check failed
     failed: int  # number of failed checks
     note: str
-    has_effect: bool = True  # the fault changed a result
+    has_effect: bool = True  # whether the fault changed a result
 
     @property
     def check(self) -> Check:

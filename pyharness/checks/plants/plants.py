@@ -1,7 +1,4 @@
-"""Planted faults, which test what each check detects.
-
-Compiled programs are altered at their entry point, twins (Python versions) in copied sources.
-"""
+"""Planted faults, which test what each kind of checks detects."""
 
 import itertools
 from collections import Counter
@@ -76,7 +73,7 @@ def _swapped(found: Array, size: float) -> Array:
 
 
 def _stale() -> Change:
-    """Return a change that replaces a trajectory by the previous one of equal length."""
+    """Return a change that replaces a trajectory by the one before of equal length."""
     before: dict[int, Trajectory] = {}
 
     def change(run: Trajectory, size: float) -> Trajectory:
@@ -108,7 +105,7 @@ def _prepared(change: Callable[[Array, _Answer, float], _Answer]) -> Fault:
 
 
 def _stale_solver(size: float) -> AbstractContextManager[Any]:
-    """Return a context in which every second prepared call repeats a result."""
+    """Return a context in which every second call of prepared solvers repeats the result before."""
     calls = itertools.count()
     before: list[_Answer] = []
 
@@ -139,7 +136,7 @@ _Run = Callable[..., Trajectory]
 
 
 def _shorter_compiled(size: float, run: _Run, scene: Scene, *rest: Any) -> Trajectory:
-    """Return a compiled run with a smaller step size, but the original times."""
+    """Return a compiled run with a smaller step size but the original times."""
     shorter = replace(scene, step_size=(1.0 - size) * scene.step_size)
     found, labels = run(shorter, *rest), run(scene, *rest)
     if found.steps != labels.steps:
@@ -172,7 +169,7 @@ def _shifted(
 
 
 def _wrong_card(size: float) -> AbstractContextManager[Any]:
-    """Return a context in which compiled programs get the flags of two defects exchanged."""
+    """Return a context where compiled programs get two flags exchanged, unless `size` is 0."""
     known = [entry["flag"] for entry in flagged() if entry["kind"] != "reading"]
     flags = Listing.flags.fget  # type: ignore[attr-defined]
 
@@ -186,7 +183,7 @@ def _wrong_card(size: float) -> AbstractContextManager[Any]:
 
 
 def _digit_altered(known: Problem, size: float) -> Problem:
-    """Return a problem whose first published omega is off by `size` times its accuracy."""
+    """Return a problem whose first published number is wrong by `size` times its accuracy."""
     value = known.values[0]
     figure = next((each for each in value.omega if each is not None), None)
     if figure is None:
@@ -264,7 +261,7 @@ PLANTS = (
 )  # fmt: skip
 
 
-# The golden record can't distinguish a fault from an intended change.
+# The golden record cannot distinguish a fault from an intended change.
 _NOT_ENOUGH = "golden"
 _DRAWS = 12
 
@@ -278,7 +275,7 @@ def self_test(seed: str, record: Path) -> Iterator[Outcome]:
 
 
 def outcome(plant: Plant, chosen: Selection) -> Outcome:
-    """Return the outcome of a fault, which a check other than the golden record's must detect."""
+    """Return the outcome of a fault, which must fail a check other than the golden record's."""
     with plant.planted(plant.size):
         failed, note = _failed(replace(chosen, only=plant.kinds))
     noticed = failed.total() - failed[_NOT_ENOUGH]

@@ -20,10 +20,10 @@ from pyharness.model.listing import Listing
 from pyharness.model.records import listing_record
 from pyharness.model.report import counted
 
-_MOST_CELLS = 24  # runs in which the faults are planted
+_MOST_CELLS = 24  # most runs in which the faults are planted
 
 Row = list[float]
-# A function that changes a parsed request or answer in place, unless the fault can't occur in it.
+# Changes a parsed request or answer in place, unless the fault cannot occur in it.
 Change = Callable[[dict[str, Any]], object]
 
 
@@ -174,7 +174,7 @@ PLANTS = (
 def self_test(command: str, cells: Sequence[Cell]) -> Iterator[Outcome]:
     """Yield the outcome without a fault (the control), then with each planted fault.
 
-    An invalid answer yields a failed control.
+    After an invalid answer the control fails.
     """
     chosen = _chosen(cells)
     try:
@@ -185,7 +185,7 @@ def self_test(command: str, cells: Sequence[Cell]) -> Iterator[Outcome]:
 
 
 def _chosen(cells: Sequence[Cell]) -> list[Cell]:
-    """Return a sample of at most 24 runs, from all programs, listings and cases."""
+    """Return a sample of at most 24 runs that covers programs, listings and cases."""
     order = random.Random("self-test").sample(range(len(cells)), len(cells))
     found: dict[tuple[object, ...], int] = {}
     for n in order:
@@ -214,7 +214,7 @@ def _planted(process: PortProcess, cells: Sequence[Cell]) -> Iterator[Outcome]:
                 has_changed = faulty != right
                 asked = json.dumps(faulty).encode()
                 faulty = _parsed(process.ask(asked)) if has_changed else answer
-            # Answers are compared as text, because NaN differs from itself, and zeros have a sign.
+            # Compare answers as text, because NaN differs from itself, and zeros have a sign.
             if json.dumps(faulty, sort_keys=True) == json.dumps(answer, sort_keys=True):
                 continue
             changed += 1

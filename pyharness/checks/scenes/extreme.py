@@ -1,4 +1,4 @@
-"""Extreme scenes with end times, in five named groups."""
+"""Extreme scenes with end times, in five groups."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -13,7 +13,7 @@ from pyharness.model.scene_file import case_scene
 
 
 class Circumstance(NamedTuple):
-    """A named extreme scene, and its end time (s)."""
+    """A named extreme scene with its end time (s)."""
 
     name: str
     scene: Scene
@@ -26,7 +26,7 @@ def speed(scene: Scene, largest: float) -> float:
 
 
 def in_steps(scene: Scene, time: float) -> Scene:
-    """Return the scene in 10 to 20 000 steps, of about 0.002 / `speed`, until `time` (s)."""
+    """Return the scene in steps of about 0.002 / `speed` until `time` (s): 10 to 20 000 of them."""
     rate = speed(scene, max(map(abs, scene.omega)))
     count = max(10, min(20_000, math.ceil(rate * abs(time) / 0.002)))
     return replace(scene, step_size=abs(time) / count, steps=count)
@@ -36,7 +36,7 @@ def _stepped(name: str, scene: Scene, time: float) -> Circumstance:
     return Circumstance(name, in_steps(scene, time), time)
 
 
-# Moments for motions near the separatrix. A = C = 1/2 are exact in binary64, so equal perturbations
+# Moments for motions near the separatrix. As A = C = 1/2 are exact in binary64, equal perturbations
 # about axes 1 and 3 start on the separatrix, where the body flips only once.
 MIDDLE_AXIS = (6.0, 5.0, 2.0)
 _A, _B = 0.5, 0.8
@@ -45,8 +45,7 @@ _FLIPS = 5
 
 def quarter(disturbance: float) -> float:
     """Return a quarter of the period (s) of the motion from omega = (`disturbance`, 1, 0) rad/s."""
-    # The complete elliptic integral K(k) divided by the frequency, by the arithmetic-geometric
-    # mean.
+    # The complete elliptic integral K(k) divided by the frequency, by the arithmetic-geometric mean
     mean, other = math.sqrt(_A * _A + _A * _B * disturbance**2), math.sqrt(_A * _B) * disturbance
     while mean - other > 1e-9 * mean:
         mean, other = 0.5 * (mean + other), math.sqrt(mean * other)
@@ -55,13 +54,12 @@ def quarter(disturbance: float) -> float:
 
 def _separatrix() -> Iterator[Circumstance]:
     """Yield rotations about the middle axis, perturbed by 1e-1 to 1e-15 rad/s."""
-    # At a flip, omega about the middle axis changes its sign. Motions end before the first flip, in
+    # In a flip, omega about the middle axis changes its sign. Motions end before the first flip, in
     # it, or in the fifth; those named "on" start on the separatrix.
     for d in (10.0**-k for k in range(1, 16)):
         beside, on = (d, 1.0, 0.0), (d, 1.0, d)
         flip = quarter(d)
-        # End times are mostly in the middle of a flip, where omega changes fastest and errors are
-        # largest.
+        # In the middle of a flip omega changes fastest, and errors are largest.
         for name, omega, time in (
             ("early", beside, min(14.0, 0.75 * flip)),
             ("flip", beside, flip),
@@ -86,7 +84,7 @@ def _near_symmetry() -> Iterator[Circumstance]:
             ("small-pair", (1.5, 1.0, near), _SHORT),
             ("large-pair", (1.0, near, 0.6), _SHORT),
             ("large-pair-long", (1.0, near, 0.6), LONG),
-            # Near a sphere omega changes slowly; its phase changes equally in all these scenes.
+            # Near a sphere omega changes slowly; the end times give equal changes of its phase.
             ("sphere", (1.0, near, 1.0 - 2.0 * difference), _SHORT / (difference or 1.0)),
         ):
             scene = Scene(f"near symmetry, {name}, {size}", SYMMETRIC_START, moments=moments)
@@ -99,8 +97,7 @@ _RADIANS = 20.0
 _ORDERS = ((0, 1, 2), (1, 2, 0), (2, 0, 1), (1, 0, 2))
 _NEEDLE, _PLATE = (1.0, 1.0 - 2.0**-41, 1e-12), (5.0, 3.0, 2.0)
 _BODIES: dict[str, Triple] = {
-    # Ratios 1 : 1 : 1e-12 and 1 : 1e12 : 1e12. The two large moments of an uneven body differ by
-    # about half of the largest possible difference.
+    # Large moments of uneven bodies differ by about half of the largest possible difference.
     "needle": (1.0, 1.0, 1e-12),
     "uneven-needle": _NEEDLE,
     "coin": (1.0, 1e12, 1e12),
@@ -118,14 +115,14 @@ _BODIES: dict[str, Triple] = {
 
 
 def _shapes() -> Iterator[Circumstance]:
-    """Yield needles, coins, plates and impossible bodies, with permuted axes, and Case 6."""
+    """Yield needles, coins, plates and impossible bodies with permuted axes, and Case 6."""
     for name, moments in _BODIES.items():
         for axes in _ORDERS:
             first, second, third = (moments[axis] for axis in axes)
             order = "".join(str(axis + 1) for axis in axes)
             scene = Scene(f"{name} {order}", _SHAPED, moments=(first, second, third))
             a, b, c = map(math.sqrt, map(abs, scene.euler_coefficients))
-            # Rates of small motions about the three axes (rad/s); the fastest advances by _RADIANS.
+            # Frequencies (rad/s) of small motions about the axes; the fastest advances by _RADIANS.
             rates = zip((b * c, c * a, a * b), scene.omega, strict=True)
             time = _RADIANS / max(w * abs(own) for w, own in rates)
             yield _stepped(f"{name}-{order}", scene, time)
@@ -175,4 +172,4 @@ EXTREMES: dict[str, Callable[[], Iterator[Circumstance]]] = {
     "scales": _scales,
     "attitude": _attitude,
 }
-"""The functions that yield the extreme scenes, by suite."""
+"""Functions that yield the extreme scenes of each group."""

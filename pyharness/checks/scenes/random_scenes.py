@@ -16,24 +16,24 @@ from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw
 
 COARSEST = 1e-3
-# Defects that are drawn after all others, so that a seed still gives the same draws.
+# Defects drawn after all others, so that a seed gives the same draws as before these were added.
 _LATER = ("three-masses",)
 _LIPSCHITZ = (500.0, 60.0, 1.0, 1e-3)
 MODERATE = ("free", "constant", "wave")
-"""The kinds of moderate scenes: torque-free, constant torque, waves with a linear torque."""
+"""Kinds of moderate scenes: torque-free, constant torque, waves with a linear torque."""
 
 
 @dataclass(frozen=True)
 class Draw:
-    """The random inputs of one check: a scene, a program, and parameters of the runs."""
+    """The random inputs of a check: scene, program, and parameters of the runs."""
 
     scene: Scene  # in odd draws a difficult one, named by its kind in `NASTY`
-    listing: Listing  # of any program, with random defects and readings of doubtful cards
-    lipschitz: float  # of the stop test (1/s)
+    listing: Listing  # a program with random defects and readings of doubtful cards
+    lipschitz: float  # constant of the stop test (1/s)
     may_stop: bool
     digits: float  # from 0 (coarsest tolerance) to 1 (a method's finest)
     backward: bool  # whether a method integrates to negative times
-    stages: int  # of Gauss collocation
+    stages: int  # number of stages of Gauss collocation
 
     @property
     def time(self) -> float:
@@ -46,7 +46,7 @@ class Draw:
 
 
 def weekly_seed(day: datetime.date | None = None) -> str:
-    """Return the week of `day`, by default today, as a seed such as 2026-W47."""
+    """Return the week of `day` (by default today) as a seed, as in 2026-W47."""
     year, week, _ = (day or datetime.date.today()).isocalendar()
     return f"{year}-W{week:02d}"
 
@@ -85,7 +85,7 @@ def random_scene(kind: str, seed: str | int, name: str = "") -> Scene:
 
 
 def draw_moderate(seed: str, kind: str, number: int) -> Scene:
-    """Return scene `number` of a seed, with a torque of `kind`, an element of `MODERATE`.
+    """Return scene `number` of a seed with a torque of `kind`, one of `MODERATE`.
 
     The body rotates by several radians.
     """
@@ -145,7 +145,7 @@ def _near_separatrix(source: Random) -> Scene:
 
 
 def _disturbed(source: Random, spin: float, faint: float) -> list[float]:
-    """Return omega (rad/s): `spin` about axis 2, with a perturbation of at most `faint`."""
+    """Return omega (rad/s): `spin` about axis 2, each component perturbed by at most `faint`."""
     return [w + faint * e for w, e in zip((0.0, spin, 0.0), _vector(source, 1.0), strict=True)]
 
 
@@ -198,7 +198,7 @@ def _far_scale(source: Random) -> Scene:
     exponent = source.choice((-1, 1)) * source.randint(20, 450)
     scene = source.choice((_plain, _from_rest, _slow_waves, _many_speeds))(source)
     if abs(exponent) > 300:
-        # The rate of a torque scales with the cube of the factor, and would overflow or underflow.
+        # A torque's rate, which scales with the factor cubed, would overflow or underflow.
         scene = replace(_plain(source), torque=TorqueLaw())
     found = scaled(scene, 2.0**exponent)
     mass = 2.0 ** source.randint(-60, 60) if abs(exponent) <= 200 else 1.0
@@ -207,7 +207,7 @@ def _far_scale(source: Random) -> Scene:
 
 
 def _sensitive(source: Random) -> Scene:
-    """Return a scene of rotation near the middle axis, which amplifies errors by up to 1e6."""
+    """Return a scene of rotation near the middle axis, with error amplification up to about 1e6."""
     low, middle, high = body = _body(source)
     spin = source.choice((-1.0, 1.0)) * 10.0 ** source.uniform(-1.0, 1.0)
     rate = abs(spin) * ((high - middle) * (middle - low) / (high * low)) ** 0.5
@@ -232,7 +232,7 @@ def _no_body(source: Random) -> Scene:
 
 
 def _extreme(source: Random) -> Scene:
-    """Return a scene with numbers from nearly all of binary64; most runs overflow."""
+    """Return a scene with numbers of all magnitudes of binary64; most runs overflow."""
 
     def any_size() -> float:
         if source.random() < 0.1:
@@ -276,14 +276,14 @@ NASTY: dict[str, Callable[[Random], Scene]] = {
     "coefficients": _no_body,
     "extreme": _extreme,
 }
-"""The functions that return scenes difficult for numerical methods, by kind."""
+"""Functions that return scenes difficult for numerical methods, by kind."""
 
 KINDS = {"plain": _plain, **NASTY, "pointing": _pointing, "driven": _driven}
-"""The functions that return random scenes, by kind."""
+"""Functions that return random scenes, by kind."""
 
 
 def _law(source: Random, size: float, kinds: int, frequencies: tuple[float, float]) -> TorqueLaw:
-    """Return a random torque law with components up to `size`, with `frequencies` in rad/s."""
+    """Return a random torque law, with components up to `size` and `frequencies` in rad/s."""
     # `kinds` is a sum of 1 for a constant term, 2 for a rate, 4 for a sine, 8 for a cosine.
     low, high = map(math.log10, frequencies)
     constant, rate = _vector(source, size), _vector(source, size)

@@ -22,13 +22,12 @@ from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.torque_law import TorqueLaw
 
-# A function of t, omega and attitude, symbols or numbers: the torque divided by the size of the
-# moments.
+# A torque as a function of t, omega and attitude, which are symbols or numbers.
 Term = Callable[[Any, Any, Any], Any]
 Body = tuple[float, list[float], float]
 STEADY = ("damping", "wheel", "drag", "wave", "control", "quotient", "root", "decay", "swing")
 TURNING = ("gradient", "field", "spring", "mixed")
-# Terms that change within a small range of time or omega, and are constant or nearly 0 elsewhere.
+# Terms that change mostly in small ranges of time or omega.
 SUDDEN = ("switch", "friction", "bell", "peak", "burst", "flash", "sigmoid", "swings")
 
 TIMED = ("table", "pulses")  # depend on time alone
@@ -64,7 +63,7 @@ def draw_ready(source: Random, names: tuple[str, ...] = READY) -> tuple[Scene, f
 
 
 def _body(source: Random) -> Body:
-    """Return the size of random possible moments (kg m2), the moments, and a speed (rad/s)."""
+    """Return a size (kg m2), random possible moments of this size (kg m2), and a speed (rad/s)."""
     size = 10.0 ** source.uniform(-2.0, 1.0)
     while True:
         found = sorted(10.0 ** source.uniform(-0.5, 0.3) for _ in range(3))
@@ -154,17 +153,17 @@ def term(source: Random, name: str, size: float, speed: float) -> Term:
 
 
 def orbit(t: Any, rate: float) -> Any:
-    """Return the direction to a satellite in a circular orbit, in axes of space."""
+    """Return the unit vector to a satellite in a circular orbit, in space axes."""
     return np.array([np.cos(rate * t), np.sin(rate * t), 0.0 * t])
 
 
 def gradient(t: Any, q: Any, inertia: Any, rate: float) -> Any:
-    """Return r x I r, a gravity-gradient torque without its factor; r is the local vertical."""
+    """Return r x I r, the gravity-gradient torque without its factor, with the local vertical r."""
     r = to_body(q, orbit(t, rate))
     return np.cross(r, inertia * r)
 
 
 def to_body(q: Any, vector: Any) -> Any:
-    """Return the components about body axes of a vector given about space axes."""
+    """Return the body-axis components of a vector given in space axes."""
     w, v = q[0], q[1:]
     return (w * w - v @ v) * vector + 2.0 * (v @ vector) * v - 2.0 * w * np.cross(v, vector)

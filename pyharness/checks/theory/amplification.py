@@ -2,13 +2,13 @@
 
 A perturbation x of a steady rotation, or the velocity during it, obeys x' = J x with a constant
 Jacobian J. A step of size h multiplies x by a matrix of polynomials in z, where z is h times an
-eigenvalue of J, or hJ itself. It has a row for each propagated vector. The original Runge-Kutta
-program propagates two: the result, and U(1), at which the first stage is evaluated. A program is
-linearly stable for z where the spectral radius is at most 1.
+eigenvalue of J, or hJ itself. The matrix has a row for each propagated vector. The original
+Runge-Kutta program propagates two: the result, and U(1), at which it evaluates the first stage. A
+program is linearly stable for z where the spectral radius is at most 1.
 
 A collocation program evaluates the right-hand side along its first estimate, a straight line, and
-corrects once. At time s of the step, the right-hand side there is F + s J F + s**2 Q(F), with the
-initial value F and the quadratic part Q.
+corrects once. At time s of the step, this right-hand side is F + s J F + s**2 Q(F), with its value
+F at the start of the step and its quadratic part Q.
 """
 
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ from pyharness.model.trajectory import Array
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 _HIGHEST = 5
-# A stability boundary nearer to z = 0 than this counts as being at 0.
+# A stability boundary nearer to z = 0 counts as being at 0.
 NEAREST = 2.0**-4
 _NOTHING = 1e-14
 # Samples of z: smallest, largest, and number. The rectangle of _REAL and _IMAGINARY contains all
@@ -39,15 +39,15 @@ _NOTHING = 1e-14
 _REAL = (-4.6, 1.4, 301)
 _IMAGINARY = (-3.6, 3.6, 361)
 _DISTANCES = (1e-3, 4.0, 181)
-_HIDDEN = 1e-13  # largest growth regarded as rounding
+_HIDDEN = 1e-13  # largest growth that counts as rounding
 
 
 @dataclass(frozen=True, eq=False)
 class Amplification:
-    """The matrix of polynomials in z by which one step multiplies a perturbation."""
+    """The matrix of polynomials in z by which a step multiplies a perturbation."""
 
-    # Fractions, shape (m, m, 5): coefficients of 1, z, ..., z**4. The last row is for the result of
-    # the step, the others for vectors such as U(1).
+    # Fractions, shape (m, m, 5): coefficients of 1, z, ..., z**4. The last row is for the step's
+    # result; a row before it is for U(1).
     coefficients: Fractions
 
     @property
@@ -64,14 +64,14 @@ class Amplification:
         return np.asarray(np.abs(np.linalg.eigvals(self.evaluate(z))).max(axis=-1))
 
     def moving(self) -> "Amplification":
-        """Return the matrix, without its last row and column if these add a constant eigenvalue."""
+        """Return the matrix without its last row and column, if these add a constant eigenvalue."""
         column = self.coefficients[:, -1]
         if self.size > 1 and not column[:-1].any() and not column[-1, 1:].any():
             return Amplification(self.coefficients[:-1, :-1])
         return self
 
     def exact_matrix(self, matrix: Exact) -> Fractions:
-        """Return the exact matrix, of order m n, for n equations x' = J x; `matrix` is hJ."""
+        """Return the exact matrix, shape (m n, m n), for n equations x' = J x; `matrix` is hJ."""
         power = np.eye(len(matrix), dtype=object)
         total = np.kron(self.coefficients[..., 0], power)
         for k in range(1, _HIGHEST):
@@ -98,13 +98,13 @@ def amplification(listing: Listing, step: int = 1) -> Amplification:
 
 
 def weight_of_squares(listing: Listing, step: int) -> Fraction:
-    """Return the weight of h**3 Q(F) in a collocation step, 1/3 for exact integration."""
+    """Return the weight of h**3 Q(F) in a collocation step; exact integration has 1/3."""
     points, weights = _quadrature(listing, step)
     return Fraction(weights @ points**2)
 
 
 def _quadrature(listing: Listing, step: int) -> tuple[Fractions, Fractions]:
-    """Return collocation points and weights, as fractions of the step size."""
+    """Return the collocation points and their weights, as fractions of the step size."""
     moved = step if listing.has("dt-accumulates") else 1
     points = [part * moved for part in PARTS[listing.program]]
     return np.array(points, dtype=object), inverse(collocation_matrix(points)).sum(axis=0)
@@ -112,8 +112,8 @@ def _quadrature(listing: Listing, step: int) -> tuple[Fractions, Fractions]:
 
 def _runge_kutta(listing: Listing) -> Amplification:
     """Return the matrix of the Runge-Kutta program (cards 770-1200)."""
-    # Stages, of shape (2, powers of z), are linear in U(1) and in the base of the step, the
-    # previous result.
+    # A stage, shape (2, 5), has polynomials in z that multiply U(1) and the previous result, the
+    # base of the step.
     first, base = np.full((2, 2, _HIGHEST), Fraction(0), dtype=object)
     first[0, 0] = base[1, 0] = Fraction(1)
     stages, slopes = [first], []
@@ -127,7 +127,7 @@ def _runge_kutta(listing: Listing) -> Amplification:
     matrix = np.array([kept, result], dtype=object)
     if listing.has("base-not-restored"):
         return Amplification(matrix)
-    # U(1) and the base are the same vector; their columns are added.
+    # U(1) and the base are the same vector, so add their columns.
     return Amplification(matrix[1:].sum(axis=1, keepdims=True))
 
 
@@ -147,7 +147,7 @@ def _polynomial_text(coefficients: Fractions) -> str:
 
 
 def boundary(matrix: Amplification, direction: complex) -> tuple[float, float]:
-    """Return the stability boundary's distance from z = 0, and the spectral radius's slope beyond.
+    """Return the stability boundary's distance from z = 0, and the spectral radius's slope there.
 
     `direction` is -1 or 1j.
     """
@@ -173,8 +173,8 @@ def boundary(matrix: Amplification, direction: complex) -> tuple[float, float]:
 class Region:
     """The spectral radius of a matrix on a grid of z and on the imaginary axis."""
 
-    name: str  # the programs and methods with this matrix
-    # Spectral radius on the grid, of the matrix from `moving`; shape (imaginary, real).
+    name: str  # programs and methods with this matrix
+    # Spectral radius of the matrix from `moving` on the grid, shape (imaginary, real).
     radius: Array
     # Spectral radius minus 1 at `Regions.distances` on the imaginary axis; 0 if only rounding.
     growth: Array
@@ -185,7 +185,7 @@ class Regions:
     # Real and imaginary parts of z on the grid.
     real: Array
     imaginary: Array
-    distances: Array  # of samples of z from 0, along the imaginary axis
+    distances: Array  # abs(z) of samples on the imaginary axis
     regions: tuple[Region, ...]  # in the order of drawing
 
 

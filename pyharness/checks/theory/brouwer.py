@@ -1,7 +1,7 @@
 """Bounds on rounding errors over many steps of torque-free motion, by Brouwer's law.
 
 Brouwer 1937, Astronomical Journal 46: with random rounding, errors of energy and momentum grow with
-the power 1/2 of the number of steps, the phase error with 3/2; with biased rounding, 1 and 2.
+the power 1/2 of the number of steps, the phase error with 3/2; with biased rounding, with 1 and 2.
 """
 
 import math
@@ -18,8 +18,8 @@ from pyharness.model.trajectory import Array
 from pyharness.truth.elliptic import torque_free
 
 ROUNDING = 2.0**-53
-# Hoeffding 1963: a sum of n independent terms of mean 0 and at most c in magnitude exceeds 4 c
-# sqrt(n) with a probability of at most 2 exp(-8).
+# Hoeffding 1963: a sum of n independent terms of mean 0 and magnitude at most c exceeds 4 c sqrt(n)
+# with a probability of at most 2 exp(-8).
 DEVIATIONS = 4.0
 LAWS = {"energy": 0.5, "momentum": 0.5, "phase": 1.5}  # powers of the number of steps
 _SAMPLES = 256
@@ -40,37 +40,37 @@ POWER = Basis(
 
 @dataclass(frozen=True)
 class Noise:
-    """Bounds on the errors of a step, divided by the largest abs(omega)."""
+    """Bounds on the errors of a step, relative to the largest abs(omega)."""
 
-    step: float  # s
-    rounding: float  # bound of the rounding error, of random sign
-    truncation: float  # bound of the truncation error, possibly biased
-    # truncation conserves energy and momentum, and affects the phase alone
+    step: float  # step size, s
+    rounding: float  # bound on the rounding error, of random sign
+    truncation: float  # bound on the truncation error, possibly biased
+    # whether the truncation error conserves energy and momentum, and affects only the phase
     conserves: bool
 
 
 @dataclass(frozen=True, eq=False)
 class Orbit:
-    """Samples of one torque-free motion, and factors for error bounds."""
+    """Samples of a torque-free motion, and factors for error bounds."""
 
     # Samples along the motion, shapes (n, 3), (n, 3), (n, 3, 3): omega (rad/s), its time derivative
-    # (rad/s2), and the Jacobian of that (1/s).
+    # (rad/s2), and the derivative's Jacobian (1/s).
     states: Array
     slopes: Array
     jacobians: Array
     largest: float  # largest abs(omega), rad/s
-    frequency: float  # of the motion about the polhode: 2 pi divided by the period (rad/s)
-    # Largest factors from an error of omega, divided by `largest`, to the errors of energy and
+    frequency: float  # 2 pi divided by the period of omega (rad/s)
+    # Largest factors from an error of omega, relative to `largest`, to the errors of energy and
     # momentum (both relative) and of the frequency (rad/s).
     gains: dict[str, float]
-    turn: float  # largest factor from such an error of omega to a phase error (rad)
+    turn: float  # largest factor from an error of omega, relative to `largest`, to the phase (rad)
 
     def limits(self, noise: Noise, steps: float) -> dict[str, float]:
-        """Return bounds after `steps` steps: "energy", "momentum" (relative), "phase" (rad)."""
+        """Return error bounds after `steps` steps: "energy", "momentum" (relative) "phase" (rad)."""
         walk = DEVIATIONS * noise.rounding * math.sqrt(steps)
         drift = steps * noise.truncation
-        # The result is rounded once more. The two roundings in each of A, B and C change the
-        # conserved quantities by at most four times the rounding error of the energy.
+        # The result is rounded once more. Two roundings in each of A, B and C change the conserved
+        # quantities by at most four units of rounding.
         lost = walk + (0.0 if noise.conserves else drift) + ROUNDING
         conserved = ("energy", "momentum")
         found = {name: lost * self.gains[name] + 4.0 * ROUNDING for name in conserved}
@@ -85,7 +85,7 @@ class Orbit:
 
 
 def orbit(scene: Scene) -> Orbit:
-    """Return samples of omega over two periods, and the factors of error bounds.
+    """Return samples of omega over two periods, and factors for error bounds.
 
     The scene must have moments and no torque.
     """
@@ -114,14 +114,14 @@ def floats(rows: Sequence[Sequence[Decimal]]) -> Array:
 
 
 def taylor_noise(body: Orbit, scene: Scene, step: float, order: int, left_out: float) -> Noise:
-    """Return bounds on the errors of a Taylor step (s), by running error analysis.
+    """Return bounds on the errors of a Taylor step of size `step` (s), by running error analysis.
 
     `left_out` is the relative truncation error.
     """
     a = np.abs(np.array(scene.euler_coefficients))
     terms, errors = _terms(body, scene, step, order), [np.abs(body.states)]
-    # Term k is a sum of k products of lower terms, with the errors of its factors and at most k + 3
-    # roundings. The sum of the terms rounds each of them three times.
+    # Term k is a sum of k products of lower terms, with the errors of their factors and at most
+    # k + 3 roundings. The sum of the terms rounds each term three times.
     for k in range(1, order + 1):
         size, carried = np.zeros((2, *body.states.shape))
         for j in range(k):
@@ -135,7 +135,7 @@ def taylor_noise(body: Orbit, scene: Scene, step: float, order: int, left_out: f
 
 
 def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
-    """Return bounds on rounding and truncation errors of a step (s) of Gauss collocation."""
+    """Return bounds on the errors of a Gauss collocation step of size `step` (s)."""
     from pyharness.checks.theory.tableau import tableau
 
     matrix = tableau("collocation", stages, "gauss").matrix
@@ -143,9 +143,9 @@ def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
     stiffness = float(np.abs(body.jacobians).sum(axis=2).max())
     spread = float(np.abs(matrix).sum(axis=1).max())
     eye = np.eye(3 * stages)
-    # With s stages and a step h, the sum that gives omega at a node has s + 3 roundings of the
-    # right-hand sides and one of omega. Its error is multiplied by the inverse of 1 - h A J, where
-    # A is the tableau's matrix and J the Jacobian.
+    # With s stages and step size h, the sum that gives omega at a node has s + 3 roundings of the
+    # right-hand sides and one of omega. Its error is multiplied by the inverse of 1 - h A J, with
+    # the tableau's matrix A and the Jacobian J.
     inverses = [np.linalg.inv(eye - step * np.kron(matrix, each)) for each in body.jacobians[::8]]
     resolvent = max(float(np.abs(each).sum(axis=1).max()) for each in inverses)
     state = body.largest
@@ -154,8 +154,8 @@ def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
     # The truncation error is the integral of the state-transition matrix times the residual, which
     # is zero at the nodes, the zeros of an orthogonal polynomial. Divide the integrand by this
     # polynomial. In the Taylor series of the quotient, powers of time below s contribute nothing;
-    # the power s is retained. By Leibniz's rule its coefficient is a sum over j of multiples of
-    # (h J)**j / j! times the Taylor term 2s + 1 - j of omega.
+    # only the power s is retained. By Leibniz's rule, its coefficient is a sum over j of multiples
+    # of (h J)**j / j! times the Taylor term 2s + 1 - j of omega.
     factor = math.factorial(stages) ** 4 / math.factorial(2 * stages) ** 2 / (2 * stages + 1)
     terms = [float(np.abs(each).max()) for each in _terms(body, scene, step, 2 * stages + 1)]
     left_out = factor * sum(
@@ -166,7 +166,7 @@ def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
 
 
 def _terms(body: Orbit, scene: Scene, step: float, order: int) -> list[Array]:
-    """Return the Taylor terms of omega, of shape (n, 3), from n states for a step in seconds."""
+    """Return the Taylor terms (rad/s), each of shape (n, 3), of a step (s) from n states."""
     a = np.array(scene.euler_coefficients)
     terms = [body.states]
     for k in range(1, order + 1):
@@ -180,9 +180,9 @@ def _terms(body: Orbit, scene: Scene, step: float, order: int) -> list[Array]:
 def errors(
     scene: Scene, body: Orbit, time: float, omega: Array, rounded: bool = True
 ) -> dict[str, float]:
-    """Return signed errors of energy and momentum (relative) and phase (rad).
+    """Return the signed errors of energy, momentum (both relative) and phase (rad).
 
-    If `rounded`, the exact solution uses rounded coefficients A, B, C.
+    If `rounded`, the exact solution has rounded coefficients A, B, C.
     """
     start = [Decimal(w) for w in scene.omega]
     found = [Decimal(float(w)) for w in omega]
@@ -199,7 +199,7 @@ def errors(
     error = np.array([float(x - y) for x, y in zip(found, truth, strict=True)])
     x, y, z = (float(w) for w in truth)
     slope = np.array(scene.euler_coefficients) * np.array([y * z, z * x, x * y])
-    late = float(error @ slope / (slope @ slope))  # s; positive if `omega` is ahead of `truth`
+    late = float(error @ slope / (slope @ slope))  # lead of `omega` over `truth`, s
     return {"energy": change(1), "momentum": 0.5 * change(2), "phase": body.frequency * late}
 
 
@@ -208,7 +208,7 @@ def root_mean_square(found: Array) -> Array:
 
 
 def exponent(steps: Sequence[float] | Array, found: Array) -> float:
-    """Return p in error ~ steps**p by least squares; column j of `found` has errors at steps[j]."""
+    """Return the fitted p in error ~ steps**p; column j of `found` has the errors at steps[j]."""
     size = np.log(np.maximum(root_mean_square(found), 1e-300))
     return float(np.polyfit(np.log(np.asarray(steps)), size, 1)[0])
 
@@ -225,7 +225,7 @@ def _frequency(a: Array, omega: Array) -> float:
 
 
 def _steepness(a: Array, omega: Array) -> float:
-    """Return the sum of magnitudes of the derivatives of `_frequency`."""
+    """Return the sum of the magnitudes of the derivatives of `_frequency` with respect to omega."""
     size = 1e-6 * float(np.abs(omega).max())
     return sum(
         abs(_frequency(a, omega + shift) - _frequency(a, omega - shift)) / (2.0 * size)

@@ -1,6 +1,6 @@
 """The collocation matrices (eq. 36 of the thesis), and the accuracy of LEQT1F's solutions.
 
-LEQT1F is the linear solver of the two-term and four-term programs. Exact solutions are fractions.
+LEQT1F is the linear solver of the two-term and four-term programs.
 """
 
 import math
@@ -31,13 +31,13 @@ HIGHAM = Basis(
     "Higham 2002, theorem 9.4, in exact fractions; the factors, and that no operation underflows "
     "or overflows, are checked (`theory/collocation_matrices.py`)",
 )
-"""Basis of the bounds in the ratios `residual`, `forward` and `increment` of `Solved`."""
+"""Basis of the bounds in `residual`, `forward` and `increment` of `Solved`."""
 PIVOTS = Basis(
     "derived",
     "choice of pivots by LEQT1F, and the step size at which its matrix is singular",
     "rounding errors of the candidates, to first order (`theory/collocation_matrices.py`)",
 )
-"""Basis of the field `pivoting` of `Solved`, and of limits that follow from it."""
+"""Basis of `pivoting` of `Solved`, and of limits that follow from it."""
 SINGULARITY = Basis(
     "derived",
     "number of steps for which LEQT1F reports IER = 129",
@@ -47,7 +47,7 @@ SINGULARITY = Basis(
 # Range of nonzero elements for which the solution of at most four equations neither underflows nor
 # overflows. A product of two elements is at least 2**-300, and after rounding a multiple of
 # 2**-352. In forward substitution every further product costs 202 binary digits, so that each
-# unknown is 0 or at least 2**-756; it is at most 2**600.
+# unknown is 0 or at least 2**-756, and at most 2**600.
 _RANGE = 2.0**-150, 2.0**150
 
 
@@ -69,35 +69,34 @@ def fractions(floats: ArrayLike) -> Fractions:
 
 
 def gamma(count: int) -> Fraction:
-    """Return n u / (1 - n u) with u = 2**-53, a bound for n roundings (Higham 2002, lemma 3.1)."""
+    """Return n u / (1 - n u), u = 2**-53, a bound for n = `count` roundings (Higham, lemma 3.1)."""
     return count * _UNIT / (1 - count * _UNIT)
 
 
 def norm(matrix: Fractions) -> Fraction:
-    """Return the row-sum norm, the largest sum of magnitudes in a row."""
     return Fraction(abs(matrix).sum(axis=1).max())
 
 
 def collocation_matrix(points: Sequence[Fraction]) -> Fractions:
-    """Return the matrix of derivatives of t, t**2, ..., t**n, one row per point (eq. 36)."""
+    """Return the derivatives of t, t**2, ..., t**n at n points, a row for each point (eq. 36)."""
     rows = [[(j + 1) * point**j for j in range(len(points))] for point in points]
     return np.array(rows, dtype=object)
 
 
 @dataclass(frozen=True)
 class Solved:
-    """LEQT1F's accuracy with one collocation matrix and six right-hand sides."""
+    """LEQT1F's accuracy with a collocation matrix A and six right-hand sides B."""
 
-    ier: int  # of the compiled solver: 0, or 129 for a singular matrix
-    differing: int  # elements of X, and IER, that differ between Fortran and Python
-    # Exact condition numbers in the row-sum norm: of the matrix, and with each column divided by
-    # its largest element.
+    ier: int  # error code of the compiled solver: 0, or 129 for a singular matrix
+    differing: int  # number of elements of X, and IER, that differ between Fortran and Python
+    # Exact condition numbers in the row-sum norm: of the matrix, and of the matrix with each column
+    # divided by its largest element.
     condition: float
     scaled_condition: float
-    # Norm of abs(L) abs(U) divided by the norm of the matrix, both after division of each column by
-    # the matrix's largest element in it.
+    # Norm of abs(L) abs(U) divided by the norm of the matrix, both with each column divided by the
+    # matrix's largest element in it.
     growth: float = math.nan
-    order: tuple[int, ...] = ()  # rows in the order of becoming pivots
+    order: tuple[int, ...] = ()  # rows in the order in which they become pivots
     # Relative difference of a pivot from the largest candidate: the largest that occurs, and the
     # largest that rounding can cause.
     pivoting: tuple[float, float] = (0.0, 0.0)
@@ -106,27 +105,26 @@ class Solved:
     residual: float = math.nan
     forward: float = math.nan
     increment: float = math.nan
-    # Error of the increment, divided by the step size times the largest element of the right-hand
-    # side.
+    # Error of the increment, divided by step size times the right-hand side's largest element.
     increment_error: float = math.nan
     yardstick: float = math.nan  # `forward` for `numpy.linalg.solve` instead of LEQT1F
 
 
 def points(program: str, step: float) -> list[float]:
-    """Return the collocation points (s), rounded as by a program's formulas."""
+    """Return the collocation points (s), rounded as in a program's formulas."""
     if program == "two-term":
         return [step / 3.0, 2.0 * step / 3.0]
     return [step * 0.2, step * 0.4, step * 0.6, step * 0.8]
 
 
 def solved(program: str, step: float) -> Solved:
-    """Return LEQT1F's accuracy for the collocation matrix of one step size (s)."""
+    """Return LEQT1F's accuracy for the collocation matrix of a step size (s)."""
     from pyharness.model.extension import extension
 
     matrix = collocation.collocation_matrix(points(program, step))
     count = len(matrix)
     places = np.arange(count)
-    # Three regular, three random.
+    # Three regular right-hand sides, three random ones.
     rough = np.random.default_rng(count).normal(size=(3, count))
     sides = np.array([np.ones(count), places / count, (-1.0) ** places, *rough])
     factors, found, ier = extension().solve_linear(*map(np.asfortranarray, (matrix, sides.T)))
@@ -142,11 +140,11 @@ def solved(program: str, step: float) -> Solved:
         return Solved(ier, differing, condition, scaled_condition)
     lower = fractions(np.tril(factors, -1) + np.eye(len(factors)))
     upper = fractions(np.triu(factors))
-    # A row of L U equals a row of the matrix except for rounding.
+    # Each row of L U equals a row of the matrix, except for rounding.
     order = tuple(int(abs(exact[:, 1] - row[1]).argmin()) for row in lower @ upper)
     sizes = abs(lower) @ abs(upper)
     growth = float(norm(sizes / columns) / norm(scaled))
-    # The bounds take `sizes` in the matrix's order of rows.
+    # The bounds need `sizes` in the matrix's order of rows.
     sizes = sizes[np.argsort(order)]
     powers = np.array([Fraction(step) ** k for k in range(1, count + 1)], dtype=object)
 
@@ -187,13 +185,13 @@ def solved(program: str, step: float) -> Solved:
 
 
 def _small_step(program: str) -> tuple[Fraction, Fractions]:
-    """Return a step (s) so small that each row's largest element is 1, and its matrix."""
+    """Return a step size (s) so small that each row's largest element is 1, and its matrix."""
     step = Fraction(1, 1000)
     return step, collocation_matrix([part * step for part in PARTS[program]])
 
 
 def solver_roundings(program: str) -> tuple[float, float]:
-    """Return bounds on the solver's rounding error, for equal rates and for deviations.
+    """Return bounds on the solver's rounding error for equal rates, and for deviations from these.
 
     Their unit is 2**-53 times step size times rate or deviation.
     """
@@ -202,33 +200,33 @@ def solver_roundings(program: str) -> tuple[float, float]:
     reach = abs(inverse(matrix))
     powers = np.array([step**k for k in range(1, count + 1)], dtype=object)
     # Higham 2002, theorem 9.4: 3n abs(powers) abs(inverse) abs(L) abs(U) abs(X), with the matrix's
-    # inverse and factors L and U, the solution X, and powers of the step size.
+    # inverse and factors L and U, the solution X, and the powers of the step size.
     factor_sizes = np.zeros_like(matrix)
     for j, (chosen, candidates, rows) in enumerate(_columns(matrix)):
         for i in candidates:
             factor_sizes[i] += abs(rows[i, j] / rows[chosen, j] * rows[chosen])
     sizes = reach @ factor_sizes
-    # With equal rates, only the coefficient of t is not zero. While each row's largest element is
-    # 1, the bounds are independent of the step size.
+    # With equal rates, only the coefficient of t is not zero. The bounds do not depend on the step
+    # size while each row's largest element is 1.
     constant, varying = powers @ sizes[:, 0], powers @ (sizes @ reach).sum(axis=1)
     return 3 * count * float(constant / step), 3 * count * float(varying / step)
 
 
 def singular_below(program: str, bits: int = 53) -> float:
-    """Return the largest step (s) for which LEQT1F, in `bits` bits, reports a singular matrix."""
+    """Return the largest step size (s) for which LEQT1F, in `bits` bits, reports singularity."""
     step, matrix = _small_step(program)
     count = len(matrix)
     *_, (chosen, candidates, _) = _columns(matrix)
     # With N rows, the computed sum N + p equals N if the scaled pivot p is at most half a unit in
-    # the last place of N, which is N 2**(1 - bits), as N is a power of 2; a tie is rounded to N.
-    # The last pivot, proportional to step**(N-1), is the first to be so small.
+    # the last place of N: this unit is N 2**(1 - bits), as N is a power of 2, and a tie is rounded
+    # to N. The last pivot, proportional to step**(N-1), is the first to be so small.
     last_pivot = candidates[chosen] / step ** (count - 1)
     half_unit = count * Fraction(1, 2**bits)
     return math.pow(half_unit / last_pivot, 1.0 / (count - 1))
 
 
 def declared_singular_below(program: str) -> float:
-    """Return the largest step (s) for which the compiled LEQT1F reports a singular matrix."""
+    """Return the largest step size (s) for which the compiled LEQT1F reports singularity."""
     from pyharness.model.extension import extension
 
     def singular(step: float) -> bool:
@@ -255,7 +253,7 @@ def _share(error: Fraction, bound: Fraction) -> float:
 
 def _pivoting(matrix: Fractions, order: Sequence[int], sizes: Fractions) -> tuple[float, float]:
     """Return the pivots' largest relative shortfall from the best candidates, and its bound."""
-    # Exact elimination in the solver's `order`; `sizes` is abs(L) abs(U).
+    # By exact elimination in the solver's `order`; `sizes` is abs(L) abs(U).
     shortfall, allowed = Fraction(0), Fraction(0)
     scale = 1 / abs(matrix).max(axis=1)
     for j, (chosen, candidates, _) in enumerate(_columns(matrix, order)):
@@ -270,9 +268,9 @@ def _pivoting(matrix: Fractions, order: Sequence[int], sizes: Fractions) -> tupl
 def _columns(
     matrix: Fractions, order: Sequence[int] | None = None
 ) -> Iterator[tuple[int, dict[int, Fraction], Fractions]]:
-    """Eliminate exactly; before each column, yield the pivot's row, scaled candidates, and rows."""
+    """Yield the pivot's row, scaled candidates and rows before each column of an elimination."""
     # A candidate is an element's magnitude divided by the largest in its row of `matrix`. `order`
-    # has the pivots' rows; by default the largest candidate is the pivot, as in LEQT1F.
+    # has the pivots' rows; without it the largest candidate is the pivot, as in LEQT1F.
     rows = matrix.copy()
     scale = 1 / abs(matrix).max(axis=1)
     left = list(range(len(rows)))

@@ -2,7 +2,7 @@
 
 The state-transition matrix Phi(t, s) of the linearised equations maps an error of omega at time s
 to the resulting error at time t. Under a torque that depends on omega or attitude, the Jacobian
-follows from the tape of recorded operations, and Phi includes the scene's attitude.
+follows from the torque's recorded operations, and Phi includes any attitude of the scene.
 """
 
 import math
@@ -29,13 +29,11 @@ from pyharness.model.trajectory import Array
 
 ROUNDING = 2.0**-53
 # Largest number of roundings in a right-hand side of Euler's equations: two in each of A, B, C, two
-# in the products, and the rest in the sums.
+# in the products, the rest in the sums.
 _ROUNDINGS = 8.0
-# Rounding error of an attitude (rad), twice the error of a quaternion's component, which has some
-# twenty roundings.
+# Rounding error of an attitude (rad): twice that from some twenty roundings of a quaternion.
 ATTITUDE = 40.0 * ROUNDING
-# Up to this amplification a method's error must be at most its tolerance; above it, the limit is
-# the amplified tolerance.
+# Error amplification above which a method's limit is the amplified tolerance.
 LIVELY = 1e3
 FLOW = Basis(
     "derived",
@@ -50,14 +48,14 @@ _Sample = TypeVar("_Sample")
 
 @dataclass(frozen=True)
 class Conditioning:
-    """The sensitivity of omega at the end of a motion to errors during it."""
+    """The sensitivity of omega at the end of a motion to earlier errors."""
 
-    # Largest factor, at least 1, from an error of omega at any time to the error at the end.
+    # Largest factor, at least 1, from an error of omega at any time to the final error.
     amplification: float
     # Final error, divided by `largest`, if every term of the right-hand side, the initial omega and
-    # the result are wrong by a few roundings, in the worst direction.
+    # the result have a few rounding errors in the worst direction.
     rounding: float
-    storing: float  # final error, divided by `largest`, from each step that rounds omega
+    storing: float  # final error, divided by `largest`, from one rounding of omega
     # Sum of the terms' rounding errors, divided by `largest`, without amplification.
     unamplified: float
     largest: float  # largest abs(omega) until the end (rad/s)
@@ -65,15 +63,15 @@ class Conditioning:
     def limit(self, made: float, steps: float = 0.0) -> float:
         """Return the allowed final error of omega, relative to `largest`.
 
-        `made` is the sum of step errors; `steps` counts uncompensated roundings.
+        `made` is the sum of the steps' errors; `steps` counts uncompensated roundings.
         """
         allowed = made * self.amplification + self.rounding + steps * self.storing
         # NaN allows no error.
         return 0.0 if math.isnan(allowed) else min(2.0, allowed)
 
     def angle_limit(self, made: float, time: float) -> float:
-        """Return an attitude's allowed error (rad) at `time` (s) from step errors of sum `made`."""
-        # Assume the largest rounding error of omega at all times.
+        """Return an attitude's allowed error (rad) at `time` (s), if steps' errors sum to `made`."""
+        # Assume that omega has its largest rounding error at all times.
         turned = self.rounding * (1.0 + math.sqrt(3.0) * self.largest * abs(time))
         return made + turned + ATTITUDE
 
@@ -81,9 +79,9 @@ class Conditioning:
 def conditioning(scene: Scene, time: float) -> Conditioning:
     """Return the sensitivity of omega at `time` (s) to earlier errors.
 
-    Raise InputError for an unbounded, too fast or too sensitive motion.
+    Raise InputError if the motion is unbounded, too fast or too sensitive.
     """
-    # Near the separatrix a numerical integration deviates after a few revolutions.
+    # Near the separatrix a numerical solution is wrong after a few revolutions.
     method = "closed-form" if closed_form(scene) else "taylor"
 
     def sample(times: Array) -> tuple[float, tuple[Array, bool]]:
@@ -103,7 +101,7 @@ def conditioning(scene: Scene, time: float) -> Conditioning:
 
 
 def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
-    """Return the final sensitivity along the solution `omega` (rad/s), shape (n, 3).
+    """Return the final sensitivity of the solution `omega` (rad/s), shape (n, 3).
 
     Its `times` (s) begin at 0 and are close together.
     """
@@ -116,7 +114,7 @@ def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
 def sampled(
     sample: Callable[[Array], tuple[float, _Sample]], time: float, fewest: int, most: int
 ) -> tuple[Array, _Sample]:
-    """Return equally spaced times (s) that suit the rate (1/s) from `sample`, and its results.
+    """Return equally spaced times (s), dense enough for the rate (1/s) of `sample`, and its results.
 
     There are `fewest` to `most` intervals.
     """
@@ -125,7 +123,7 @@ def sampled(
         times = np.linspace(0.0, time, count + 1)
         rate, found = sample(times)
         wanted = rate * abs(time) * _NODES_PER_RADIAN
-        # NaN where the torque is singular, or a product overflows.
+        # NaN if the torque is singular, or a product overflows.
         if not wanted <= most:
             raise InputError(
                 "conditioning: the motion is too fast for so long a time; use a shorter time"
@@ -136,25 +134,25 @@ def sampled(
 
 
 def of_flow(flow: Array, times: Array, state: Array, source: Array, largest: float) -> Conditioning:
-    """Return a final state's sensitivity; `flow` has the matrix from each time to the last.
+    """Return the final state's sensitivity to earlier errors.
 
-    `source` sums the magnitudes of the derivative's terms.
+    `flow`, shape (n, m, m), has the state-transition matrix from each time to the last; `source`,
+    shape (n, m), has the sums of magnitudes of the derivative's terms.
     """
-    # Shapes: `flow` (n, m, m), `state` and `source` (n, m).
     steps, sizes = np.diff(times), np.abs(flow)
 
     def gathered(made: Array) -> Array:
         arriving = (sizes @ made[:, :, None])[:, :, 0]
         return np.asarray((0.5 * (arriving[1:] + arriving[:-1]) * np.abs(steps)[:, None]).sum(0))
 
-    # The first and the last omega are rounded once, even in a very short time.
+    # The first and the last omega are rounded even in a very short time.
     ends = sizes[0] @ np.abs(state[0]) + np.abs(state[-1])
     span = abs(float(times[-1])) or 1.0
     unamplified = float((0.5 * (source[1:] + source[:-1]) * np.abs(steps)[:, None]).sum(0).max())
     found = Conditioning(
         amplification=growth(flow),
         rounding=_ROUNDINGS * ROUNDING * float((gathered(source) + ends).max()) / largest,
-        # The divisors' product might underflow.
+        # Divide twice, because `span` times `largest` might underflow.
         storing=ROUNDING * float(gathered(np.abs(state)).max()) / span / largest,
         unamplified=_ROUNDINGS * ROUNDING * (unamplified / largest + 2.0),
         largest=largest,
@@ -172,12 +170,12 @@ def magnitudes(scene: Scene, times: Array, omega: Array) -> Array:
     moments = np.array(scene.moments or (1.0, 1.0, 1.0))
     torque = np.abs(law.constant) + np.abs(law.rate) * np.abs(times)[:, None]
     for amplitude, frequency in law.sines + law.cosines:
-        # The factor allows for the rounding error of the angle.
+        # The added term allows for the rounding error of the angle.
         torque = torque + np.abs(amplitude) * (1.0 + np.abs(frequency * times))[:, None]
     return np.asarray(products + torque / moments)
 
 
-# An error of a quaternion's component is half the error of the angle (rad).
+# Error of a quaternion's component, divided by the error of the angle (rad).
 _OF_ANGLE = 0.5
 
 
@@ -185,7 +183,7 @@ def conditioning_at(scene: Scene, times: Sequence[float]) -> Conditioning:
     """Return the sensitivity of a scene's solution at `times` (s), or raise InputError."""
     if not isinstance(scene.torque, StateTorque):
         return conditioning(scene, times[-1])
-    # Damping may reduce errors, so the largest sensitivity at any of the times counts.
+    # Because damping may reduce errors, the largest sensitivity at any of the times counts.
     each = [astuple(_of_state(scene, time)) for time in times]
     return Conditioning(*map(max, zip(*each, strict=True)))
 
@@ -212,7 +210,7 @@ def _of_state(scene: Scene, time: float) -> Conditioning:
 
 
 def _path(scene: Scene, times: Array) -> Array:
-    """Return omega and any attitude, one row for each of `times` (s), which begin at 0."""
+    """Return rows of omega (rad/s) and any attitude at `times` (s), which begin at 0."""
     if times[-1] == 0.0:
         return np.tile([*scene.omega, *(scene.attitude or ())], (len(times), 1))
     attitude = scene.attitude is not None
@@ -226,18 +224,19 @@ def _path(scene: Scene, times: Array) -> Array:
 
 
 def _sources(tape: Tape, times: Array, state: Array) -> Array:
-    """Return bounds on the equations' rounding errors (1/s), divided by the unit roundoff."""
-    # Each operation adds the rounding error of its result or, for a sum, of its terms' magnitudes.
+    """Return bounds on the rounding errors of the derivatives, divided by the unit roundoff."""
+    # Each operation adds an error in proportion to its result or, for a sum, to the sum of its
+    # terms' magnitudes.
     given = [_Bounded(each, np.zeros(len(times))) for each in inputs_of(times, state)]
     with np.errstate(all="ignore"):
         found = evaluate(tape, given, _BOUNDS)
-    # An output that is constant is a plain number.
+    # A constant output is a plain number.
     errors = [_bounded(each).error for each in found]
     return np.stack([np.broadcast_to(each, len(times)) for each in errors], axis=1)
 
 
 class _Bounded:
-    """Values, and bounds on their rounding errors divided by the unit roundoff."""
+    """Values, and bounds on their rounding errors, divided by the unit roundoff."""
 
     def __init__(self, value: Any, error: Any) -> None:
         self.value, self.error = value, error

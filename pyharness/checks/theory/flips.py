@@ -8,8 +8,7 @@ from numpy.typing import ArrayLike
 
 from pyharness.model.trajectory import Array
 
-# Enough iterations of the arithmetic-geometric mean for ratios of 1e-300. Each iteration halves the
-# logarithm of the ratio, and doubles the number of equal digits once the two numbers are close.
+# Enough iterations of the arithmetic-geometric mean for two numbers with a ratio of 1e-300.
 _LEVELS = 16
 # Relative difference below which, in binary64, the arithmetic mean equals the arithmetic-geometric
 # mean.
@@ -26,7 +25,7 @@ def flip_times(moments: ArrayLike, omega0: ArrayLike) -> Array:
     i1, i2, i3 = np.take_along_axis(bodies, order, axis=1).T
     w1, w2, w3 = np.abs(np.take_along_axis(omega, order, axis=1)).T
     s1, s2, s3 = (i3 - i2) / i1, (i3 - i1) / i2, (i2 - i1) / i3
-    # Omega circles the axis, 1 or 3, with the larger rate. If the rates are equal, the motion is on
+    # Omega encircles axis 1 or 3, whichever has the larger rate. With equal rates the motion is on
     # the separatrix and never returns.
     about1, about3 = np.sqrt(s2 * s3) * w1, np.sqrt(s1 * s2) * w3
     upper = np.hypot(np.sqrt(s1 * s3) * w2, np.maximum(about1, about3))
@@ -40,7 +39,7 @@ def flip_times(moments: ArrayLike, omega0: ArrayLike) -> Array:
 def mean(upper: Array, lower: Array) -> Array:
     """Return the arithmetic-geometric mean of each pair of non-negative numbers."""
     for _ in range(_LEVELS):
-        # A pair keeps its bits while others converge.
+        # Leave a converged pair unchanged, so that its result does not depend on the others.
         left = ~(np.abs(upper - lower) <= _NEAR * upper)
         if not left.any():
             break

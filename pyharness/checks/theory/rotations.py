@@ -1,8 +1,8 @@
 """Steady rotations under constant torque, and their linear stability.
 
 Grammel's method, equation 32 of the thesis (III.4.a), adds to a steady rotation (a, b, c) a small
-perturbation proportional to exp(Q t). With the coefficients A, B, C of Euler's equations and M,
-torque over moment, (a, b, c) is steady if A bc = -M1, B ca = -M2, C ab = -M3. The rates Q (1/s) are
+perturbation proportional to exp(Q t). With Euler's coefficients A, B, C and the torque divided by
+the moments, M, a rotation is steady if A bc = -M1, B ca = -M2, C ab = -M3. The rates Q (1/s) are
 the roots of Q**3 - (BC a**2 + CA b**2 + AB c**2) Q - 2 ABC abc = 0.
 
 `share` is the initial perturbation divided by the rotation. Of a continuous family, only some
@@ -28,27 +28,27 @@ _OVERFLOWS = (
     "rotations: a steady rotation or its rates overflow; use a smaller omega or torque, or moments "
     "nearer to each other"
 )
-# Shown points of a hyperbola of steady rotations: ratios of a component of omega to its value at
+# Points shown on a hyperbola of steady rotations: ratios of a component of omega to its value at
 # the vertex.
 _ALONG = (0.25, 0.5, 1.0, 2.0, 4.0)
 _SHOWN = "shown, of one branch, the vertex and points of 1/4, 1/2, 2 and 4 times its"
-# Error at which the linear approximation counts as invalid: relative to the perturbation, or a
-# phase (rad).
+# Error at which the linear approximation becomes invalid: relative to the perturbation, or a phase
+# (rad).
 OFF = 0.1
 
 
 @dataclass(frozen=True)
 class SteadyRotation:
-    """A steady rotation, and the development of a small perturbation."""
+    """A steady rotation, and how a small perturbation of it develops."""
 
     place: str  # an axis, a point of a hyperbola, ...
     omega: Triple  # rad/s
     rates: Rates  # Q of equation 32 (1/s), the fastest growth first
     # True if no small perturbation grows, neither like exp(Q t) nor, if all Q are 0, like t.
     stable: bool
-    # Shortest time (s) between flips of the perturbed motion; None without flips.
+    # Shortest time (s) between flips of the perturbed motion, or None without flips.
     flip_interval: float | None
-    # Earliest time (s) at which the linear approximation has the error `OFF`, if known.
+    # Earliest time (s) at which the linear approximation has the error `OFF`, or None if unknown.
     linear_until: float | None
 
     @property
@@ -67,12 +67,12 @@ class SteadyRotation:
 @dataclass(frozen=True)
 class SteadyRotations:
     told: str  # text: which steady rotations exist, and which are shown
-    disturbance: float  # perturbation divided by the rotation
+    disturbance: float  # initial perturbation divided by the rotation
     rotations: tuple[SteadyRotation, ...]
 
 
 def steady_rotations(scene: Scene, disturbance: float) -> SteadyRotations:
-    """Return a scene's steady rotations; `disturbance` is the relative perturbation."""
+    """Return a scene's steady rotations under the relative perturbation `disturbance`."""
     if scene.body_torque.varies:
         raise InputError(
             "rotations: the torque varies with time, so that no rotation is steady; "
@@ -132,7 +132,7 @@ def _rotation(scene: Scene, place: str, omega: Triple, disturbance: float) -> St
     found = rates(scene.euler_coefficients, omega)
     if not np.isfinite([*matrix.flat, *found]).all():
         raise InputError(_OVERFLOWS)
-    # The rates have the sum 0. If all are 0, but not the Jacobian, a perturbation grows like t.
+    # The sum of the rates is 0. If all are 0 but the Jacobian is not, a perturbation grows like t.
     stable = found[0].real <= 0.0 and (any(found) or not matrix.any())
     flips: float | None = None
     until: float | None = None
@@ -152,7 +152,7 @@ def _rotation(scene: Scene, place: str, omega: Triple, disturbance: float) -> St
 def _growing(
     scene: Scene, omega: Triple, rate: complex, matrix: Array, share: float
 ) -> float | None:
-    """Return the time (s) when second-order terms reach a tenth of a growing perturbation."""
+    """Return the time (s) at which second-order terms reach a tenth of a growing perturbation."""
     # The eigenvector of `rate`, the complex rate (1/s) of fastest growth; `matrix` is the Jacobian.
     grows = np.linalg.svd(matrix - rate * np.eye(3))[2][-1].conj()
     second = 0.0
@@ -170,11 +170,10 @@ def _growing(
 
 
 def _phase(coefficients: Sequence[float], rate: float, share: float) -> float | None:
-    """Return the time (s) when the phase error about a stable axis reaches 0.1 rad."""
+    """Return the time (s) at which the phase error about a stable axis reaches 0.1 rad."""
     # `coefficients` are in cyclic order from the axis; `rate` is the frequency (rad/s) by linear
     # theory. A tilt by `share` (rad) towards another axis changes the frequency by the fraction
-    # `share`**2 / 4 times the first coefficient divided by the coefficient of
-    # the other axis.
+    # `share`**2 / 4 times the ratio of the first coefficient to the other axis's.
     spun, *others = map(abs, coefficients)
     if spun != 0.0 and rate == 0.0:
         return None  # only the spin drifts
@@ -192,9 +191,9 @@ def _flip_interval(coefficients: Sequence[float], spin: float, share: float) -> 
     # Flips are most frequent for a perturbation along the axis with the smaller coefficient.
     tilt = share / math.sqrt(min(abs(second), abs(third)))
     high, low = scale * math.hypot(tilt, 1.0 / math.sqrt(abs(first))), scale * tilt
-    # The time is 2 K / lambda, near (2 / lambda) ln(4 / k') for a small k'. K is the complete
-    # elliptic integral with complementary modulus k', pi / 2 over the arithmetic-geometric mean of
-    # 1 and k'; lambda is near the growth rate.
+    # The time is 2 K / lambda, where lambda is near the growth rate, and the complete elliptic
+    # integral K is pi / 2 divided by the arithmetic-geometric mean of 1 and the complementary
+    # modulus.
     while high - low > 4.0 * ROUNDING * high:
         high, low = 0.5 * (high + low), math.sqrt(high) * math.sqrt(low)
     return math.pi / high / spin
@@ -240,8 +239,8 @@ def _axes(coefficients: Triple, spin: float) -> tuple[str, Places]:
 
 
 def _hyperbola(coefficients: Triple, product: float, held: int) -> tuple[str, Places]:
-    """Return a text on one branch and its points, for a torque about the axis `held` (from 0)."""
-    # `product` is the product of the other two components (rad2/s2). The other branch is opposite.
+    """Return a text and points of a branch, for a torque about the axis `held` (from 0)."""
+    # `product` is that of the other two components of omega (rad2/s2).
     one, other = (held + 1) % 3, (held + 2) % 3
     told = (
         f"torque about axis {held + 1}: the hyperbola w{one + 1} w{other + 1} = {product:.6g}, "
@@ -265,7 +264,7 @@ def _three(components: dict[int, float]) -> Triple:
 
 
 def _across(products: Sequence[float], axis: int) -> tuple[str, Places]:
-    """Return a text on one branch and its points, for a torque across the axis of symmetry."""
+    """Return a text and points of a branch, for a torque across the axis of symmetry."""
     one, other = (axis + 1) % 3, (axis + 2) % 3
     # w_one w_axis and w_other w_axis.
     across = products[other], products[one]

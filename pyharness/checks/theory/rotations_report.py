@@ -1,7 +1,4 @@
-"""The report of the command `rotations`, with a picture of polhodes and growth rates.
-
-Polhodes are drawn as directions of the angular momentum.
-"""
+"""The report of the command `rotations`, with a picture of polhodes and growth rates."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -113,8 +110,8 @@ def _record(each: SteadyRotation) -> dict[str, Any]:
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Direction to the viewer, as components along the axes of the smallest, middle and largest moment;
-# the axis of the smallest points upwards.
+# Direction to the viewer: components along the axes of the smallest, which points upwards, middle
+# and largest moment.
 _VIEW = np.array([0.36, 0.72, 0.60])
 _GRID = 101
 _HIDDEN = 0.22  # opacity of curves behind the sphere
@@ -122,13 +119,13 @@ _SEPARATRIX: dict[str, Any] = {"color": "#c02020", "linewidth": 1.8}
 _POLHODE: dict[str, Any] = {"color": "#1040a0", "linewidth": 0.9}
 _MIDDLES = {(0.72, -0.36): 2, (-0.5, 0.5): 2, (0.7, 0.3): 1, (-0.7, -0.3): 1, (0.3, 0.7): 3,
             (-0.3, -0.7): 3}  # fmt: skip
-# Largest angle of each curve from the axis that it encircles (rad); 90 degrees on the separatrix.
+# Largest angle (rad) of each curve from the axis that it encircles; 90 degrees on the separatrix.
 _ANGLES = tuple(math.radians(degrees) for degrees in (18.0, 36.0, 54.0, 72.0))
 _POINTS = 181
 
 
 def rotations_picture(scene: Scene) -> Picture:
-    """Return the picture of a scene's polhodes, and of growth rates about all bodies' middle axes.
+    """Return a picture of a scene's polhodes, and of growth rates about all bodies' middle axes.
 
     The scene must have moments.
     """
@@ -186,7 +183,7 @@ def _square(axes: "Axes", scene: Scene) -> list[list[Any]]:
     growth = growth_of_bodies(first, third)
     shades = axes.contourf(first, third, growth, levels=np.linspace(0.0, 1.0, 11), cmap="Blues")
     axes.figure.colorbar(shades, ax=axes, label="Re Q / spin", shrink=0.85)
-    # On these lines two moments are equal.
+    # Lines on which two moments are equal.
     for ends in (([0, 0], [-1, 1]), ([-1, 1], [0, 0]), ([-1, 1], [-1, 1])):
         axes.plot(*ends, color="#505050", linewidth=0.8)
     for place, middle in _MIDDLES.items():
@@ -220,7 +217,7 @@ def _square(axes: "Axes", scene: Scene) -> list[list[Any]]:
 
 
 def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
-    """Yield name and points, shape (n, 3), of torque-free curves of L / abs(L).
+    """Yield names and points, shape (n, 3), of torque-free curves of L / abs(L).
 
     L is the angular momentum in body axes.
     """
@@ -242,8 +239,7 @@ def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
                 curve = np.outer(to_middle, unit[middle]) + np.outer(to_far, unit[far])
                 name = f"around axis {'+' if sign > 0.0 else '-'}{axis + 1}"
                 yield name, curve + np.outer(sign * up, unit[axis])
-    # Angle of the separatrix from the axis of the largest 1 / I. If axis 2 is the middle one, the
-    # planes are L3 / L1 = +- sqrt((j1 - j2) / (j2 - j3)).
+    # Angle of the separatrix's planes from the axis of the largest 1 / I.
     tilt = math.atan2(math.sqrt(j[high] - j[middle]), math.sqrt(j[middle] - j[low]))
     for sign in (1.0, -1.0):
         across = math.cos(tilt) * unit[high] + sign * math.sin(tilt) * unit[low]
@@ -251,7 +247,7 @@ def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
 
 
 def growth_of_bodies(first: Array, third: Array) -> Array:
-    """Return the growth rate about each middle axis, divided by the spin.
+    """Return the growth rate about each body's middle axis, divided by the spin.
 
     `first` and `third` are Euler's coefficients A and -C.
     """

@@ -17,7 +17,7 @@ from pyharness.checks.theory.collocation_matrices import PARTS, collocation_matr
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 
-# Powers 0 to TERMS - 1 of the step size.
+# Number of powers of the step size, from 0.
 TERMS = 24
 
 
@@ -25,14 +25,14 @@ class Numbers:
     """Euler's equations for numbers; omega (rad/s) has the shape (..., 3)."""
 
     def __init__(self, scene: Scene, step: float = 1.0, sizes: bool = False) -> None:
-        """Store step size (s), and coefficients and torque, as absolute values if `sizes`."""
+        """Store step size (s), coefficients and torque, the last two as magnitudes if `sizes`."""
         self._step = step
         size = np.abs if sizes else np.positive
         self._coefficients = size(np.array(scene.euler_coefficients))
         self._torque = size(np.array(scene.normalized_torque(0.0)))
 
     def rate(self, omega: Array) -> Array:
-        """Return the right-hand sides (rad/s2)."""
+        """Return the right-hand sides (rad/s2) at `omega`."""
         turned, onward = np.roll(omega, -1, axis=-1), np.roll(omega, -2, axis=-1)
         return np.asarray(self._torque + self._coefficients * turned * onward)
 
@@ -76,19 +76,19 @@ class FixedStep:
     name: str
     order: int  # order of the global error
     scheme: Scheme  # ``scheme(arithmetic, omega)`` returns omega after a step
-    # Bound of the rounding error of a step's last additions, in units of 2**-53 times omega.
+    # Bound on the rounding error of a step's last additions, in units of 2**-53 times omega.
     roundings: float = 1.0
 
 
 def constant(omega: Array) -> Array:
-    """Return a constant, shape (..., 3), as a power series, shape (TERMS, ..., 3)."""
+    """Return a constant omega, shape (..., 3), as a power series, shape (TERMS, ..., 3)."""
     result = np.zeros((TERMS, *omega.shape))
     result[0] = omega
     return result
 
 
 def collocation(program: str) -> Scheme:
-    """Return the scheme of a collocation program, an estimate and one correction."""
+    """Return the scheme of a collocation program: an estimate and one correction."""
     parts = PARTS[program]
     weights = inverse(collocation_matrix(parts)).sum(axis=0).astype(float)
 
@@ -103,7 +103,7 @@ def collocation(program: str) -> Scheme:
 
 
 def collocation_singular(program: str) -> Scheme:
-    """Return the scheme of a collocation program whose matrix is reported as singular.
+    """Return a collocation program's scheme if LEQT1F reports a singular matrix.
 
     LEQT1F then returns the right-hand sides as solutions.
     """
@@ -129,7 +129,7 @@ def collocation_singular(program: str) -> Scheme:
 
 
 def runge_kutta_4(on: Numbers, omega: Array, punched: bool = False) -> Array:
-    """Return omega after a step of classical Runge-Kutta (eq. 31).
+    """Return omega after a classical Runge-Kutta step (eq. 31).
 
     If `punched`, it is the first step of the original program.
     """
@@ -146,15 +146,14 @@ runge_kutta_punched = partial(runge_kutta_4, punched=True)
 
 
 def improved_euler(on: Numbers, omega: Array) -> Array:
-    """Return omega after a step of the improved Euler method (eq. 29)."""
     first = on.times_step(on.rate(omega))
     return np.asarray(omega + 0.5 * (first + on.times_step(on.rate(omega + first))))
 
 
 def taylor_3(on: Numbers, omega: Array) -> Array:
-    """Return omega after a step of the Taylor method with three terms (eq. 30)."""
+    """Return omega after a Taylor step with three terms (eq. 30)."""
     rate = on.rate(omega)
-    # The derivative of the right-hand side along itself; exact, because it is quadratic.
+    # Derivative of the right-hand side along itself, exact because the right-hand side is quadratic.
     along = 0.5 * (on.rate(omega + rate) - on.rate(omega - rate))
     return omega + on.times_step(rate + 0.5 * on.times_step(along))
 
@@ -191,13 +190,13 @@ SCHEMES = {
 
 
 def local_error(scheme: Scheme, scene: Scene, omega: Array) -> Array:
-    """Return truncation errors of a step from n omegas (rad/s), as series, shape (TERMS, n, 3)."""
+    """Return truncation errors of a step from n omegas (rad/s), a series of shape (TERMS, n, 3)."""
     on = Series(scene)
     return scheme(on, constant(omega)) - on.solution(omega)
 
 
 def spacing(count: int) -> Sequence[Fraction]:
-    """Return weights of a central difference for f'(0), exact up to degree 2 `count`.
+    """Return weights of a central difference for f'(0), exact for polynomials of degree 2 `count`.
 
     Weight i, from 1, multiplies f(i) - f(-i).
     """

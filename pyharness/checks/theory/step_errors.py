@@ -1,4 +1,4 @@
-"""Predicted truncation and rounding errors of fixed steps at the end of a scene.
+"""Predicted truncation and rounding errors at the end of a run with fixed steps.
 
 The state-transition matrix propagates the steps' errors to the end. Truncation errors come from
 `schemes`.
@@ -19,10 +19,10 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 
 _FEWEST_NODES, _MOST_NODES = 200, 20_000
-# Independent rounding errors of steps add up like the square root of their number. The mean
-# rounding error is assumed to be a third of the largest.
+# Mean rounding error of a step, as an assumed fraction of the largest. Independent errors add up
+# like the square root of their number.
 _MEAN_ROUNDING = 1.0 / 3.0
-# Largest accepted ratio of a power series' last term to its sum.
+# Largest accepted ratio of the last term of a power series to its sum.
 _CONVERGED = 1e-3
 FORECAST = Basis(
     "derived",
@@ -30,28 +30,28 @@ FORECAST = Basis(
     "twice the propagated local errors, whose power series is truncated, and rounding errors "
     "(`theory/step_errors.py`)",
 )
-"""Basis of the field `bound` of a `Forecast`."""
+"""Basis of `bound` of a `Forecast`."""
 
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """A scene's solution, with its sensitivity to perturbations at earlier times."""
+    """A scene's solution, with the sensitivity of its end to earlier perturbations."""
 
     scene: Scene  # with constant torque
     times: Array  # shape (n,), s: from 0 to the end
     omega: Array  # shape (n, 3), rad/s
-    propagators: Array  # shape (n, 3, 3); matrices from each time to the end
+    propagators: Array  # shape (n, 3, 3): state-transition matrices from each time to the end
     flow: Conditioning  # sensitivity of omega at the end
     turned: float  # integral over time of the Jacobian's row-sum norm
     fastest: float  # largest row-sum norm of the Jacobian (1/s)
 
     @property
     def norms(self) -> Array:
-        """The row-sum norms of the matrices, shape (n,)."""
+        """The row-sum norms of `propagators`, shape (n,)."""
         return np.asarray(np.abs(self.propagators).sum(axis=2).max(axis=1))
 
     def over_time(self, values: Array) -> Array:
-        """Return the integral over time (s) of `values`, one for each time."""
+        """Return the integral over time (s) of `values`, which has a row for each time."""
         return np.asarray(np.trapezoid(values, self.times, axis=0))
 
 
@@ -59,10 +59,10 @@ class Path:
 class Forecast:
     """Predicted final errors of a fixed-step run, relative to the largest omega."""
 
-    truncation: float  # expected truncation error, the largest of any component
-    # Bound of truncation and rounding together; infinite for too large steps.
+    truncation: float  # expected truncation error, largest of the components
+    # Bound on the sum of truncation and rounding error, infinite for too large steps.
     bound: float
-    rounding: float  # bound of the rounding error
+    rounding: float  # bound on the rounding error
     wandering: float  # expected rounding error if the steps' errors are independent
 
 
@@ -86,8 +86,8 @@ class Forecaster:
         self._path = along
         self.method = SCHEMES[method]
         self._missed = cache(self._series)
-        # Mean relative final error from the rounding of one step. A component that never changes
-        # has none.
+        # Mean relative final error from the rounding of one step. Components that never change have
+        # no rounding error.
         changes = (self._rates() != 0.0).any(axis=0)
         carried = along.propagators * (along.omega * changes)[:, None, :]
         squares = along.over_time(np.square(carried).sum(axis=2)) / float(along.times[-1])
@@ -107,8 +107,8 @@ class Forecaster:
         worst = float(here.over_time(here.norms * np.abs(local).max(axis=1))) / h / largest
         last = float(np.abs(terms[-1]).max())
         known = last <= _CONVERGED * float(np.abs(local).max())
-        # Later steps start off the exact solution, where errors and amplification are larger; the
-        # bound allows for twice as large ones.
+        # Later steps do not start on the exact solution, so that errors and amplification may be
+        # larger; the bound allows for a factor of 2.
         off = 2.0 * worst * (here.turned + 2.0 * (order + 2))
         if not (known and off <= math.log(2.0)):
             worst = math.inf
@@ -118,7 +118,7 @@ class Forecaster:
             rates = self._rates()
             constant, varying = solver_roundings(self.method.name)
             travelled = float(here.over_time(norms * np.abs(rates).max(axis=1))) / largest
-            # Relative change of the right-hand sides in a step, at most.
+            # Bound on the relative change of the right-hand sides in a step.
             differing = min(1.0, h * here.fastest)
             rounding += ROUNDING * travelled * (constant + varying * differing)
         wandering = self._wandering * math.sqrt(steps)
@@ -145,6 +145,6 @@ class Forecaster:
         if singular:
             scheme, order = collocation_singular(self.method.name), 1
         missed = local_error(scheme, self._path.scene, self._path.omega)
-        # By the order of the scheme these terms are zero, except for rounding.
+        # By the scheme's order, these terms are zero except for rounding.
         missed[: order + 1] = 0.0
         return missed

@@ -1,4 +1,4 @@
-"""Weighted residual methods as Runge-Kutta tableaux, for any step size.
+"""Weighted residual methods as Runge-Kutta tableaux.
 
 The methods are collocation, subdomain, Galerkin and least squares, with the trial function omega(0)
 + c1 t + ... + cn t**n. Its derivative is a projection of the right-hand side f along the step on
@@ -18,13 +18,13 @@ from pyharness.model.trajectory import Array
 
 @dataclass(frozen=True, eq=False)
 class Tableau:
-    """One correction of a step on the unit interval, as a Runge-Kutta tableau."""
+    """One correction of a step as a Runge-Kutta tableau."""
 
-    # Shape (m,), in units of the step size h: where f is evaluated, the collocation points or the
-    # quadrature nodes of the weighted integrals.
+    # Shape (m,), in units of the step size h: the points at which f is evaluated (collocation
+    # points, or quadrature nodes of the weighted integrals).
     nodes: Array
-    matrix: Array  # shape (m, m); next estimate at the nodes: omega(0) + h matrix f
-    weights: Array  # shape (m,); result of the step: omega(0) + h weights f
+    matrix: Array  # shape (m, m); the next estimate at the nodes is omega(0) + h matrix f
+    weights: Array  # shape (m,); the result of the step is omega(0) + h weights f
 
 
 @cache
@@ -36,7 +36,7 @@ def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None =
     """
     # Products of two omegas have degree 2n, and the weight functions n (Galerkin), n - 1 (least
     # squares) or 0 (subdomain). The quadrature is exact under constant torque; under other torques,
-    # its error is of order 2n + 1 or higher, above the method's.
+    # its error has the order 2n + 1 or higher, above the method's order.
     n = terms
     if weighting == "collocation":
         nodes = grid(points, n)
@@ -49,15 +49,15 @@ def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None =
     else:
         degree = 3 * n if weighting == "galerkin" else 3 * n - 1
         nodes, quadrature = _gauss(degree // 2 + 1)
-        # These tests span the same space as the weight functions t ... t**n (Galerkin) or
+        # `tests` span the same space as the weight functions t ... t**n (Galerkin) or
         # 1 ... t**(n-1) (least squares).
         tests = basis(nodes, n)
         if weighting == "galerkin":
             tests = tests * nodes[:, None]
     weighted = fractions((tests * quadrature[:, None]).T)
-    # In floats the tableau would depend on the LAPACK in use.
+    # In fractions, because in floats the tableau would depend on the installed LAPACK.
     projection = inverse(weighted @ fractions(basis(nodes, n))) @ weighted
-    # Integrals of `basis` from 0 to the nodes.
+    # Integrals of the `basis` polynomials from 0 to the nodes.
     antiderivatives = legendre.legint(np.eye(n), lbnd=-1.0, scl=0.5)
     integrals = legendre.legval(2.0 * nodes - 1.0, antiderivatives).T
     matrix = fractions(integrals) @ projection
@@ -65,7 +65,7 @@ def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None =
 
 
 def grid(points: str | tuple[float, ...] | None, n: int) -> Array:
-    """Return n collocation points in units of the step, by default those of the thesis."""
+    """Return n collocation points in units of the step size, by default those of the thesis."""
     if points == "gauss":
         return _gauss(n)[0]
     if points is None or points == "thesis":
@@ -77,7 +77,7 @@ def _gauss(m: int) -> tuple[Array, Array]:
     """Return m Gauss-Legendre nodes and weights on the unit interval."""
     nodes, weights = [], []
     for near in legendre.leggauss(m)[0].tolist():
-        # leggauss computes the nodes as eigenvalues; one Newton step removes their error.
+        # One Newton step removes the error of the nodes, which leggauss computes as eigenvalues.
         value, slope = _legendre(m, Fraction(near))
         x = (Fraction(near) - value / slope).limit_denominator(10**36)
         _, slope = _legendre(m, x)
@@ -95,5 +95,5 @@ def _legendre(m: int, x: Fraction) -> tuple[Fraction, Fraction]:
 
 
 def basis(s: Array, n: int) -> Array:
-    """Return Legendre polynomials 0 to n - 1, shifted to [0, 1], at m points, shape (m, n)."""
+    """Return Legendre polynomials 0 to n - 1 on [0, 1] at m points `s`, shape (m, n)."""
     return np.asarray(legendre.legvander(2.0 * s - 1.0, n - 1), dtype=float)

@@ -47,7 +47,7 @@ from pyharness.truth.free_attitude import free_attitude, period_of
 _unknown = partial(unknown_flow, 1.0)
 _SERIES = ("taylor", "dop853")
 _TOLERANCES = {"taylor": (1e-12, MIDDLING), "dop853": (MIDDLING,)}
-# Each of three angles in degrees is rounded when formed, converted and read.
+# Rounding errors (rad) of three angles, which are formed, converted to degrees and read.
 _ANGLES = 64.0 * ROUNDING
 _OPERATIONS = Basis(
     "derived",
@@ -59,7 +59,7 @@ _BODIES = 8
 
 @dataclass(frozen=True)
 class Turn:
-    """A rotation of a scene about body or space axes, and its inverse for quaternions (n, 4)."""
+    """A rotation of a scene's body or space axes, and its inverse for quaternions, shape (n, 4)."""
 
     scene: Callable[[Scene], Scene]
     back: Callable[[Array], Array]
@@ -96,10 +96,9 @@ def _allowed(method: str, tolerance: float, flow: Conditioning, time: float) -> 
 
 
 POLICY = Policy(_limit, FLOW, refusable)
-"""Policy whose limit is rounding for closed forms, else tolerance plus rounding.
+"""Policy whose limit is rounding for closed forms, else tolerance plus amplified rounding.
 
-The flow amplifies the rounding errors of the other methods and, if its amplification exceeds a
-thousand, their tolerance.
+The tolerance is amplified too if the error amplification exceeds a thousand.
 """
 
 
@@ -143,7 +142,7 @@ def _attempts() -> Iterator[Attempt]:
 def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterator[Check]:
     scene, truth = scene_of(name), known()
     tried = by_rows(name.subject, tolerance, scene, [truth.end])
-    # Quaternions are compared with their signs, which are continuous in time.
+    # The signs of quaternions count, because they are continuous in time.
     yield judge(name.with_quantity("angle"), tried, truth, POLICY)
     answer = tried.answer
     if answer.attitude is None:
@@ -151,8 +150,8 @@ def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterato
     off = abs(float(np.linalg.norm(answer.attitude)) - 1.0)
     yield name.with_quantity("length").bounded(off, 8.0 * ROUNDING, _OPERATIONS)
     if name.subject in FORMS:
-        # The direction of the angular momentum changes by at most the error of the angle. The
-        # moments multiply omega, which has 16 rounding errors; the rotation takes two products.
+        # The angular momentum in space has the attitude's error, and that of omega (16 rounding
+        # errors) times the moments.
         moments = np.array(scene.moments)
         momentum = moments * scene.omega
         largest = max(scene.moments or (1.0,)) * max(map(abs, scene.omega))
@@ -166,9 +165,8 @@ def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterato
 def _montgomery(name: Name) -> Check:
     """Return the check of a body's rotation in a period against Montgomery's formula."""
     # The angle about the angular momentum L in a period T is 2 E T/L, with the energy E, minus the
-    # solid angle that the direction of L encloses in the body, about the axis along which its
-    # component keeps its sign. No other check detects a wrong rate of this angle, which is not
-    # conserved.
+    # solid angle that the direction of L encloses in the body. No other check detects a wrong rate
+    # of this angle, because it is not conserved.
     scene = scene_of(name)
     period = float(period_of(scene) or 0.0)
     momentum = np.array(scene.moments) * scene.omega
@@ -188,7 +186,7 @@ def _montgomery(name: Name) -> Check:
 
 
 def _solid_angle(scene: Scene, period: float) -> float:
-    """Return the solid angle that the angular momentum encloses in the body in a `period` (s)."""
+    """Return the solid angle that L's direction encloses in the body in a `period` (s)."""
     moments = np.array(scene.moments)
     before, count, rows = math.inf, 32, np.empty((0, 3))
     while True:  # the trapezoidal rule converges exponentially
@@ -200,8 +198,7 @@ def _solid_angle(scene: Scene, period: float) -> float:
         axes = [(third + 1) % 3, (third + 2) % 3, third]
         m, omega = m[:, axes], rows[:, axes]
         if m[0, 2] < 0.0:
-            # Half a turn about the first axis makes the third component positive, which the formula
-            # requires.
+            # The formula needs a positive third component; rotate by 180 degrees about the first axis.
             m, omega = m * [1.0, -1.0, -1.0], omega * [1.0, -1.0, -1.0]
         rate = np.cross(m, omega)
         found = float(((m[:, 0] * rate[:, 1] - m[:, 1] * rate[:, 0]) / (1.0 + m[:, 2])).mean())
@@ -229,7 +226,7 @@ def _back(name: Name) -> Check:
     again = solve(start, [-time], method, tolerance, attitude=True).attitude
     assert again is not None
     forth, back = conditioning(scene, time), conditioning(start, -time)
-    # The error of omega in the forward run rotates the body in the backward run.
+    # The forward run's error of omega rotates the body in the backward run.
     made = forth.limit(tolerance if method == "taylor" else 16.0 * ROUNDING)
     turns = made * back.amplification * math.sqrt(3.0) * back.largest * time
     limit = _allowed(method, tolerance, forth, time) + _allowed(method, tolerance, back, -time)
@@ -238,7 +235,7 @@ def _back(name: Name) -> Check:
 
 
 def _angles(off: float, name: Name) -> Check:
-    """Return the check, against SciPy, of Euler angles `off` (rad) from a pole."""
+    """Return the check, against SciPy, of Euler angles at the distance `off` (rad) from a pole."""
     from scipy.spatial.transform import Rotation
 
     sequence = name.circumstance

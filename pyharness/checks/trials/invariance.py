@@ -1,7 +1,7 @@
-"""Trial of invariance: rotating or rescaling a problem must rotate or rescale its results.
+"""Trial of invariance: a rotated or rescaled problem must have rotated or rescaled results.
 
-Methods whose operations differ only in axes, signs or exponents must return equal bits; the rest
-must agree within an error bound.
+Results must have equal bits if operations differ only in axes, signs or exponents; else they must
+agree within an error bound.
 """
 
 import random
@@ -50,12 +50,12 @@ SCENES = {
 
 @dataclass(frozen=True)
 class Symmetry:
-    """A rotation or rescaling of a problem, with its inverse for omega."""
+    """A rotation or rescaling of a problem."""
 
     turn: Callable[[Scene], Scene]
-    faster: float  # a time t becomes t / `faster`
-    back: Callable[[Array], Array]  # transforms the resulting omega
-    bitwise: tuple[str, ...]  # methods that must return the same bits
+    faster: float  # the time t becomes t / `faster`
+    back: Callable[[Array], Array]  # the inverse, for omega
+    bitwise: tuple[str, ...]  # methods that must return equal bits
 
 
 def _signs(first: float, second: float, third: float) -> Symmetry:
@@ -63,8 +63,8 @@ def _signs(first: float, second: float, third: float) -> Symmetry:
         lambda s: rotated(s, lambda v: (first * v[0], second * v[1], third * v[2]), body=False),
         1.0,
         lambda omega: omega * [first, second, third],
-        # Rounding to nearest does not depend on the sign. Radau and LSODA difference their Jacobian
-        # in a direction that does not change sign.
+        # Rounding to nearest does not depend on the sign. Radau and LSODA are missing, because their
+        # finite differences for the Jacobian do not change sign.
         (*OURS, *_PREPARED, "dop853", "rk45", *FIXED_STEP, *PROGRAMS),
     )
 
@@ -73,13 +73,11 @@ def _faster(factor: float, *bitwise: str) -> Symmetry:
     return Symmetry(lambda s: scaled(s, factor), factor, lambda omega: omega / factor, bitwise)
 
 
-# Scaling by a power of two changes no mantissa in these methods, which compare only quantities of
-# the same unit. SciPy compares different units for its first step; LEQT1F's implicit row scaling
-# compares powers of the step size.
+# Scaling by a power of two changes no mantissa in methods that compare only quantities of the same
+# unit. SciPy compares different units for its first step, LEQT1F powers of the step size.
 _POWERS_OF_TWO = (*OURS, *_PREPARED, *FIXED_STEP, "runge-kutta")
 SYMMETRIES = {
-    # These methods form products of the next two axes in this order; others process the axes in a
-    # fixed order.
+    # Methods that form products of the next two axes in this order; others have a fixed order.
     "cyclic": Symmetry(
         lambda scene: rotated(scene, lambda v: (v[1], v[2], v[0]), body=True),
         1.0,
@@ -133,7 +131,7 @@ def _check_rotated(symmetry: Symmetry, time: float, tolerance: float, name: Name
     difference = float(np.abs(plain - other).max()) / flow.largest
     if method in FIXED_STEP:
         return name.described(difference)
-    # Each result may have the allowed error.
+    # Both results may have the allowed error.
     return name.bounded(difference, 2.0 * flow.limit(tolerance), FLOW)
 
 
@@ -141,7 +139,7 @@ def _back(time: float, tolerance: float, name: Name) -> Check:
     scene, method = scene_of(name), name.subject
     there = run_method(method, scene, time, tolerance).omega
     start = restarted_at(scene, there, time)
-    # In the backward run, SciPy may meet only a coarser tolerance.
+    # SciPy may meet only a coarser tolerance in the backward run.
     coarser = tolerance
     if method in SCIPY_METHODS:
         coarser = max(tolerance, 1.1 * finest(method, start, -time))
@@ -150,14 +148,14 @@ def _back(time: float, tolerance: float, name: Name) -> Check:
     difference = float(np.abs(again - scene.omega).max()) / flow.largest
     if method in FIXED_STEP:
         return name.described(difference, "not reversible")
-    # The forward error is an initial error of the backward run.
+    # The forward run's error is an initial error of the backward run.
     limit = flow.limit(tolerance) * back.amplification + back.limit(coarser)
     return name.bounded(difference, limit, FLOW)
 
 
 def _split(time: float, tolerance: float, name: Name) -> Check:
     scene, method = scene_of(name), name.subject
-    # Always the same three cuts.
+    # A fixed seed, for the same three cuts in every run.
     source = random.Random("cuts")
     cuts = sorted(source.uniform(0.0, time) for _ in range(3))
     omega = np.array(scene.omega)
@@ -168,7 +166,7 @@ def _split(time: float, tolerance: float, name: Name) -> Check:
         omega = run_method(method, start, stop - begin, tolerance).omega
         piece = _flow(scene.name, begin, stop - begin)
         rest = 1.0 if stop == time else _flow(scene.name, stop, time - stop).amplification
-        # The rest of the motion amplifies the error of each piece.
+        # The rest of the motion amplifies the error of this piece.
         limit += piece.limit(tolerance) * rest
     whole = run_method(method, scene, time, tolerance).omega
     difference = float(np.abs(omega - whole).max()) / flow.largest

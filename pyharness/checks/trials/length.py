@@ -38,21 +38,21 @@ MOTIONS = {
     # All three components vary, and the elliptic modulus is large.
     "tumbling": Scene("tumbling", (0.25, 1.0, 0.5), moments=(40.0, 30.0, 20.0)),
 }
-# Initial conditions of each motion. With so many, over two decades of steps, a random walk is
-# mistaken for a drift with a probability below one in a thousand.
+# Number of initial conditions of each motion. With so many, over two decades of steps, a random
+# walk is mistaken for a drift with a probability below one in a thousand.
 STARTS = 12
 _EFFORT = 10.0  # factor on the work limit of the Taylor series
-# With fewer revolutions the rounding of the result is not negligible.
+# Fewest revolutions for which the rounding of the result is negligible.
 _FIT_FROM = 10**2.5
-# Half the difference of the powers for random and biased rounding.
+# Half the difference between the powers for random and for biased rounding.
 _HALFWAY = 0.25
-# Largest phase error (rad) that is measured accurately.
+# Largest phase error (rad) that can be measured accurately.
 _LOST = 0.1
 
 # Bound on the last two terms of the Taylor series at the finest tolerance, relative to omega.
 _LEFT_OUT = Series.SLACK * Series.LEAST_LOCAL_TOLERANCE
 # Step size by number of stages, in radians of the fastest rate. With 8 stages the truncation error
-# is far below rounding; with 4 stages it dominates the phase error, but must not change the energy.
+# is far below rounding; with 4 it dominates the phase error, but must not change the energy.
 _PARTS = {8: 1.0, 4: 0.25}
 _CLOSED_FORM = 16.0 * brouwer.ROUNDING  # error of the closed form at any time
 CLOSED_FORM = Basis(
@@ -71,9 +71,9 @@ class Integrator:
     """A method whose error growth is measured."""
 
     run: Runner
-    noise: Callable[[Orbit, Scene, float], Noise]  # bounds the errors of a step of a size (s)
-    revolutions: float  # length of the first run
-    others: float  # length of the runs from other initial conditions, in revolutions
+    noise: Callable[[Orbit, Scene, float], Noise]  # returns bounds on the errors of a step (s)
+    revolutions: float  # length of the run from the first initial condition
+    others: float  # length, in revolutions, of the runs from other initial conditions
     preference: bool = False  # whether rounding is biased
 
 
@@ -105,11 +105,10 @@ def _rate(scene: Scene) -> float:
 
 
 INTEGRATORS = {
-    # The truncation error keeps its sign, and steps lock to the periodic motion, so that rounding
-    # recurs in every revolution. The last two terms are at most SLACK times the local tolerance;
-    # each later one is at most half of the previous.
+    # Rounding is biased, because steps lock to the periodic motion, so that rounding errors recur
+    # in every revolution.
     "taylor": Integrator(_taylor, _taylor_noise, 1e6, 10**5.5, preference=True),
-    # A step takes ten times as long as a Taylor step.
+    # Shorter runs, because a step takes ten times as long as a Taylor step.
     "gauss-8": Integrator(_gauss(8), partial(brouwer.gauss_noise, stages=8), 1e6, 1e5),
     "gauss-4": Integrator(_gauss(4), partial(brouwer.gauss_noise, stages=4), 1e5, 10**4.5),
 }
@@ -134,7 +133,7 @@ def _attempts() -> Iterator[Attempt]:
 
 
 def check_growth(integrator: Integrator, name: Name) -> Iterator[Check]:
-    """Yield checks of the fitted powers of growth, and of errors after given revolutions."""
+    """Yield checks of errors after each number of revolutions, and of their powers of growth."""
     motion = name.circumstance
     for what, found, steps, limits in measured(integrator, MOTIONS[motion], orbit_of(motion)):
         horizons = np.array(REVOLUTIONS[: len(steps)])
@@ -152,14 +151,14 @@ def check_growth(integrator: Integrator, name: Name) -> Iterator[Check]:
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """The errors of one quantity, `what`, after n numbers of `steps`."""
+    """The errors of the quantity `what` after each of n numbers of steps."""
 
     motion: str
     method: str
     what: str
     steps: Array
-    error: Array  # root mean square over initial conditions
-    limits: Array  # bounds of `error` by Brouwer's law
+    error: Array  # root mean square over the initial conditions
+    limits: Array  # bounds on `error` by Brouwer's law
     starts: Array  # number of initial conditions
 
 
@@ -175,9 +174,9 @@ def curves() -> Iterator[Drift]:
 def measured(
     integrator: Integrator, scene: Scene, body: Orbit
 ) -> Iterator[tuple[str, Array, Array, list[float]]]:
-    """Yield name, errors, numbers of steps and error bounds of each quantity.
+    """Yield each quantity's name, errors, numbers of steps and error bounds.
 
-    Errors have the shape (initial conditions, times), NaN after a run's end.
+    Errors have the shape (initial conditions, times), and are NaN after a run's end.
     """
     turn = 2.0 * math.pi / body.largest
     reached = [r for r in REVOLUTIONS if r <= 1.01 * integrator.revolutions]
@@ -203,7 +202,7 @@ def orbit_of(motion: str) -> Orbit:
 
 
 def starts(scene: Scene, body: Orbit) -> list[Scene]:
-    """Return scenes that start at different phases of one motion."""
+    """Return scenes with different initial phases of one motion."""
     times = [0.37 * k / body.frequency for k in range(STARTS)]
     rows = brouwer.floats([torque_free(scene, t, rounded=True) for t in times])
     return [replace(scene, omega=row) for row in rows]

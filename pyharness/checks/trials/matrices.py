@@ -1,4 +1,4 @@
-"""Trial of the collocation matrices for steps from 1e-10 to 10 s, and of their singularity.
+"""Trial of the collocation matrices for step sizes from 1e-10 to 10 s, and of their singularity.
 
 The linear solver LEQT1F reports a singular matrix by the error code IER = 129.
 """
@@ -26,7 +26,7 @@ from pyharness.thesis import compiled
 from pyharness.thesis.linear_solver import SINGULAR
 
 STEPS = tuple(10.0 ** (k / 2.0) for k in range(-20, 3))
-# Step sizes (s); with some of them, the four-term program's matrix is singular.
+# Step sizes (s); for some of them the four-term program's matrix is singular.
 _RUN_STEPS = (1e-7, 1e-6, 1e-5, 1e-4)
 
 
@@ -68,8 +68,8 @@ def _threshold(name: Name) -> Check:
     program = name.subject
     wanted = singular_below(program)
     found = declared_singular_below(program)
-    # The last pivot is proportional to a power of the step, whose exponent divides the relative
-    # rounding error.
+    # The last pivot is proportional to a power of the step size, so divide its relative rounding
+    # error by the exponent.
     _, rounding = solved(program, 1.01 * wanted).pivoting
     limit = rounding / (len(PARTS[program]) - 1)
     return name.bounded(abs(found / wanted - 1.0), limit, PIVOTS, f"{found:.6g} s")
@@ -81,7 +81,7 @@ def _counted(listing: Listing, name: Name) -> Check:
     assert ier is not None
     count = int((ier == SINGULAR).sum())
     singular = singular_below(listing.program) / scene.step_size
-    # With `dt-accumulates` the matrix is singular in the first steps only.
+    # With the defect `dt-accumulates` the matrix is singular only in the first steps.
     expected = min(scene.steps, math.floor(singular))
     if not listing.has("dt-accumulates"):
         expected = scene.steps if singular >= 1.0 else 0

@@ -25,7 +25,7 @@ from pyharness.model.listing import Listing, subset
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.scene_file import case_scene
 
-# A, B, C and a steady omega (rad/s), with few binary digits. The eigenvalues are real, imaginary
+# A, B, C and a steady omega (rad/s), with few binary digits, whose eigenvalues are real, imaginary
 # and complex, in both half-planes.
 _STEADY: dict[str, tuple[Triple, Triple]] = {
     "spin": ((0.5, -0.5, 0.25), (0.0, 0.0, 1.0)),
@@ -77,7 +77,7 @@ def _attempt(listing: Listing, name: Name) -> Iterator[Check | Attempt]:
                 probe = partial(moving_step, scene, listing, count)
                 yield _probed(name, f"step-{count}-case-{case}", probe, scene, note)
     elif listing.defects == {"base-not-restored"}:
-        return  # two eigenvalues of similar size: there is no single growth rate
+        return  # two eigenvalues have similar magnitudes, so that there is no single growth rate
     for kind, direction in _DIRECTIONS.items():
         yield _probed(name, f"boundary-{kind}", partial(observed_boundary, listing, direction))
     for case in (2, 3, 4):
@@ -97,7 +97,7 @@ def _probed(
 
 
 def _spin(listing: Listing, name: Name) -> Check:
-    """Return, as a check, the growth per step of a wobble about axis 3."""
+    """Return the growth per step of a wobble about axis 3, as a check without a limit."""
     scene = scene_of(name)
     z = eigenvalues(replace(scene, omega=(0.0, 0.0, scene.omega[2])))
     spin = z[np.argmax(np.abs(z))]

@@ -24,7 +24,7 @@ from pyharness.model.torque_law import TorqueLaw
 
 _LAW = TorqueLaw((10.0, -20.0, 15.0), (0.0, 0.0, 1.0), (((3.0, 0.0, 1.0), 4.0),))
 _DRIVEN = replace(ORDINARY, torque=_LAW)
-# Exponents of powers of two whose squares and cubes are in the range of binary64 too.
+# Exponents of powers of two whose squares and cubes are in the range of binary64.
 _DRIVEN_TWOS = (-320, -100, 100, 320)
 _OVERFLOW = Basis(
     "derived",
@@ -34,12 +34,11 @@ _OVERFLOW = Basis(
 
 
 def _bit_for_bit(method: str, kind: str, scene: Scene, powers: Sequence[int]) -> Iterator[Attempt]:
-    """Yield deferred checks that scaling by a power of two changes no mantissa."""
+    """Yield deferred checks that scaling omega by a power of two changes no mantissa."""
     time = scene.step_size * scene.steps
     plain = cache(lambda: _tried(method, scene, time))
 
     def same(factor: float, name: Name) -> Check:
-        # The original motion must be computed first.
         first, run = plain(), _tried(method, scene_of(name), time / factor)
         with np.errstate(invalid="ignore"):
             wrong = float(np.abs(run.omega / factor - first.omega).max())
@@ -72,7 +71,7 @@ def _flow() -> Conditioning:
 
 
 def _truth(scene: Scene, time: float) -> Truth:
-    """Return a scaled motion's true omega, with the amplification of the original motion."""
+    """Return a scaled motion's true omega at `time` (s), with the original error amplification."""
     size = max(map(abs, scene.omega)) / max(map(abs, ORDINARY.omega))
     return truth_of(scene, time, replace(_flow(), largest=_flow().largest * size))
 
@@ -87,7 +86,7 @@ def _attempts() -> Iterator[Attempt]:
         if method not in (*SCIPY_METHODS, "closed-form"):
             yield from _bit_for_bit(method, "same-driven", driven, _DRIVEN_TWOS)
     law = TorqueLaw((1e10, 2e10, -1e10))
-    # The body is a sphere; in another body, the coupling of the axes would change omega.
+    # A sphere, because in other bodies the coupling of the axes would change omega.
     scene = Scene("beyond", (0.0, 0.0, 0.0), moments=(2.0, 2.0, 2.0), torque=law, step_size=1e298)
     for method in ALL:
         yield Attempt(named("scales", method, "beyond", scene=scene), _beyond)

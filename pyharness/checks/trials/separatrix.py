@@ -15,8 +15,8 @@ from pyharness.engine.registry import FIXED_STEP
 from pyharness.model.basis import Basis
 from pyharness.model.scene import Scene
 
-_STAYS = 50.0  # time (s) for which the rotation must stay constant
-# The long time is for closed forms, whose limits need no error amplification.
+_STAYS = 50.0  # time (s) for which the rotation must be constant
+# For the time LONG of closed forms, whose limits need no error amplification.
 _UNKNOWN = unknown_flow(max(map(abs, SYMMETRIC_START)))
 _UNDISTURBED = Basis(
     "derived",
@@ -33,7 +33,7 @@ def _undisturbed() -> Iterator[Attempt]:
         method = name.subject
         run = run_method(method, scene, _STAYS, None if method in FIXED_STEP else MIDDLING)
         wrong = float(np.abs(run.omega - scene.omega).max())
-        # Zeros must stay 0; `quick` changes units, and may round the spin.
+        # Only `quick` may round the spin, because it changes units.
         limit = 2.0**-52 if method == "quick" else 0.0
         stays = run.omega[0] == run.omega[2] == 0.0 and run.has_result
         note = "" if stays else "it left the axis"

@@ -1,4 +1,4 @@
-"""Trial of steps from 1 to 1e-6 s: truncation, rounding, their crossing, and divergence."""
+"""Trial of step sizes from 1 to 1e-6 s: truncation and rounding errors, and divergence."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -29,7 +29,7 @@ TIME = 1.0
 SMALLEST = 1e-6
 # Numbers of steps in `TIME` (s), half a decade apart.
 COUNTS = tuple(round(10.0 ** (k / 2.0)) for k in range(13))
-# Time (s) of a longer search for divergence, and its smallest step size (s), too small to diverge.
+# Time (s) of a longer search for divergence, and its smallest step size (s).
 _LONG, _SMALLEST_LONG = 100.0, 2e-3
 _SPINNING = (2, 3, 4)
 _CROSSING = Basis(
@@ -71,7 +71,7 @@ def _of_case(case: int, listing: Listing | None, place: Name) -> Iterator[Attemp
         own = replace(place, quantity=f"{TIME / count:.0e}", scene=scene)
         yield Attempt(own, partial(predicted, count))
     gauss = method.startswith("gauss")
-    # Where rounding is visible, methods of higher order have no truncation error left.
+    # Methods of higher order have only rounding errors where rounding is visible.
     if not (before or gauss) and SCHEMES[method].order in (2, 4):
         crossing = partial(_crossing, method, case, lambda count: error(count)[0])
         yield Attempt(replace(place, quantity="crossing", scene=None), crossing)
@@ -80,20 +80,20 @@ def _of_case(case: int, listing: Listing | None, place: Name) -> Iterator[Attemp
 
 
 def _crossing(method: str, case: int, error: Callable[[int], float], name: Name) -> Check:
-    """Return the check, against theory, of the smallest step where truncation dominates."""
+    """Return the check of the smallest step size at which the truncation error dominates."""
     forecaster = _forecaster(case, method)
     smallest = SMALLEST
     if method in PARTS:
-        # With smaller steps, LEQT1F reports a singular matrix.
+        # For smaller steps LEQT1F reports a singular matrix.
         smallest = max(smallest, math.nextafter(singular_below(method), 1.0))
     counts = [count for count in COUNTS if TIME / count >= smallest]
     ruled = [c for c in counts if 0.5 < error(c) / forecaster.predict(c).truncation < 2.0]
     found = TIME / max(ruled, default=1)
     if found > TIME / counts[-1]:
-        # Estimated by the geometric mean of this step and the next smaller one.
+        # Take the geometric mean of this step size and the next smaller one.
         found /= 10.0**0.25
     predicted = forecaster.crossing(smallest)
-    # Rounding may differ from its prediction by a factor of ten, besides the half decade.
+    # Allow for the half decade between step sizes, and for rounding ten times as predicted.
     limit = 0.25 + 1.0 / (SCHEMES[method].order + 0.5)
     best = min(counts, key=error)
     note = (
@@ -104,7 +104,7 @@ def _crossing(method: str, case: int, error: Callable[[int], float], name: Name)
 
 
 def _error(scene: Scene, name: str, case: int, listing: Listing | None) -> tuple[float, str]:
-    """Return the final relative error of omega, not finite for an incomplete run, and a note."""
+    """Return the final error of omega, relative or infinite for an incomplete run, and a note."""
     largest = _path(case).flow.largest
 
     def error(omega: Array) -> float:
@@ -131,7 +131,7 @@ def _divergence(case: int, listing: Listing | None, name: Name) -> Check:
     matrix = amplification(scheme)
     found, predicted, limit = divergence(scene, _LONG, matrix, runner, _SMALLEST_LONG)
     note = f"{_from(found, _LONG)}, predicted from {predicted:.4g} s"
-    # Linear theory excludes moving collocation points, unless the equations are linear.
+    # Linear theory holds for moving collocation points only if the equations are linear.
     if listing is None or listing.label == "corrected" or (method in PARTS and case == 2):
         return name.bounded(abs(found / predicted - 1.0), limit, DOUBLING, note)
     return name.described(found, note)

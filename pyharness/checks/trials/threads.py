@@ -1,7 +1,4 @@
-"""Trial of threads: concurrent calls must return bit-for-bit identical results.
-
-`choose_instructions` is not called, because it must precede all threads.
-"""
+"""Trial of threads: concurrent calls must return bit-for-bit identical results."""
 
 import random
 import sys
@@ -31,7 +28,7 @@ from pyharness.thesis.programs import IMPLEMENTATIONS
 
 THREADS = 8
 _REPEATS = 30
-# Switch interval (s), a hundredth of the default.
+# Interval (s) between switches of threads, a hundredth of the default.
 _SWITCH = 5e-5
 _TOLERANCE = 1e-9
 _TIMES = (0.05, 0.1, 0.2)
@@ -46,7 +43,7 @@ SCENES = (
     Scene("sphere", (1.0, 1.0, 1.0), moments=(40.0, 40.0, 40.0), torque=_WAVE, steps=20),
     Scene("driven", (0.0, 1.0, 1.0), moments=(40.0, 30.0, 20.0), torque=_WAVES, steps=20),
 )
-# The computation of its error amplification needs many steps.
+# A scene whose error amplification needs many steps.
 _BRAKED = Scene("braked", (0.3, 1.1, 2.7), moments=(40.0, 30.0, 20.0), torque=damping(0.5))
 _LATE = 20.0  # end time (s)
 
@@ -70,7 +67,7 @@ def _run(only: Sequence[str]) -> Iterator[Check]:
 
 
 def different(jobs: Sequence[Job], repeats: int = _REPEATS) -> list[Job]:
-    """Return the jobs whose results in threads differ, once for each differing call."""
+    """Return the jobs whose results differ in threads, once for each differing call."""
     alone = [bits(job) for job in jobs]
     order = [index for index in range(len(jobs)) for _ in range(repeats)]
     random.Random("threads").shuffle(order)

@@ -1,6 +1,6 @@
-"""Trial of torques: waves too fast for the step, huge and tiny torques, resonance.
+"""Trial of torques: waves (sine or cosine terms) too fast for the step, huge and tiny torques.
 
-A wave is a sine or cosine term of the torque; in resonance it has the frequency of precession.
+In resonance a wave has the frequency of precession.
 """
 
 import math
@@ -39,7 +39,7 @@ from pyharness.truth.reference import reference
 _PREPARED = {"prepared-auto": "auto", "quick": "quick"}
 _OURS = ("taylor", "gauss-2", "gauss-4", "gauss-8", "auto")
 _ALL = (*_OURS, *_PREPARED, "dop853", "lsoda", "rk45", "radau")
-# Methods that can follow a wave for a million radians within seconds.
+# Methods that can integrate over a million radians of a wave within seconds.
 _LONG = ("taylor", "auto", *_PREPARED)
 
 _BODY = (40.0, 30.0, 20.0)
@@ -49,7 +49,7 @@ _START = (0.3, 1.0, 2.0)
 
 @dataclass(frozen=True, eq=False)
 class Circumstance:
-    """A scene to solve until `time` (s), with the methods to check."""
+    """A scene, its end time (s), and the methods to check."""
 
     scene: Scene
     time: float
@@ -62,8 +62,8 @@ def axial(scene: Scene, time: float) -> Truth:
     """Return the true omega at `time` (s) of a symmetric body with a torque along its axis."""
     flow = conditioning(scene, time)
     waves = scene.law.sines + scene.law.cosines
-    # The phase of a wave has a rounding error in each of n evaluations, at least one in a period.
-    # `conditioning` adds all n; as they are random, 4 sqrt(n) suffice (Hoeffding 1963).
+    # A wave's phase has a rounding error in each of n evaluations, at least one in a period.
+    # `conditioning` adds all n; because they are random, 4 sqrt(n) suffice (Hoeffding 1963).
     periods = max(frequency * time for _, frequency in waves) / (2.0 * math.pi)
     chance = min(1.0, 4.0 / math.sqrt(periods))
     omega = np.array([[float(w) for w in axial_top(scene, [time])[0]]])
@@ -72,7 +72,7 @@ def axial(scene: Scene, time: float) -> Truth:
 
 
 def averaged(scene: Scene, time: float) -> Truth:
-    """Return the true omega at `time` (s) without very fast waves, with a bound on their effect."""
+    """Return the true omega at `time` (s) without its waves, with a bound on their effect."""
     moments = np.array(scene.moments)
     waves = scene.law.sines + scene.law.cosines
     moved = sum(float((2.0 * np.abs(a) / moments).max()) / f for a, f in waves)
@@ -81,8 +81,8 @@ def averaged(scene: Scene, time: float) -> Truth:
 
 
 def summed(scene: Scene, time: float) -> Truth:
-    """Return the true omega at `time` (s) of a sphere, with a bound on its rounding errors."""
-    # The phase of a wave is computed in double-double; only the final sum is rounded.
+    """Return the true omega of a sphere at `time` (s), with a bound on a method's rounding."""
+    # Methods compute the phase of a wave in double-double, and round only the final sum.
     known = reference(scene, [time])
     largest = float(np.abs([known.omega[-1], scene.omega]).max())
     rounding = 16.0 * ROUNDING
@@ -117,7 +117,7 @@ def _tiny(size: float) -> Circumstance:
 
 
 def _resonant(moments: Triple) -> Circumstance:
-    """Return a scene whose torque rotates with the precession of Case 2's top."""
+    """Return a scene whose torque rotates with the precession of the top of Case 2."""
     law = TorqueLaw(sines=(((0.0, -40.0, 0.0), 5.0),), cosines=(((40.0, 0.0, 0.0), 5.0),))
     scene = Scene("resonance", (0.0, 1.0, 10.0), moments=moments, torque=law, steps=2000)
     return Circumstance(scene, 20.0, programs=True)
@@ -141,7 +141,7 @@ CIRCUMSTANCES = {
     "no-digits-1e22": _no_digits(1e22, 2e23, sphere=True),
     "averaged-1e16": _no_digits(1e16, 10.0, sphere=False),
     **{f"huge-{size:.0e}": _huge(size) for size in (1e6, 1e9, 1e12)},
-    # Omega grows to 1e8 times its initial value, which is no divergence.
+    # Omega grows to 1e8 times its initial value without diverging.
     "huge-from-rest": _huge(1e4, (1e-6, 0.0, 0.0)),
     **{f"tiny-{size:.0e}": _tiny(size) for size in (1e-12, 1e-100, 1e-300, 5e-324)},
     "resonant": _resonant(_SYMMETRIC),
@@ -177,7 +177,7 @@ def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check
 
 
 def _describe_axial(name: Name) -> Iterator[Attempt]:
-    """Yield deferred reports of errors where a phase advances 100 rad or more in a step."""
+    """Yield deferred reports of errors with a fixed step, in which a phase advances 100 rad or more."""
     scene = scene_of(name)
     truth = cache(lambda: brouwer.floats(axial_top(scene, scene.times())))
 

@@ -35,8 +35,8 @@ from pyharness.model.trajectory import Array
 TARGETS = (1e-6, 1e-12)
 STEPS = 300  # number of RK4 steps, where the rate is in steps per second
 ROUNDS = 9
-# Durations (s). The number of bodies is increased after a call shorter than `_CALL`, or shorter than
-# `_LONG_CALL` if the last increase raised the bodies per second by more than half.
+# Durations (s). The number of bodies is increased after a call shorter than `_CALL`, or shorter
+# than `_LONG_CALL` if the last increase raised the bodies per second by more than half.
 _CALL, _LONG_CALL = 0.03, 0.5
 SLOW = 0.3  # s; slower calls are timed in fewer rounds
 _BATCH = 0.02  # s; duration of the calls in a round
@@ -110,7 +110,7 @@ class _Task:
         return float(np.where(np.isfinite(errors), errors, np.inf).max())
 
     def setting(self, each: EnsembleContender) -> float | None:
-        """Return the coarsest setting that reaches the target error, or None; without target, STEPS."""
+        """Return the coarsest setting that reaches the target error, or None; `STEPS` without one."""
         if self.target is None:
             return float(STEPS)
         for setting in _ladder(each, self.target):
@@ -281,7 +281,7 @@ def needed(method: str, bodies: int) -> None:
 
 
 def _resident(name: str) -> int:
-    """Return this process's ``VmRSS`` (current memory) or ``VmHWM`` (peak) in bytes; 0 if unknown."""
+    """Return this process's ``VmRSS`` (memory now) or ``VmHWM`` (peak), in bytes; 0 if unknown."""
     with suppress(OSError), open("/proc/self/status", encoding="ascii") as file:
         for line in file:
             if line.startswith(name + ":"):

@@ -1,7 +1,7 @@
 """Third-party solvers for `bench --ensemble`.
 
-Each returns a function that computes omega (rad/s) at the end time, shape (n, 3), or the attitudes,
-shape (n, 4), if the load requests them.
+Each returns a function that integrates to the end time, and returns omega (rad/s), shape (n, 3), or
+the requested attitudes, shape (n, 4).
 """
 
 from collections.abc import Callable
@@ -24,7 +24,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
 
-# Numbers of bodies in a batch. heyoka recommends 4, even if a register holds 8 numbers.
+# Numbers of bodies in a batch; heyoka recommends 4.
 BATCHES = (4, 8, 16)
 LANES = 64  # number of bodies in a block
 _BLOCK = 4096  # number of bodies whose arrays fit into the cache

@@ -1,8 +1,8 @@
 """Run time against error, for our and third-party solvers, in one process.
 
-The result of a call with each setting of a contender, from coarse to fine, is compared with the
-reference. Batches of all calls are then timed in interleaved rounds, so that other work of the
-machine affects all alike; the median time counts.
+The result of a call with each setting, from coarse to fine, is compared with the reference. Batches
+of all calls are then timed in interleaved rounds, so that other work of the machine affects all
+alike; the median time counts.
 """
 
 import math
@@ -30,19 +30,17 @@ from pyharness.truth.reference import Reference, reference
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
 HORIZON, LONG_HORIZON = 3.0, 100.0  # end times T, s
 _CASES, _LONG_CASES = (2, 3, 4, 5, 6, 7), (3, 4)
-# Cases with attitude. Until the long end time, the reference would need too many steps in Case 6.
+# Cases with attitude. In Case 6 the reference would need too many steps until the long end time.
 _TURNING_CASES, _LONG_TURNING_CASES = (1, *_CASES), (1, 2, 3, 4, 5, 7)
 
 _LONGEST_CALL = 1.0  # s; settings whose calls take longer are left out
-# Longest time (s) to prepare and try a setting: at a coarse tolerance a solver may leave the true
-# solution, and then never end.
+# Longest time (s) to prepare and try a setting: at a coarse tolerance a solver may never end.
 _LONGEST_FIRST = 30.0
-# Time (s) for all first calls of a contender on one workload.
+# Longest time (s) of all first calls of a contender on a workload.
 _BUDGET = {"tolerance": 1.0, "steps": 0.15, "none": 1.0}
 _LARGEST_STEPS = 1 << 22  # largest number of steps of a call
-_FAILURES = 12  # after so many successive settings without result, finer ones are left out
-# Factor on the work limit of the proved error bound; the proof is still short beside the
-# measurement.
+_FAILURES = 12  # after so many successive settings without a result, finer ones are left out
+# Factor on the work limit of the proved error bound, whose time is short beside the measurement.
 _PROOF_EFFORT = 10.0
 _ROUNDS = 9
 _BATCH = 1e-3  # s; calls faster than this are batched
@@ -57,14 +55,13 @@ class Workload:
     label: str
     scene: Scene
     horizon: float  # end time T, s
-    # Only for scenes that are not cases: kinds, solution, error amplification, and number of
-    # revolutions.
+    # For scenes that are not cases: kinds, solution, error amplification, number of revolutions.
     kinds: tuple[str, ...] = ()
     truth: Reference | None = None
     growth: float = 0.0
     turns: float = 0.0
-    # Errors are relative to this angular velocity (rad/s) or, if that is larger, to the largest
-    # component of the true omega at T.
+    # Errors are relative to this angular velocity (rad/s) or, if larger, to the largest component
+    # of the true omega at T.
     scale: float = 0.0
 
     @property
@@ -73,7 +70,7 @@ class Workload:
 
     @property
     def group(self) -> str:
-        """Return the name of the group over which ratios are averaged."""
+        """The name of the group over which ratios are averaged."""
         if self.horizon != HORIZON and self.scene.attitude is None:
             return f"T = {self.horizon:g}"
         return f"{'torque-free' if self.scene.torque.is_zero else 'torque'}, T = {self.horizon:g}"
@@ -81,19 +78,19 @@ class Workload:
 
 @dataclass(frozen=True)
 class Row:
-    """The run time and error of one contender and setting on one workload."""
+    """The run time and error of a contender with a setting on a workload."""
 
     workload: Workload
     method: str
     kind: str  # "tolerance", "steps" or "none"
     setting: float | None  # None if the contender has no setting
     seconds: float | None  # median, s; None if the call failed
-    # The larger of the errors of omega at T, relative as in `Workload.scale`, and of the attitude
-    # (rad). None if the call failed.
+    # The larger of the errors at T of omega (relative as in `Workload.scale`) and attitude (rad);
+    # None if the call failed.
     error: float | None
-    evaluations: int | None  # of the right-hand side in a call, if counted
+    evaluations: int | None  # number of right-hand sides in a call, if counted
     note: str = ""
-    # Time (s) to prepare the call, with any compilation.
+    # Time (s) to prepare the call, including compilation.
     preparing: float = field(default=0.0, compare=False)
 
 
@@ -110,11 +107,11 @@ class Finding:
     workloads: list[Workload]
     rows: list[Row]
     refused: list[Refusal]
-    # Time (s) of all preparations, by (case number or label of a random scene, contender).
+    # Time (s) of all preparations, by case number (or label) and contender.
     preparation: dict[tuple[int | str, str], float]
-    # Error estimate of the reference, relative as `Row.error`, by label of the workload.
+    # Error estimate of the reference, relative as in `Row.error`, by the workload's label.
     doubt: dict[str, float]
-    # A bound on the reference's error, proved if possible.
+    # Bound on the reference's error, proved if possible, by the workload's label.
     bounds: dict[str, ErrorBound] = field(default_factory=dict)
 
     @property
@@ -125,7 +122,7 @@ class Finding:
 def workloads(
     case: int | None = None, horizon: float | None = None, attitude: bool = False
 ) -> list[Workload]:
-    """Return cases of Table 1 as workloads, by default until 3 s, some also until 100 s."""
+    """Return cases of Table 1 as workloads, by default to 3 s, and some also to 100 s."""
     usual, long = (_TURNING_CASES, _LONG_TURNING_CASES) if attitude else (_CASES, _LONG_CASES)
     cases = usual if case is None else (case,)
     asked = [(n, HORIZON if horizon is None else horizon) for n in cases]
@@ -159,7 +156,7 @@ def measure(
         found.bounds[load.label] = bound if before is None else joined([before, bound])
         place = load.scene.case or load.label
         if load.kinds and not any(known == place for known, _ in makers):
-            makers.clear()  # the scenes before do not occur again
+            makers.clear()  # earlier scenes do not occur again
         for contender in contenders:
             refused = partial(Refusal, load, contender.name, None)
             if load.scene.attitude is not None and not contender.attitude:
@@ -167,7 +164,7 @@ def measure(
                 continue
             say(contender.name)
             key = (place, contender.name)
-            # One compiled code serves all end times of a scene.
+            # Compile only once for all end times of a scene.
             begin = clock()
             try:
                 if key not in makers:
@@ -193,19 +190,19 @@ def error_of(end: End, truth: Reference, scale: float = 0.0) -> float | None:
         return error
     if end.attitude is None or not np.isfinite(end.attitude).all() or not end.attitude.any():
         return None
-    # Integrators do not preserve the norm. The division by the largest component prevents overflow
-    # and underflow of the squares.
+    # Normalise, because integrators do not preserve the norm; divide first, so that no square
+    # overflows or underflows.
     attitude = end.attitude / np.abs(end.attitude).max()
     attitude /= np.linalg.norm(attitude)
     return max(error, float(angle_between(attitude[None], truth.attitude)[0]))
 
 
 def relative_error(omega: Array, truth: Reference, scale: float = 0.0) -> float | None:
-    """Return omega's error relative to the larger of `scale` (rad/s) and true omega, or None."""
+    """Return omega's error relative to the larger of `scale` (rad/s) and the true omega, or None."""
     if len(truth.omega) == 0:
         return None
-    # Near the true solution this subtraction is exact, so the `remainder`, the reference's digits
-    # beyond binary64, matters.
+    # Near the true solution this difference is exact, so that the reference's digits beyond
+    # binary64, the `remainder`, matter.
     difference = omega - truth.omega[0]
     if truth.remainder is not None:
         difference -= truth.remainder[0]
@@ -219,9 +216,9 @@ def ladder(contender: SceneContender, scene: Scene, horizon: float) -> Iterator[
     if contender.settings:
         yield from contender.settings
         return
-    # In the largest step, the body rotates by at most 16 rad about an axis at the initial omega; no
-    # method works with larger steps. The frequencies of the torque are not considered, because a
-    # fast torque may be too weak to require small steps.
+    # In the largest step the body rotates by at most 16 rad about an axis, at the initial omega; no
+    # method works with larger steps. The torque's frequencies are ignored, because a fast torque
+    # may be too weak to require small steps.
     phase = max(map(abs, scene.omega)) * horizon / 16.0
     steps = 1 << max(1, math.ceil(math.log2(max(1.0, phase))))
     while steps <= _LARGEST_STEPS:
@@ -241,8 +238,7 @@ def _first_calls(
     spent = preparing = last = before = 0.0
     for setting in ladder(contender, load.scene, load.horizon):
         named = None if contender.setting == "none" else setting
-        # The time is extrapolated from the last two calls. The bounds allow for an interruption of
-        # one of them.
+        # Extrapolate the time from the last two calls, of which one may have been interrupted.
         expected = last * min(4.0, max(1.0, last / before)) if before else last
         hopeless = ""
         if expected > _LONGEST_CALL or spent + expected > _BUDGET[contender.setting]:

@@ -47,7 +47,7 @@ def peers() -> list[SceneContender]:
 
     return [
         adaptive("heyoka", "heyoka", heyoka_maker),
-        # With the derivatives by the initial state, which our error amplification needs too.
+        # With derivatives with respect to the initial state, as for our error amplification.
         adaptive("heyoka-variational", "heyoka", partial(heyoka_maker, variational=True)),
         fixed("rk4", 4),
         fixed("dop8", 8),
@@ -62,7 +62,7 @@ def peers() -> list[SceneContender]:
 def heyoka_maker(
     scene: Scene, formula: Formula | None = None, *, variational: bool = False
 ) -> Maker:
-    """Return a function that prepares heyoka's integrations, compiled once for each tolerance.
+    """Return a maker of heyoka's integrations, which are compiled once for each tolerance.
 
     `variational` adds derivatives with respect to the initial state.
     """
@@ -78,7 +78,7 @@ def heyoka_maker(
 
     def make(horizon: float, setting: float) -> Ready:
         if setting not in integrators:
-            # Compilation is timed, so code from an earlier compilation must not be reused.
+            # Compile anew, because the compilation is timed.
             heyoka.llvm_state.clear_memcache()
             if hasattr(heyoka.llvm_state, "set_diskcache_enabled"):
                 heyoka.llvm_state.set_diskcache_enabled(False)
@@ -103,7 +103,7 @@ def heyoka_maker(
 
 
 def _problem(scene: Scene) -> tuple[RightHandSide, Sequence[float], Any]:
-    """Return right-hand side, initial state, and the ratio of absolute to relative tolerance."""
+    """Return right-hand side, initial state, and absolute divided by relative tolerance."""
     is_free, largest = scene.attitude is None, max(map(abs, scene.omega)) or 1.0
     if isinstance(scene.torque, StateTorque):
         slopes = slopes_of(scene)
@@ -147,8 +147,7 @@ def _odeint(scene: Scene) -> Maker:
         )  # fmt: skip
 
         def read(rows: Any) -> End:
-            # The call is repeated, because evaluations are counted only with an option that the
-            # timed call omits.
+            # Repeat the call with an option, omitted in the timed call, that counts evaluations.
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", ODEintWarning)
                 _, told = run(full_output=True)
@@ -162,9 +161,9 @@ def _odeint(scene: Scene) -> Maker:
 
 
 def heyoka_equations(scene: Scene, formula: Formula | None = None) -> list[tuple[Any, Any]]:
-    """Return pairs (unknown, derivative) for omega and, if the scene has one, the attitude.
+    """Return heyoka's pairs (unknown, derivative) for omega and any attitude of the scene.
 
-    Raise InputError if heyoka can't evaluate the torque.
+    Raise InputError if heyoka cannot evaluate the torque.
     """
     import heyoka
 
@@ -192,7 +191,7 @@ def heyoka_equations(scene: Scene, formula: Formula | None = None) -> list[tuple
 
 
 def heyoka_functions() -> Functions[Any]:
-    """Return functions that evaluate a tape (recorded torque) in heyoka's arithmetic."""
+    """Return functions that evaluate a recorded torque in heyoka's arithmetic."""
     import heyoka
 
     def table(_: Table, time: Any) -> Any:
@@ -214,7 +213,7 @@ def heyoka_functions() -> Functions[Any]:
 
 
 def numba_fixed(method: str, scene: Scene) -> Maker:
-    """Return a maker of numba's integrations by "rk4" or "dop8", DOP853's formula of order 8."""
+    """Return a maker of numba's integrations by "rk4" or "dop8" (DOP853's formula of order 8)."""
     import numba
 
     formula: Tableau = RK4
@@ -251,9 +250,9 @@ def compiled_function(source: str) -> Any:
 def rates(
     scene: Scene, time: str, state: Sequence[str], coefficients: Sequence[float] = ()
 ) -> list[str]:
-    """Return omega's derivatives as Python source in `time` (an expression) and `state` (names).
+    """Return omega's three derivatives as Python expressions in `time` and in the names `state`.
 
-    `coefficients` are A, B, C.
+    `coefficients` are Euler's A, B, C, by default the scene's.
     """
     x, y, z = state
     moments = scene.moments or (1.0, 1.0, 1.0)

@@ -13,8 +13,7 @@ if TYPE_CHECKING:
     from pyharness.bench.growth import Growth
 
 _FLOOR = 2.0**-53  # relative error of one rounding in double precision
-# Styles are distinct without colours: dashes and line width show the group of a solver, markers the
-# solver.
+# Distinct without colours: dashes and line width show a solver's group, markers the solver.
 _FAMILIES: dict[str, dict[str, Any]] = {
     "ours": {"linestyle": "-", "linewidth": 1.5, "color": "#1040a0"},
     "gauss": {"linestyle": (0, (6, 1.5)), "linewidth": 0.9, "color": "#3a86c8"},

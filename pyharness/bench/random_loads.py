@@ -22,29 +22,26 @@ from pyharness.truth.reference import Reference
 MOST_TURNS = 300.0
 WAVES = {"one wave": 1, "three waves": 3, "ten waves": 10}
 LAWS = ("no torque", "constant torque", "ramp", *WAVES)
-# Frequencies relative to the initial |omega|.
+# Ranges of frequencies, relative to the initial |omega|.
 SPEEDS = {"slow waves": (0.01, 0.1), "matched waves": (0.3, 3.0), "fast waves": (3.0, 10.0)}
-# Moments in an arbitrary unit, drawn from a generator x.
+# Functions of a generator x that draw moments in an arbitrary unit.
 BODIES: dict[str, Callable[[Random], list[float]]] = {
     "compact": lambda x: [x.uniform(2.0, 3.0) for _ in range(3)],
     "flat": lambda x: _flat(x, x.uniform(1.0, 3.0), x.uniform(1.0, 3.0)),
     "needle-like": lambda x: [low := x.uniform(0.01, 0.1), 1.0, 1.0 + low * x.uniform(0.0, 1.0)],
     "nearly symmetric": lambda x: [1.0, 1.0 + _log(x, 1e-6, 1e-2), x.uniform(0.2, 1.9)],
 }
-MOST_GROWTH = 1e3  # scenes with this error amplification or more are not accepted
+MOST_GROWTH = 1e3  # scenes with this error amplification or more are rejected
 _LENGTHS = {"1 to 10 turns": 10.0, "10 to 100 turns": 100.0, "100 to 300 turns": MOST_TURNS}
 KINDS = ("all", *LAWS, *SPEEDS, *BODIES, *_LENGTHS)
 
 
 def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
-    """Return the workload that `seed` and `number`, from 1 on, determine.
-
-    With `attitude`, the workload has no `truth`.
-    """
+    """Return the workload that `seed` and `number` (from 1) determine; no `truth` with `attitude`."""
     source = Random(f"bench/{seed}/{number}")
     place = number - 1
     law, place = LAWS[place % len(LAWS)], place // len(LAWS)
-    # Twelve successive draws with the same kind of torque contain all pairs of four bodies and
+    # Twelve successive draws of the same kind of torque have all pairs of the four bodies and the
     # three speeds.
     body = list(BODIES)[place % len(BODIES)]
     speed = list(SPEEDS)[place % len(SPEEDS)] if law in WAVES else ""
@@ -52,7 +49,7 @@ def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
     while True:
         scene, horizon = by_torque(source, name, law, speed, body)
         try:
-            # A fast estimate rejects scenes far above the limit; near it the reference decides.
+            # A fast estimate rejects scenes far above the limit.
             if conditioning(scene, horizon).amplification > 2.0 * MOST_GROWTH:
                 continue
             path = integer_series(scene, [horizon])
@@ -74,7 +71,7 @@ def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
 
 
 def by_torque(source: Random, name: str, law: str, speed: str, body: str) -> tuple[Scene, float]:
-    """Return a random scene, and the time (s) of roughly 1 to 300 revolutions."""
+    """Return a random scene and the time (s) of roughly 1 to 300 revolutions."""
     mass = _log(source, 1.0, 50.0)
     moments = [mass * each for each in BODIES[body](source)]
     source.shuffle(moments)
@@ -89,8 +86,8 @@ def by_torque(source: Random, name: str, law: str, speed: str, body: str) -> tup
 
     found, horizon = TorqueLaw(), 2.0 * math.pi * turns / start
     if law in ("constant torque", "ramp"):
-        # By the end the torque alone would add `gain` times the initial |omega|. The mean |omega|
-        # determines the time of the desired number of revolutions.
+        # The torque alone would add `gain` times the initial |omega| until the end. The mean |omega|
+        # gives the time of the desired revolutions.
         gain = _log(source, 0.1, 30.0)
         constant = law == "constant torque"
         horizon /= 1.0 + gain / (2.0 if constant else 3.0)
@@ -99,7 +96,7 @@ def by_torque(source: Random, name: str, law: str, speed: str, body: str) -> tup
     elif law in WAVES:
         waves = []
         for _ in range(WAVES[law]):
-            # Each wave alone would make omega oscillate by a fraction of its initial value.
+            # Each wave alone would make omega oscillate by 0.01 to 1 times its initial value.
             frequency = start * _log(source, *SPEEDS[speed])
             waves.append((torque(frequency * start * _log(source, 0.01, 1.0)), frequency))
         sines = source.randint(0, len(waves))

@@ -40,9 +40,9 @@ _DRIFT = (
 def measured_report(
     title: str, worth: str, found: Report, packages: Iterable[str], command: str
 ) -> Report:
-    """Return a benchmark's report, with machine and build added, and a Markdown page.
+    """Return the report `found` with machine, build and a Markdown page added.
 
-    `worth` says how comparable the numbers are.
+    `worth` is a text on how comparable the numbers are.
     """
     here, built = machine(packages), build()
     *parts, notes = found.text
@@ -61,9 +61,9 @@ def measured_report(
 
 
 def grouped(reasons: Iterable[tuple[str, str, str]], most: int | None = None) -> list[str]:
-    """Return lines on missing results from tuples of contender, reason and task.
+    """Return lines on missing results, from tuples (contender, reason, task).
 
-    Contenders with equal reason and tasks share a line.
+    Contenders with the same reason and tasks share a line.
     """
     places: dict[tuple[str, str], list[str]] = {}
     for who, why, where in reasons:
@@ -176,7 +176,7 @@ def _settings_of(each: Row | Refusal) -> dict[str, Any]:
 
 
 def microseconds(seconds: float | None) -> str:
-    """Return a time (s) as text in microseconds; "-" for None."""
+    """Return a time (s) as text in microseconds, or "-" for None."""
     if seconds is None:
         return "-"
     value = seconds * 1e6
@@ -256,7 +256,7 @@ def _notes(finding: Finding) -> list[str]:
 
 def not_measured(finding: Finding) -> list[str]:
     """Return a line for each reason for missing results, with examples."""
-    # Reasons that differ only in the expected time or last step at their end share a line.
+    # Omit the expected time or last step from the reasons, so that alike ones share a line.
     came: list[tuple[Row | Refusal, str]] = [
         (each, each.reason.split(", a call would take")[0]) for each in finding.refused
     ]

@@ -1,4 +1,4 @@
-"""Time saved by omitting unnecessary computations."""
+"""Run time saved by omitting unnecessary computations."""
 
 import subprocess
 import sys
@@ -44,8 +44,8 @@ def savings(t_end: float = 3.0, tolerance: float = 1e-9) -> list[Saving]:
         scene = case_scene(case)
         one, other = (_solver(scene, name, t_end, tolerance) for name in ("taylor", "closed-form"))
         found.append(measured_saving("integration", f"Case {case}: closed form", one, other))
-    # This rate is too small to change a bit of the result, but forces the kernel to evaluate the
-    # torque at each time.
+    # The rate changes no bit of the result, but forces the kernel to evaluate the torque at each
+    # time.
     varying = replace(constant, torque=replace(constant.law, rate=(1e-300, 0.0, 0.0)))
     one, other = (_solver(scene, "taylor", t_end, tolerance) for scene in (varying, constant))
     found.append(measured_saving("torque of time", "Case 5: constant torque", one, other))

@@ -21,7 +21,7 @@ class Score:
     # For each target error, the time (s) of the fastest setting that reaches it, or None.
     seconds: tuple[float | None, ...]
     best: float | None  # the smallest error of any setting
-    # The baseline's times divided by `seconds`; above 1 where this contender is faster.
+    # The baseline's times divided by `seconds`: above 1 if this contender is faster.
     ratios: tuple[float | None, ...]
 
 
@@ -31,22 +31,22 @@ class Spread:
 
     method: str
     kind: str
-    target: float  # error, as in `Row.error`
+    target: float  # target error, as in `Row.error`
     scenes: int
-    reached: int  # number of scenes where contender and baseline reach the error
+    reached: int  # number of scenes in which contender and baseline reach the target error
     mean: float | None  # geometric mean over these scenes
     smallest: float | None
     quartiles: tuple[float | None, float | None, float | None]
 
 
 def yardstick(finding: Finding) -> str | None:
-    """Return the name of the baseline contender; None if none was measured."""
+    """Return the baseline's name, or None if nothing was measured."""
     names = list(dict.fromkeys(row.method for row in finding.rows))
     return next((name for name in (*YARDSTICKS, *names) if name in names), None)
 
 
 def scores(finding: Finding, load: Workload, targets: Sequence[float] = TARGETS) -> list[Score]:
-    """Return the scores on a workload, the baseline first."""
+    """Return each contender's score on a workload, the baseline's first."""
     rows: dict[str, list[Row]] = {}
     for row in finding.rows:
         if row.workload == load:
@@ -75,9 +75,9 @@ def groups(finding: Finding) -> dict[str, list[Workload]]:
 
 
 def means(finding: Finding, loads: Sequence[Workload]) -> dict[str, list[float | None]]:
-    """Return each contender's geometric mean ratio over `loads`, for each target error.
+    """Return each contender's geometric mean ratios over `loads`, one for each target error.
 
-    A mean is None if any ratio is missing.
+    A mean is None if a ratio is missing.
     """
     tables = [_ratios(finding, load) for load in loads]
     names = dict.fromkeys(name for table in tables for name in table)
@@ -90,7 +90,7 @@ def means(finding: Finding, loads: Sequence[Workload]) -> dict[str, list[float |
 
 
 def spreads(finding: Finding, kinds: Sequence[str]) -> list[Spread]:
-    """Return distributions of ratios by contender (except the baseline), error and kind."""
+    """Return distributions of ratios by contender (not the baseline), target error and kind."""
     tables = {load.label: _ratios(finding, load) for load in finding.workloads}
     names = dict.fromkeys(name for table in tables.values() for name in table)
     first, found = yardstick(finding), []

@@ -1,4 +1,4 @@
-"""The problems and contenders of `bench --terms`, for torques that depend on the state."""
+"""Problems and contenders of `bench --terms`, for torques that depend on the state."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -32,7 +32,7 @@ OURS, HEYOKA, DOP853 = "auto", "heyoka", "solve_ivp-dop853"
 VARIATIONAL = "heyoka-variational"
 MANY_OURS, MANY_HEYOKA = "taylor", "heyoka-batch"
 ONE_TOLERANCE = 1e-9  # for solvers compared with ours at one tolerance
-# Coarser tolerances change nothing in our steps. The finest is the default of heyoka.
+# Coarser tolerances do not change our steps. The finest is heyoka's default.
 _TOLERANCES = (*(each for each in TOLERANCES if each <= 1e-3), 2.0**-52)
 
 HORIZONS = (10.0, 100.0)  # end times of a single body, s
@@ -42,7 +42,7 @@ _OMEGA: Triple = (0.3, 0.2, 0.9)  # rad/s
 _SPREAD = 0.2  # largest deviation of a component of a body's initial omega from _OMEGA, rad/s
 _ATTITUDE = (0.6, 0.0, 0.8, 0.0)
 
-# These numbers occur in the ready-made terms and again in the formulas.
+# Arguments of the ready-made terms, which occur in the formulas too.
 _D = (0.05, 0.1, 0.15)
 _CUBIC = 0.1
 _TARGET = (0.1, 0.2, 0.5)
@@ -68,7 +68,7 @@ class TermScene:
 class TermBodies(EnsembleLoad):
     """Bodies with different initial omegas and one torque, which depends on the state."""
 
-    body: Scene  # body, torque and initial attitude of all
+    body: Scene  # moments, torque and initial attitude of all bodies
 
     @property
     def scene(self) -> Scene:
@@ -151,7 +151,7 @@ EXPRESSIONS: dict[str, Callable[..., Any]] = {
     "beacon": _beacon,
 }
 
-# The formulas of docs/how-to/torques.md; arguments as in `Formula`.
+# Formulas of docs/how-to/torques.md, with arguments as in `Formula`.
 
 
 def _cross(a: Sequence[Any], b: Sequence[Any]) -> list[Any]:

@@ -50,17 +50,17 @@ _WORTH = (
 class Terms:
     single: Finding
     many: Rates
-    leaves: Counter[str] = field(default_factory=Counter)  # numbers of torques by `Solver.leaves`
+    leaves: Counter[str] = field(default_factory=Counter)  # number of torques by `Solver.leaves`
 
 
 @dataclass(frozen=True)
 class Summary:
-    """The mean and smallest ratio over the scenes of a kind, at one target error."""
+    """The mean and smallest ratio over the scenes of a kind at a target error."""
 
     kind: str
     bodies: int  # number of bodies in a call
-    target: float | None  # None for all target errors together
-    scenes: int  # pairs of scene and end time in which both solvers reach the error
+    target: float | None  # target error; None for all together
+    scenes: int  # number of pairs of scene and end time in which both solvers reach the error
     mean: float | None  # geometric mean
     smallest: float | None
 
@@ -72,7 +72,7 @@ def term_report(found: Terms, packages: Iterable[str], command: str) -> Report:
 
 
 def summaries(found: Terms) -> list[Summary]:
-    """Return mean and smallest ratios by kind and error; empty without heyoka."""
+    """Return mean and smallest ratios by kind and target error, or [] without heyoka."""
     result = []
     for kind in _TITLES:
         loads = [load for load in found.single.workloads if kind in load.kinds]
@@ -128,7 +128,7 @@ def _over(finding: Finding, load: Workload, peer: str) -> float | None:
 
 
 def _preparing(finding: Finding, load: Workload, method: str) -> float | None:
-    """Return a method's time (s) to prepare for a scene's shortest end time; None if unknown."""
+    """Return a method's time (s) to prepare for a scene's shortest end time, or None."""
     first = next(each for each in finding.workloads if each.label == load.label)
     times = [row.preparing for row in _rows(finding, first, method)]
     return (times[0] if method == OURS else statistics.median(times)) if times else None

@@ -21,8 +21,8 @@ MIDDLING = 1e-6
 _LADDER = (1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-9, 1e-7, MIDDLING, 1e-5, 1e-4, 1e-3)
 # Methods that take minutes at their finest tolerances.
 _ONLY_MIDDLING = ("quick", "rk45", "radau")
-# Work limits (number of right-hand sides), and the factor by which the coarsest tolerance may exceed
-# them.
+# Work limits (numbers of right-hand sides), and the factor by which the coarsest tolerance may
+# exceed them.
 _BUDGETS = {**dict.fromkeys(GAUSS, 1_000_000.0), **dict.fromkeys(SCIPY_METHODS, 4_000.0)}
 _PATIENCE = 10.0
 _ORDERS = {"dop853": 8, "lsoda": 8, "radau": 5, "rk45": 5}

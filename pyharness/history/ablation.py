@@ -1,4 +1,4 @@
-"""Apparatus entries (notes on the programs, such as defects), and their effects on errors."""
+"""Entries of the apparatus (notes on the programs, as on defects), and their effects on errors."""
 
 import math
 import string
@@ -37,11 +37,11 @@ for _a in "abcd":
 
 @dataclass(frozen=True)
 class Effect:
-    """The outcome of a program version (`listing`) on a scene."""
+    """The outcome of a program's version `listing` in a scene."""
 
     listing: Listing
     omega: float  # largest error (rad/s) over the completed `steps`
-    velocity: float  # likewise, m/s
+    velocity: float  # the same for velocity (m/s)
     steps: int
     ended: str
     stop: Stop | None
@@ -51,7 +51,7 @@ class Effect:
 
 @dataclass(frozen=True)
 class CaseEffects:
-    """The outcomes of four program versions in one case, which show an apparatus entry's effect."""
+    """The outcomes of four program versions in a case, which show an entry's effect."""
 
     program: str
     case: int
@@ -93,7 +93,7 @@ def case_truth(case: int) -> Reference:
 
 
 def effects_of(name: str) -> Iterator[CaseEffects]:
-    """Yield an apparatus entry's effects by program and case; in each, `original` has the entry."""
+    """Yield the effects of the entry `name` in each of its programs and each case."""
     known = entry(name)
     for program in known["programs"]:
         printed = Listing.original(program).active
@@ -107,9 +107,9 @@ def effects_of(name: str) -> Iterator[CaseEffects]:
 def lattice(
     scene: Scene, program: str, readings: tuple[str, ...] = (), effort: float = 1.0
 ) -> list[Effect]:
-    """Return outcomes with every subset of defects and `readings`, largest `common` error first.
+    """Return outcomes with each subset of defects and `readings`, largest `common` error first.
 
-    Under varying torque, conjectures vary too.
+    Under a varying torque, the subsets include conjectures.
     """
     check_steps(scene, program, "fortran", effort)
     truth = reference(scene, scene.times(), velocity=True, effort=effort)
@@ -130,12 +130,12 @@ def switched(scene: Scene, program: str) -> tuple[str, ...]:
 
 
 def _size(found: Effect) -> list[float]:
-    # Rounded to three digits, so that rounding errors do not affect the order.
+    # Three digits, so that rounding errors do not affect the order.
     return [float(f"{each:.2e}") for each in (*found.common, found.omega, found.velocity)]
 
 
 def apparatus_report(entries: Sequence[dict[str, Any]], are_all_shown: bool = True) -> Report:
-    """Return a report with a line for each apparatus entry.
+    """Return a report with a line for each entry.
 
     Unless `are_all_shown`, its text has only the defects that change numbers.
     """

@@ -1,4 +1,4 @@
-"""The reports of the command `cards` on the punched cards of the thesis's programs."""
+"""Reports of the command `cards` on the punched cards of the thesis's programs."""
 
 import textwrap
 from collections import Counter
@@ -27,7 +27,7 @@ _DISAGREEMENTS = (
     *words("disagreement in equation origin certainty"), Column("entries", left=True, fit="wrap"),
 )  # fmt: skip
 _SHORT = dict(zip(PROGRAMS, ("2", "4", "R"), strict=True))
-HALF = 48  # width, in characters, of each of two texts side by side
+HALF = 48  # width (characters) of each of two texts side by side
 
 
 def cards_report(
@@ -68,7 +68,7 @@ def _contents(cards: Sequence[Card]) -> list[Section]:
 def card_record(card: Card) -> dict[str, Any]:
     """Return a card as a JSON record."""
     found = deck(card.program)
-    # Null if the scan agrees with our text, empty if it lacks the card.
+    # None if the scan agrees with our text, "" if it lacks the card.
     scan = (card.scan or "") if card.deviates else None
     differences = [each._asdict() for each in card.differences]
     port, twin = ([x._asdict() for x in of.get(card.number, [])] for of in (found.port, found.twin))
@@ -81,9 +81,9 @@ def card_record(card: Card) -> dict[str, Any]:
 def scan_report(
     faults: Sequence[str], undeclared: Sequence[str], lines: int, digest: str
 ) -> Report:
-    """Return a report on the unexplained lines of a scan.
+    """Return a report on the unexplained lines of a scan with the SHA-256 `digest`.
 
-    `faults` and `undeclared` are sentences from `collation`; `digest` is the scan's SHA-256.
+    `faults` and `undeclared` are sentences from `collation`.
     """
     cards = [card for program in PROGRAMS for card in deck(program).cards.values()]
     deviating = sum(bool(each.differences or each.lost) for each in cards)
@@ -106,7 +106,7 @@ def scan_report(
 
 
 def classes_report() -> Report:
-    """Return the report that counts apparatus entries and their cards, by kind."""
+    """Return a report of the numbers of apparatus entries and their cards by kind."""
     entries = facts("apparatus")["entry"]
     cards = [card for program in PROGRAMS for card in deck(program).cards.values()]
     entries_of = Counter(each.entry for card in cards for each in card.differences)
@@ -153,7 +153,7 @@ def _block(card: Card) -> Section:
 
 
 def beside(left: Iterable[str], right: Iterable[str]) -> list[Line]:
-    """Return two texts side by side; left lines have at most `HALF` characters."""
+    """Return two texts side by side; left lines must have at most `HALF` characters."""
     pairs = zip_longest(left, right, fillvalue="")
     return [Line(f"{a.ljust(HALF)}   {b}".rstrip()) for a, b in pairs]
 

@@ -66,7 +66,7 @@ class Orbit:
     turn: float  # largest factor from an error of omega, relative to `largest`, to the phase (rad)
 
     def limits(self, noise: Noise, steps: float) -> dict[str, float]:
-        """Return error bounds after `steps` steps: "energy", "momentum" (relative) "phase" (rad)."""
+        """Return bounds after `steps` steps: "energy", "momentum" (relative), "phase" (rad)."""
         walk = DEVIATIONS * noise.rounding * math.sqrt(steps)
         drift = steps * noise.truncation
         # The result is rounded once more. Two roundings in each of A, B and C change the conserved

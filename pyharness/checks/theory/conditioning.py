@@ -70,7 +70,7 @@ class Conditioning:
         return 0.0 if math.isnan(allowed) else min(2.0, allowed)
 
     def angle_limit(self, made: float, time: float) -> float:
-        """Return an attitude's allowed error (rad) at `time` (s), if steps' errors sum to `made`."""
+        """Return an attitude's allowed error (rad) at `time` (s); step errors add up to `made`."""
         # Assume that omega has its largest rounding error at all times.
         turned = self.rounding * (1.0 + math.sqrt(3.0) * self.largest * abs(time))
         return made + turned + ATTITUDE
@@ -114,9 +114,9 @@ def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
 def sampled(
     sample: Callable[[Array], tuple[float, _Sample]], time: float, fewest: int, most: int
 ) -> tuple[Array, _Sample]:
-    """Return equally spaced times (s), dense enough for the rate (1/s) of `sample`, and its results.
+    """Return equally spaced times (s) and the results of `sample` at these times.
 
-    There are `fewest` to `most` intervals.
+    The `fewest` to `most` intervals are short enough for the rate (1/s) that `sample` returns.
     """
     count = fewest
     while True:

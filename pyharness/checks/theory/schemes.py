@@ -153,7 +153,7 @@ def improved_euler(on: Numbers, omega: Array) -> Array:
 def taylor_3(on: Numbers, omega: Array) -> Array:
     """Return omega after a Taylor step with three terms (eq. 30)."""
     rate = on.rate(omega)
-    # Derivative of the right-hand side along itself, exact because the right-hand side is quadratic.
+    # Derivative of the quadratic right-hand side along itself, exact except for rounding.
     along = 0.5 * (on.rate(omega + rate) - on.rate(omega - rate))
     return omega + on.times_step(rate + 0.5 * on.times_step(along))
 

@@ -1,4 +1,4 @@
-"""Trial of torque-free attitudes: near a separatrix, over 1e6 revolutions, near angle poles."""
+"""Trial of torque-free attitudes."""
 
 import math
 import random
@@ -43,7 +43,7 @@ from pyharness.model.trajectory import Array, turned_to_space
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.free_attitude import free_attitude, period_of
 
-# The limits of closed forms need no conditioning, whose computation would take long.
+# The limits of closed forms do not need the error amplification, whose computation takes long.
 _unknown = partial(unknown_flow, 1.0)
 _SERIES = ("taylor", "dop853")
 _TOLERANCES = {"taylor": (1e-12, MIDDLING), "dop853": (MIDDLING,)}
@@ -198,7 +198,7 @@ def _solid_angle(scene: Scene, period: float) -> float:
         axes = [(third + 1) % 3, (third + 2) % 3, third]
         m, omega = m[:, axes], rows[:, axes]
         if m[0, 2] < 0.0:
-            # The formula needs a positive third component; rotate by 180 degrees about the first axis.
+            # Rotate by 180 degrees about the first axis; the formula needs a positive third component.
             m, omega = m * [1.0, -1.0, -1.0], omega * [1.0, -1.0, -1.0]
         rate = np.cross(m, omega)
         found = float(((m[:, 0] * rate[:, 1] - m[:, 1] * rate[:, 0]) / (1.0 + m[:, 2])).mean())

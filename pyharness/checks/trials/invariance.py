@@ -63,8 +63,8 @@ def _signs(first: float, second: float, third: float) -> Symmetry:
         lambda s: rotated(s, lambda v: (first * v[0], second * v[1], third * v[2]), body=False),
         1.0,
         lambda omega: omega * [first, second, third],
-        # Rounding to nearest does not depend on the sign. Radau and LSODA are missing, because their
-        # finite differences for the Jacobian do not change sign.
+        # Rounding to nearest does not depend on the sign. Radau and LSODA are missing: the finite
+        # differences of their Jacobian do not change sign.
         (*OURS, *_PREPARED, "dop853", "rk45", *FIXED_STEP, *PROGRAMS),
     )
 

@@ -30,7 +30,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 from pyharness.truth.elliptic import torque_free
 
-# A revolution takes the time 2 pi divided by the largest component of omega.
+# A revolution takes 2 pi divided by the largest component of omega.
 REVOLUTIONS = tuple(10.0 ** (k / 2.0) for k in range(2, 13))
 MOTIONS = {
     # Case 4: fast precession about the axis of the spin.

@@ -177,7 +177,7 @@ def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check
 
 
 def _describe_axial(name: Name) -> Iterator[Attempt]:
-    """Yield deferred reports of errors with a fixed step, in which a phase advances 100 rad or more."""
+    """Yield deferred reports of errors with fixed steps of at least 100 rad of a wave's phase."""
     scene = scene_of(name)
     truth = cache(lambda: brouwer.floats(axial_top(scene, scene.times())))
 

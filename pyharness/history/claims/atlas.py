@@ -1,7 +1,7 @@
 """The atlas of claims: which claims hold for which initial omega (start).
 
-The starts cover all directions at several magnitudes. A claim scores 1 point if reproduced, 1/2 if
-in part. Verdict codes are those of `over_starts`.
+The starts have all directions at several magnitudes. A claim scores 1 point if reproduced, 1/2 if
+reproduced in part. Verdict codes are those of `over_starts`.
 """
 
 import math
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 WHERE = ("omega.magnitude", "height", "longitude")
 CHOSEN = ("reading", "steps")
 _CODES = (FAILS, HOLDS, IN_PART)
-# The points of a verdict, indexed by its code.
+# Points by verdict code.
 _POINTS = np.zeros(len(_CODES) + 1)
 _POINTS[[HOLDS, IN_PART]] = POINTS[REPRODUCED], POINTS[PARTLY]
 Codes = NDArray[np.int8]
@@ -47,16 +47,16 @@ _OMEGA = tuple(Column(f"omega{k}", digits(".3g"), unit="rad/s") for k in (1, 2, 
 class Atlas:
     """The verdict codes of claims over readings, numbers of steps and initial omegas."""
 
-    codes: Mapping[str, Codes]  # by claim; axes: reading, steps, magnitude, height, longitude
+    codes: Mapping[str, Codes]  # by claim; axes reading, steps, magnitude, height, longitude
     readings: Sequence[str]
     steps: Sequence[int]
     first: Batch  # scenes of the first reading and number of steps
-    magnitudes: Array  # of omega(0), rad/s
-    heights: Array  # omega3 over the magnitude
-    longitudes: Array  # rad
+    magnitudes: Array  # magnitudes of omega(0), rad/s
+    heights: Array  # omega3 divided by the magnitude
+    longitudes: Array  # angles about axis 3, from axis 1, rad
 
     def score(self, reading: int = 0, steps: int = 0) -> Array:
-        """Return the points of each initial omega, for indices of reading and number of steps."""
+        """Return each start's points, for the indices of a reading and a number of steps."""
         return sum_of_points([codes[reading, steps] for codes in self.codes.values()])
 
     def none_fails(self, reading: int = 0, steps: int = 0) -> NDArray[np.bool_]:
@@ -64,7 +64,7 @@ class Atlas:
         return np.asarray(np.all(held, axis=0))
 
     def start(self, at: Sequence[int] | NDArray[Any]) -> Triple:
-        """Return omega(0) (rad/s) at the indices of magnitude, height and longitude."""
+        """Return omega(0) (rad/s) at the indices `at` of magnitude, height and longitude."""
         size, height = self.magnitudes[at[0]], self.heights[at[1]]
         across, longitude = np.sqrt(1.0 - height * height), self.longitudes[at[2]]
         found = size * np.array([across * np.cos(longitude), across * np.sin(longitude), height])
@@ -72,7 +72,7 @@ class Atlas:
 
 
 def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Any], first: Batch) -> Atlas:
-    """Return the atlas of a sweep, which must be complete and have the atlas's axes."""
+    """Return the atlas of a sweep, or raise InputError if it is incomplete or has other axes."""
     if tuple(axes) != (*CHOSEN, *WHERE) or not all(map(len, axes.values())) or not codes:
         allowed = ", ".join((*CHOSEN, *WHERE))
         raise InputError(
@@ -102,14 +102,14 @@ def shares(codes: Codes) -> tuple[float, float, float]:
 
 
 def bits(codes: Codes) -> float:
-    """Return the entropy (bits) of a claim's verdict over the initial omegas."""
+    """Return the entropy (bits) of a claim's verdict over the starts."""
     parts = np.array([(codes == code).mean() for code in _CODES])
     parts = parts[parts > 0.0]
     return float(-(parts * np.log2(parts)).sum()) + 0.0
 
 
 def about(names: Sequence[str]) -> dict[int, list[str]]:
-    """Return by case the claims in `names` that concern this case alone."""
+    """Return by case the claims in `names` that concern only this case."""
     found: dict[int, list[str]] = {}
     for name in names:
         case = claim(name)["parameters"].get("case")
@@ -119,7 +119,7 @@ def about(names: Sequence[str]) -> dict[int, list[str]]:
 
 
 def shown_starts(names: Sequence[str], first: Batch) -> dict[Triple, dict[str, int]]:
-    """Return for each of `starts` the verdict codes by claim, with the programs of `first`."""
+    """Return verdict codes by claim for each of `starts`, otherwise with the scenes of `first`."""
     given = starts()
     batch = replace(first, arrays={"omega": np.array(given)})
     found = {name: FUNCTIONS[name](batch) for name in names}
@@ -239,7 +239,7 @@ def _by_choice(atlas: Atlas) -> Table:
 
 
 def _percentage_turned(atlas: Atlas) -> Table:
-    """Return by claim the percentage of verdicts that another reading or step count changes."""
+    """Return a table of the percentage of each claim's verdicts that other choices change."""
     places = [(k, 0) for k in range(1, len(atlas.readings))]
     places += [(0, m) for m in range(1, len(atlas.steps))]
     rows = []
@@ -252,7 +252,7 @@ def _percentage_turned(atlas: Atlas) -> Table:
 
 
 def atlas_picture(atlas: Atlas) -> Picture:
-    """Return maps of the score over directions of omega(0), and each claim's mean by magnitude."""
+    """Return maps of the score over directions of omega(0), and claims' mean points by magnitude."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12.0, 7.2), dpi=100, layout="constrained")
@@ -277,7 +277,7 @@ def atlas_picture(atlas: Atlas) -> Picture:
 def _draw_maps(figure: "Figure", atlas: Atlas, score: Any) -> None:
     import matplotlib as mpl
 
-    # The first and last maps resemble their neighbours.
+    # Omit the first and last maps, which resemble their neighbours.
     count = len(atlas.magnitudes)
     inside = np.linspace(0, count - 1, _MAPS + 2)[1:-1].round()
     chosen = np.unique(inside) if count > _MAPS else np.arange(count)

@@ -1,6 +1,6 @@
 """Evidence on the choices that the thesis leaves open: a score for every combination.
 
-A combination fixes omega(0), readings, conjectures and number of steps. Its omega(0) is one value
+A combination has an omega(0), readings, conjectures and a number of steps. Its omega(0) is one value
 for all cases in which the thesis gives none, or our value for each case. The score is the number of
 testable claims that the original programs reproduce; in part counts 1/2.
 """
@@ -34,7 +34,7 @@ from pyharness.thesis.cells import subsets
 POINTS = {REPRODUCED: 1.0, IN_PART: 0.5}
 STEPS = (100, 300)
 KINDS = ("result", "design")
-"""The kinds of claims that are scored, those about the programs."""
+"""The kinds of claims that are scored."""
 _SHOWN = 12
 _SHORT = {
     "omega(0)": "omega(0)", "reading c1-for-c": "C1", "reading do-variable": "DO",
@@ -59,7 +59,7 @@ class Combination:
 
     @property
     def holding(self) -> int:
-        """Return the number of claims reproduced at least in part."""
+        """The number of claims reproduced at least in part."""
         return sum(each in POINTS for each in self.verdicts.values())
 
     def choices(self) -> dict[str, str]:
@@ -84,8 +84,8 @@ def evidence() -> Iterator[Combination]:
 
 
 def combinations() -> list[Assumptions]:
-    """Return all combinations of assumptions; a start of None selects our values of omega(0)."""
-    # The last name varies fastest.
+    """Return all combinations; a start of None selects our values of omega(0)."""
+    # Reversed, so that the last name varies fastest.
     readings, conjectures = (
         list(subsets(names_of(kind)[::-1])) for kind in ("reading", "conjecture")
     )
@@ -99,15 +99,15 @@ def discriminating(found: list[Combination]) -> list[str]:
 
 
 def undecided(found: list[Combination]) -> dict[str, list[str]]:
-    """Return by choice the values that occur with the highest score."""
+    """Return the values of each choice that occur with the highest score."""
     best = max(each.score for each in found)
     choices = [each.choices() for each in found if each.score == best]
     return {axis: sorted({each[axis] for each in choices}) for axis in choices[0]}
 
 
 def _relevant(entry: dict[str, Any], chosen: Assumptions) -> Assumptions:
-    """Return `chosen` with defaults for assumptions on which the claim does not depend."""
-    # Combinations that then agree share one test of the claim.
+    """Return `chosen` with defaults for assumptions on which a claim does not depend."""
+    # Combinations that then are equal share one test of the claim.
     hangs_on = entry["assumptions"]
     readings = frozenset(name for name in chosen.readings if f"reading {name}" in hangs_on)
     named = [each for each in hangs_on if each.startswith("conjecture ")]

@@ -1,4 +1,4 @@
-"""Runs of the programs under assumptions, cached, for the tests of claims."""
+"""Cached runs of the programs under assumptions, for the tests of claims."""
 
 import math
 from collections.abc import Sequence
@@ -27,15 +27,15 @@ class Assumptions:
 
     # omega(0) (rad/s) in the cases for which the thesis gives none; None: our values in cases.toml.
     start: Triple | None = None
-    readings: frozenset[str] = frozenset()  # alternatives to those that we adopt
+    readings: frozenset[str] = frozenset()  # readings other than those that we adopt
     steps: int = 100
     conjectures: frozenset[str] | None = None  # None: those of the original listing
-    word: str = BINARY64  # arithmetic
+    word: str = BINARY64  # arithmetic of the programs
 
 
 @dataclass(frozen=True)
 class Laboratory:
-    """The three programs, run on the cases of Table 1; `parts` divides a run's step size."""
+    """The three programs on the cases of Table 1; `parts` divides a run's step size."""
 
     is_original: bool
     assumptions: Assumptions = field(default_factory=Assumptions)
@@ -62,7 +62,7 @@ class Laboratory:
     def run_on(
         self, scene: Scene, listing: Listing, may_stop: bool = True, lipschitz: float = 500.0
     ) -> Trajectory:
-        """Return the run of a listing in the assumed arithmetic; `lipschitz` is in 1/s."""
+        """Return a listing's run in the assumed arithmetic, with the stop constant `lipschitz` (1/s)."""
         return _run(listing, scene, may_stop, lipschitz, self.assumptions.word)
 
     def truth(self, case: int) -> Reference:
@@ -70,30 +70,30 @@ class Laboratory:
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
         run = self.run(program, case, may_stop, parts)
-        reached = run.omega[parts - 1 :: parts]  # only the undivided steps
+        reached = run.omega[parts - 1 :: parts]  # at the ends of the undivided steps
         omega = np.full((self.assumptions.steps, 3), np.nan)
         omega[: len(reached)] = reached
         complete, overflow = (np.bool_(run.ended == each) for each in ("complete", "overflow"))
         return Runs(omega, np.asarray(len(reached)), complete, overflow)
 
     def solution(self, case: int) -> Array:
-        """Return the reference omega (rad/s) of a case, shape (steps, 3)."""
+        """Return a case's reference omega (rad/s), shape (steps, 3)."""
         return self.truth(case).omega
 
     def error(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> float:
-        """Return the largest error of any omega component (rad/s), infinite after an overflow."""
+        """Return the largest error (rad/s) of any component of omega, infinite after an overflow."""
         return float(largest_error(self, program, case, may_stop, parts))
 
     def models(self, case: int, terms: int) -> Array:
         """Return omega (rad/s) by collocation at `terms` evenly spaced points, shape (steps, 3).
 
-        For original programs, the torque must be constant.
+        For original programs the torque must be constant.
         """
         accumulates = self.is_original and "dt-accumulates" not in self.fixed
         return _model(self.scene(case), terms, accumulates, self.assumptions.word)
 
     def required_constant(self, case: int) -> float:
-        """Return the least Lipschitz constant (1/s) with which a run does not stop, or infinity."""
+        """Return the least stop constant (1/s) with which a run does not stop, or infinity."""
         scene, listing = self.scene(case), self.listing("runge-kutta")
         constant = 0.0
         for _ in range(6 * scene.steps):
@@ -107,7 +107,7 @@ class Laboratory:
 
 
 def starts() -> list[Triple]:
-    """Return all initial omegas (rad/s) in the thesis, and one that we add."""
+    """Return all initial omegas (rad/s) of the thesis, and one that we add."""
     given = (each["omega"] for each in facts("claims")["start"])
     return [(float(a), float(b), float(c)) for a, b, c in given]
 
@@ -117,14 +117,14 @@ def start_text(start: Triple) -> str:
 
 
 def distance(first: Array, second: Array) -> float:
-    """Return the largest difference (rad/s) of any omega component over the common steps."""
+    """Return the largest difference (rad/s) of any component of omega over the common steps."""
     n = min(len(first), len(second))
     with np.errstate(all="ignore"):
         return float(np.abs(first[:n] - second[:n]).max(initial=0.0))
 
 
 def largest(truth: Reference) -> float:
-    """Return the largest magnitude of any reference omega component (rad/s)."""
+    """Return the largest magnitude (rad/s) of any component of the reference omega."""
     return float(largest_of(truth.omega))
 
 
@@ -164,10 +164,10 @@ def _model(scene: Scene, terms: int, accumulates: bool, word: str) -> Array:
 
 
 LITERALS = ("DT=", "T=", "DT+")
-"""The statements of the collocation decks in which the step size is a literal number.
+"""Statements of the collocation decks in which the step size is a literal number.
 
-``DT=`` sets the interval length DT before the loop, ``T=`` sets the end of the interval, and
-``DT+`` adds to DT in every step.
+``DT=`` sets the interval's length DT before the loop, ``T=`` sets the interval's end, and ``DT+``
+adds to DT in every step.
 """
 
 
@@ -177,7 +177,7 @@ def by_literals(
 ) -> Array:
     """Return an original collocation program's omega (rad/s), shape (scenes, steps, 3).
 
-    `parts` divides the literals in `changed`; the torque must be constant.
+    `parts` divides the literal step sizes in `changed`; the torque must be constant.
     """
     h, steps = scenes[0].step_size, scenes[0].steps
     dt, end, growth = (h / parts if name in changed else h for name in LITERALS)
@@ -185,7 +185,7 @@ def by_literals(
     bodies = np.array([each.euler_coefficients for each in scenes])
     torque = np.array([each.normalized_torque(0.0) for each in scenes])
     rows = integrate_models(omega, bodies, torque, terms, dt, end, growth, round(steps * h / end))
-    every = round(h / end)  # to return only the undivided steps
+    every = round(h / end)  # return omega at the ends of the undivided steps
     return rows[:, every - 1 :: every]
 
 
@@ -195,7 +195,7 @@ def integrate_models(
 ) -> Array:  # fmt: skip
     """Return omega (rad/s) of n bodies by collocation, shape (n, steps, 3).
 
-    `torque` is over moments (rad/s2), and times are in s.
+    `torque` is divided by the moments (rad/s2); times are in s.
     """
     a, b, c = coefficients.T
 
@@ -211,7 +211,7 @@ def integrate_models(
     with np.errstate(all="ignore"):
         for step in range(steps):
             first = rates(state)
-            # The points divide (0, dt) evenly; the step has the length `end`.
+            # The collocation points divide (0, dt) evenly, but the step has the length `end`.
             points = dt * inside
             at_points = np.array([rates(state + t * first) for t in points])
             matrix = powers * points[:, None] ** (powers - 1)

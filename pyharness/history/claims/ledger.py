@@ -1,4 +1,4 @@
-"""The claims of the thesis, our verdicts on them, and reports."""
+"""The claims of the thesis and our verdicts on them."""
 
 import math
 from collections import Counter
@@ -22,7 +22,7 @@ from pyharness.thesis.programs import BINARY64
 
 @dataclass(frozen=True)
 class Survival:
-    """The verdicts with one assumption changed; `survives` if neither verdict changes."""
+    """The verdicts after a change of one assumption; `survives` if neither verdict changes."""
 
     assumption: str
     original: str
@@ -32,7 +32,7 @@ class Survival:
 
 @dataclass(frozen=True)
 class Judgement:
-    """The verdicts on a claim, from runs of the original and of the corrected programs."""
+    """The verdicts on a claim, from the original and from the corrected programs."""
 
     claim: dict[str, Any]
     original: Judged
@@ -42,12 +42,12 @@ class Judgement:
 
 @dataclass(frozen=True)
 class Assignment:
-    """An initial omega for a case without one in the thesis, with verdicts by claim."""
+    """An initial omega for a case without one in the thesis, with the verdicts by claim."""
 
     case: int
     start: Triple  # rad/s
     verdicts: dict[str, str]
-    # Whether the claims whose verdicts depend on `start` are reproduced, at least in part.
+    # Whether all claims whose verdicts depend on `start` are reproduced, at least in part.
     holds: bool
 
 
@@ -88,7 +88,7 @@ def judgements() -> list[Judgement]:
 
 
 def outcome(entry: dict[str, Any], laboratory: Laboratory) -> Judged:
-    """Return the verdict on a claim, an entry of `data/claims.toml`."""
+    """Return the verdict on a claim, which is an entry of `data/claims.toml`."""
     name, parameters = entry["test"], entry.get("parameters", {})
     for module in (verdicts, methods, theory):
         if name in vars(module):
@@ -106,7 +106,7 @@ def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:
         elif name == "steps":
             yield "300 steps", Assumptions(steps=300)
         elif name.startswith("conjecture "):
-            # The choice is removed if the original listing has it, else added.
+            # Remove the conjecture if the original listing has it, else add it.
             conjecture = name.removeprefix("conjecture ")
             own = Listing.original(PROGRAMS[0]).conjectures
             told = "without" if conjecture in own else "with"
@@ -116,7 +116,7 @@ def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:
 
 
 def assignments() -> list[Assignment]:
-    """Return the verdicts from each initial omega in each case for which the thesis gives none."""
+    """Return the verdicts for each start, in each case for which the thesis gives no omega(0)."""
     found = []
     for case in open_starts():
         about = [each for each in claims() if each.get("parameters", {}).get("case") == case]
@@ -131,7 +131,7 @@ def assignments() -> list[Assignment]:
     return found
 
 
-# Each verdict as written in the table of all claims, and in the legend of the table.
+# Each verdict as written in the table of claims, and in its legend.
 _VERDICTS = {
     "reproduced": ("yes", "reproduced (yes)"),
     "reproduced in part": ("in part", "in part"),
@@ -159,7 +159,7 @@ KINDS = {
     "history": "what others did, and what the author did",
     "recommendation": "neither true nor false, and so not testable",
 }
-"""The kinds of claims, each with its subject."""
+"""The kinds of claims and their subjects."""
 
 
 def claims_report(judgements: Sequence[Judgement]) -> Report:
@@ -268,7 +268,7 @@ def _hangs_on(judgement: Judgement) -> list[str]:
 
 
 def written(x: float) -> str:
-    """Return a number as text: whole numbers below a million in full, others to three digits."""
+    """Return a number as text: whole ones below a million in full, others to three digits."""
     if not math.isfinite(x):
         return short(x)
     return f"{x:.0f}" if x == int(x) and abs(x) < 1e6 else f"{x:.3g}"

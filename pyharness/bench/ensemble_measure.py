@@ -110,7 +110,7 @@ class _Task:
         return float(np.where(np.isfinite(errors), errors, np.inf).max())
 
     def setting(self, each: EnsembleContender) -> float | None:
-        """Return the coarsest setting that reaches the target error, or None; `STEPS` without one."""
+        """Return the coarsest setting that reaches the target error or, without target, `STEPS`."""
         if self.target is None:
             return float(STEPS)
         for setting in _ladder(each, self.target):

@@ -48,10 +48,10 @@ _BATCH = 1e-3  # s; calls faster than this are batched
 
 @dataclass(frozen=True)
 class Workload:
-    """A scene, and the time to which its motion is integrated."""
+    """A scene and its end time."""
 
-    # The number of a case or of a random scene, or the name of a torque term. A case number is
-    # followed by `L` if T = 100 s (`3L`), or by any other T that is not 3 s.
+    # Number of a case or random scene, or name of a torque term. A case number is followed by `L`
+    # if T = 100 s (`3L`), or by T if T is neither 3 nor 100 s.
     label: str
     scene: Scene
     horizon: float  # end time T, s
@@ -198,7 +198,7 @@ def error_of(end: End, truth: Reference, scale: float = 0.0) -> float | None:
 
 
 def relative_error(omega: Array, truth: Reference, scale: float = 0.0) -> float | None:
-    """Return omega's error relative to the larger of `scale` (rad/s) and the true omega, or None."""
+    """Return omega's error relative to the larger of `scale` (rad/s) and true omega, or None."""
     if len(truth.omega) == 0:
         return None
     # Near the true solution this difference is exact, so that the reference's digits beyond

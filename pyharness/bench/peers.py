@@ -1,7 +1,7 @@
 """Third-party integrators for `bench`, set up for speed as their documentation recommends.
 
-numba compiles a Runge-Kutta method for each scene: the right-hand sides contain the scene's
-numbers, and the loop over stages is unrolled.
+numba compiles a Runge-Kutta method for each scene, with the scene's numbers in the right-hand sides
+and an unrolled loop over stages.
 """
 
 import warnings
@@ -23,7 +23,7 @@ from pyharness.model.tape import Functions, Table, evaluate
 from pyharness.model.trajectory import Array
 from pyharness.truth.reference import exact_coefficients
 
-# A torque about the body axes (N m), from time, omega, attitude, and the functions sin and cos.
+# Returns a torque about body axes (N m) from time, omega, attitude, and the functions sin and cos.
 Formula = Callable[..., Sequence[Any]]
 MOST_STEPS = 10_000_000
 Tableau = tuple[Sequence[Sequence[float]], Sequence[float], Sequence[float]]

@@ -37,7 +37,7 @@ KINDS = ("all", *LAWS, *SPEEDS, *BODIES, *_LENGTHS)
 
 
 def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
-    """Return the workload that `seed` and `number` (from 1) determine; no `truth` with `attitude`."""
+    """Return workload `number` (from 1) of a seed; with `attitude` it has no `truth`."""
     source = Random(f"bench/{seed}/{number}")
     place = number - 1
     law, place = LAWS[place % len(LAWS)], place // len(LAWS)
@@ -86,8 +86,8 @@ def by_torque(source: Random, name: str, law: str, speed: str, body: str) -> tup
 
     found, horizon = TorqueLaw(), 2.0 * math.pi * turns / start
     if law in ("constant torque", "ramp"):
-        # The torque alone would add `gain` times the initial |omega| until the end. The mean |omega|
-        # gives the time of the desired revolutions.
+        # Until the end the torque alone would add `gain` times the initial |omega|. The mean
+        # |omega| gives the time of the desired revolutions.
         gain = _log(source, 0.1, 30.0)
         constant = law == "constant torque"
         horizon /= 1.0 + gain / (2.0 if constant else 3.0)

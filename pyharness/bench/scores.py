@@ -1,4 +1,4 @@
-"""Contenders' times to reach target errors, and a baseline's times divided by these."""
+"""Contenders' times to reach target errors, and a baseline's times divided by them."""
 
 import math
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ import numpy as np
 
 from pyharness.bench.measure import TARGETS, Finding, Row, Workload
 
-# The first of these that was measured is the baseline of all ratios.
+# The first of these contenders that was measured is the baseline.
 YARDSTICKS = ("heyoka", "solve_ivp-dop853")
 
 

@@ -1,8 +1,8 @@
 """The thesis's weighted residual methods (III.1 and IV.2), and their orders of convergence.
 
-One step of length h solves omega' = f(t, omega) (eq. 16-18) with a polynomial trial function
+A step of size h solves omega' = f(t, omega) (eq. 16-18) with a polynomial trial function
 omega(0) + c1 t + ... + cn t**n. The first estimate assumes constant f. Each correction (the thesis
-makes one) evaluates f along the previous estimate. It chooses c1, ..., cn so that the integrals of
+makes one) evaluates f along the previous estimate, and chooses c1, ..., cn so that the integrals of
 W (omega' - f) over the step vanish for n weight functions W (eq. 26).
 """
 
@@ -30,20 +30,20 @@ WEIGHTINGS = ("collocation", "subdomain", "galerkin", "least-squares")
 POINTS = ("thesis", "gauss")
 MOST_TERMS = 12
 MOST_CORRECTIONS = 100
-# Largest condition number; above it the points are so close that half of the digits are lost.
+# Largest condition number. Above it points are so close that half of the digits are lost.
 _WORST_CONDITION = 1e8
 SCHEMES: tuple[tuple[str, str | None], ...] = (
     *(("collocation", points) for points in POINTS),
     *((other, None) for other in WEIGHTINGS[1:]),
 )
-# Each method is integrated up to a horizon, with each of these numbers of steps. Every number is
-# twice the number two places before. Horizons are fractions of the end time. Up to the first, the
-# leading term of the error dominates even with large steps. The next two are for methods whose
-# error at the first is mostly rounding, the last three for long scenes.
+# Numbers of steps with which each method integrates up to a horizon; each is twice the number two
+# places before. Horizons are fractions of the end time: at the first, the leading term of the error
+# dominates even with large steps. The next two are for methods whose error at the first is mostly
+# rounding, the last three for long scenes.
 _LADDER = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192)
 _HORIZONS = (1 / 4, 1 / 2, 1, 1 / 16, 1 / 64, 1 / 256)
 # Orders are computed from errors in this range, relative to the largest omega at the horizon. Above
-# it, higher terms of the error matter; below it, rounding error (at most 1e-15) does.
+# it higher terms of the error matter, below it rounding errors (at most 1e-15).
 _LARGEST, _SMALLEST = 1e-2, 5e-14
 _SLOPES_WANTED = 4
 _SETTLED = 0.1
@@ -53,14 +53,15 @@ MOST_STEPS = 2_000
 
 @dataclass(frozen=True)
 class Member:
-    """A weighted residual method of the thesis, with n = `terms` coefficients ci.
+    """A weighted residual method of the thesis with n = `terms` coefficients.
 
-    The weight functions of least squares are i t**(i-1).
+    The weight functions of least squares are i t**(i-1), for i = 1 to n.
     """
 
     weighting: str = "collocation"
     terms: int = 2
-    # Fractions of the step: "thesis" (k/(n+1), k = 1 to n), "gauss" (Gauss-Legendre), or numbers.
+    # Collocation points: "thesis" (k/(n+1) of the step, k = 1 to n), "gauss" (Gauss-Legendre), or
+    # fractions of the step.
     points: str | tuple[float, ...] | None = None
     corrections: int = 1
 
@@ -108,7 +109,7 @@ class Member:
 
 
 def converged_order(member: Member) -> int:
-    """Return the order after many corrections, as derived in docs/explanation/methods.md."""
+    """Return the order of convergence after many corrections (docs/explanation/methods.md)."""
     n = member.terms
     if member.weighting == "galerkin":
         return n
@@ -125,12 +126,12 @@ def converged_order(member: Member) -> int:
 
 
 def predicted_order(member: Member) -> int:
-    """Return the order of the global error after the method's corrections."""
+    """Return the order of convergence after the method's corrections."""
     return min(member.corrections + 1, converged_order(member))
 
 
 def run(scene: Scene, member: Member) -> Trajectory:
-    """Integrate a scene by a weighted residual method (Jacobs 1982, eq. 20-27, and IV.2)."""
+    """Return a scene's trajectory by a weighted residual method (Jacobs 1982, eq. 20-27, IV.2)."""
     omega = integrate(scene, [member])[0]
     rows = int(np.logical_and.accumulate(np.isfinite(omega).all(axis=1)).sum())
     time = np.array(scene.times()[:rows])
@@ -146,7 +147,7 @@ def integrate(scene: Scene, members: Sequence[Member]) -> Array:
 
     Values after an overflow are not finite.
     """
-    # The members are sorted, so that those that need another correction are contiguous in memory.
+    # Sorted, so that members that need another correction are contiguous in memory.
     order = sorted(range(len(members)), key=lambda i: -members[i].corrections)
     members = [members[i] for i in order]
     schemes = [tableau(m.weighting, m.terms, m.points) for m in members]
@@ -187,7 +188,7 @@ def integrate(scene: Scene, members: Sequence[Member]) -> Array:
 
 
 def _stages(matrix: Array, rates: Array) -> Array:
-    """Return matrices (i, j, members) times rates, three times as fast as `_sums`."""
+    """Return matrices (i, j, members) times rates, three times as fast as by `_sums`."""
     side_by_side = np.ascontiguousarray(rates.transpose(1, 2, 0))
     total: Array = matrix[:, 0, None] * side_by_side[0]
     product = np.empty_like(total)
@@ -198,12 +199,12 @@ def _stages(matrix: Array, rates: Array) -> Array:
 
 
 def _sums(factors: Array, rates: Array) -> Array:
-    """Return the products of factors (members, i, j) and rates (members, j, 3) without BLAS."""
+    """Return factors (members, i, j) times rates (members, j, 3), without BLAS."""
     return np.asarray(np.einsum("mij,mjk->mik", factors, rates))
 
 
 def _rates(scene: Scene, torque: Array, omega: Array) -> Array:
-    rates = np.empty(omega.shape)  # C order, because the layout can change how NumPy rounds sums
+    rates = np.empty(omega.shape)  # in C order, because NumPy's rounding depends on the layout
     for i, (a, j, k) in enumerate(zip(scene.euler_coefficients, (1, 0, 0), (2, 2, 1), strict=True)):
         rates[..., i] = torque[..., i] + a * omega[..., j] * omega[..., k]
     return rates
@@ -224,11 +225,11 @@ def _torque(scene: Scene, times: Array) -> Array:
 
 @dataclass(frozen=True)
 class OrderFinding:
-    """A method's predicted and measured order of convergence in a scene, and its error."""
+    """A method's predicted and measured order of convergence in a scene, and error."""
 
     member: Member
     predicted: int
-    measured: float | None  # None if too many errors are too large or only rounding
+    measured: float | None  # None if too few errors are in the usable range
     settled: bool  # whether the last two measurements differ by at most 0.1
     error: float  # largest error of omega (rad/s) with the scene's step size
 
@@ -238,8 +239,7 @@ class OrderFinding:
 
     @property
     def misses(self) -> bool:
-        """Return whether the measured order is below the derived one."""
-        # In special scenes it is higher.
+        """Whether the measured order is below the predicted one; in special scenes it is above."""
         return self.settled and self.deviation < -SLACK
 
 
@@ -250,7 +250,7 @@ def family_members() -> list[Member]:
 def order_table(
     scene: Scene, members: Sequence[Member] | None = None, progress: Progress = no_progress
 ) -> list[OrderFinding]:
-    """Return order of convergence and error of each method, by default of `family_members`.
+    """Return each method's order of convergence and error, by default of `family_members`.
 
     The solution must be bounded.
     """
@@ -277,7 +277,7 @@ def order_table(
         for i, column in zip(open_ones, errors.T, strict=True):
             slopes = _slopes(column)
             doubt = abs(slopes[-1] - slopes[-2]) if len(slopes) >= _SLOPES_WANTED else math.inf
-            # Two slopes may agree by chance: an order that is too low must be so at every horizon.
+            # Two slopes may agree by chance, so that too low an order must be so at every horizon.
             settled = doubt <= _SETTLED and not _too_low(slopes[-1], chosen[i])
             if settled or doubt < doubts[i]:
                 measured[i], doubts[i] = slopes[-1], doubt
@@ -302,7 +302,7 @@ def _too_low(order: float | None, member: Member) -> bool:
 
 
 def _ladder(scene: Scene, members: Sequence[Member], horizon: float, end: Array) -> Array:
-    """Return the relative errors at `horizon` (s), shape (step sizes, members)."""
+    """Return the relative errors of omega at `horizon` (s), shape (step sizes, members)."""
     scale = float(np.abs(end).max()) or 1.0
     rungs = []
     for steps in _LADDER:
@@ -315,11 +315,11 @@ def _ladder(scene: Scene, members: Sequence[Member], horizon: float, end: Array)
 
 
 def _slopes(errors: Array) -> list[float]:
-    """Return the order from each usable pair of errors with step sizes of ratio 2."""
+    """Return the order from each usable pair of errors with a ratio of step sizes of 2."""
     return [
         math.log2(coarse / fine)
         for coarse, fine in zip(errors[:-2], errors[2:], strict=True)
-        # An error may be 0, or so large that the ratio is 0.
+        # The ratio is 0 if the coarse error is 0 or the fine one infinite.
         if coarse < _LARGEST and fine > _SMALLEST and coarse / fine > 0.0
     ]
 
@@ -356,7 +356,7 @@ def _finding(found: Sequence[OrderFinding]) -> list[str]:
 
 
 def verdict(found: Sequence[OrderFinding]) -> list[str]:
-    """Return a sentence for each order below the derived one, or one for all."""
+    """Return a sentence for each unexpected order or, if there is none, a summary."""
     unexpected = _unexpected(found)
     if unexpected:
         return [f"UNEXPECTED: {each}" for each in unexpected]

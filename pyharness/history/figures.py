@@ -26,11 +26,11 @@ if TYPE_CHECKING:
 
 SETS = {"original": Listing.original, "corrected": Listing.corrected}
 ENDINGS = ("svg", "png", "csv")
-# Terms after x(0) in the trial functions.
+# Number of terms after x(0) in the trial functions.
 TERMS = {"two-term": 2, "four-term": 4}
 _POINTS_STEPS = 10
 _NUMBERS = "curve listing time recorded_time omega1 omega2 omega3"
-# These styles can be told apart without colour.
+# The styles differ even without colour.
 _REFERENCE: dict[str, Any] = {"color": "#bdbdbd", "linestyle": "-", "linewidth": 5.0}
 _LIMIT: dict[str, Any] = {"color": "#107040", "linestyle": (0, (3, 1.5)), "linewidth": 1.0}
 _STYLES = {
@@ -49,9 +49,9 @@ _END: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class FigurePlan:
-    """The plan of a redrawn figure of the thesis.
+    """The plan of a redrawn figure, with our `caption`.
 
-    `source` is the passage that supports the choice of programs; `caption` is ours.
+    `source` is the passage of the thesis that supports the choice of programs.
     """
 
     number: int
@@ -61,11 +61,11 @@ class FigurePlan:
     programs: tuple[str, ...]
     caption: str
     source: str
-    limit_of: str  # program whose limit is drawn, or ""
+    limit_of: str  # program whose limit (step size to 0) is drawn, or ""
 
     @property
     def stem(self) -> str:
-        """Return the name of the figure's files without suffix, as in `figure-10a`."""
+        """The name of the figure's files without suffix, as in `figure-10a`."""
         of_set = "-corrected" if self.set == "corrected" else ""
         return f"figure-{self.number:02d}{self.part.lower()}{of_set}"
 
@@ -105,7 +105,7 @@ class FigureFinding:
 
     @property
     def known(self) -> list[tuple[str, Array]]:
-        """Return label and omega (rad/s) of the reference and, if drawn, of the limit."""
+        """The label and omega (rad/s) of the reference and, if drawn, of the limit."""
         return [("reference", self.reference.omega), *([self.limit] if self.limit else [])]
 
 
@@ -159,7 +159,7 @@ def _record(finding: FigureFinding) -> dict[str, Any]:
 
 
 def curve_numbers(finding: FigureFinding) -> Table:
-    """Return the plotted omega (rad/s) by curve and time (s)."""
+    """Return a table of the plotted omega (rad/s) by curve and time (s)."""
     truth, start = finding.reference, np.array(finding.scene.omega)
     rows = [
         [curve, "", t, None, *omega]
@@ -180,7 +180,7 @@ def _from_zero(values: Array, start: Array | float = 0.0) -> Array:
 
 
 def figure_picture(finding: FigureFinding) -> Picture:
-    """Return a picture of each omega component over time, with the reference solution."""
+    """Return a picture of each component of omega over time, with the reference."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7.2, 8.6), dpi=110, layout="constrained")
@@ -205,10 +205,10 @@ def figure_picture(finding: FigureFinding) -> Picture:
 
 
 def together_picture(first: FigureFinding, second: FigureFinding) -> Picture:
-    """Return one picture of omega1 in an original and a corrected figure."""
+    """Return a picture of omega1 from an original and a corrected figure."""
     from matplotlib.figure import Figure
 
-    # The curves of the corrected programs coincide.
+    # One of the corrected programs' curves is enough, because all coincide.
     second = replace(second, curves=second.curves[-1:])
     figure = Figure(figsize=(7.2, 4.2), dpi=110, layout="constrained")
     axes = figure.subplots()
@@ -228,14 +228,14 @@ def points_picture() -> Picture:
     """Return a picture of the original programs' collocation points in the first steps."""
     from matplotlib.figure import Figure
 
-    scene = case_scene(2)  # any case: the points are the same
-    # Each row is a step, and the grey band its length.
+    scene = case_scene(2)  # the points are the same in all cases
+    # Each row is a step; the grey band has the length of a step.
     figure = Figure(figsize=(7.2, 3.2), dpi=110, layout="constrained")
     both = figure.subplots(1, len(TERMS), sharex=True, sharey=True)
     rows: list[list[Any]] = []
     for axes, (program, terms) in zip(both, TERMS.items(), strict=True):
         run = run_program(scene, Listing.original(program))
-        # DT of each step, because TIME=TIME+DT.
+        # TIME increases by DT in each step.
         dt = np.diff(_from_zero(run.recorded_time[:_POINTS_STEPS]))
         color, _, _, marker, _ = _STYLES[program]
         axes.axvspan(0.0, scene.step_size, color="#d8d8d8", linewidth=0.0)
@@ -264,7 +264,7 @@ def _draw_panel(
         run = curve.trajectory
         style = dict(zip(_STYLE, _STYLES[curve.listing.program], strict=True))
         omega = _from_zero(run.omega, start)[:, row]
-        # Renderers fail on very large coordinates.
+        # Clipped, because renderers fail on very large coordinates.
         shown = np.clip(omega, bottom - 50.0 * height, top + 50.0 * height)
         style |= {"label": curve.label, "zorder": 3} | _MARKERS | other
         axes.plot(_from_zero(run.time), shown, **style)
@@ -276,7 +276,7 @@ def _draw_panel(
 
 
 def _frame(finding: FigureFinding, row: int) -> tuple[float, float]:
-    # A curve leaves the plot where it is outside the reference's range by more than max |omega|.
+    # Curves more than max |omega| outside the reference's range are cut off.
     truth = finding.reference.omega
     least, largest = float(truth[:, row].min()), float(truth[:, row].max())
     far = float(np.abs(truth).max())

@@ -1,7 +1,7 @@
 """Software Heritage identifiers (SWHIDs) and a digest of the edition.
 
-A SWHID (ISO/IEC 18670) contains git's SHA-1 hash of a file or folder, by which the archive Software
-Heritage finds its copies.
+A SWHID (ISO/IEC 18670) has git's SHA-1 hash of a file or folder, by which the archive Software
+Heritage finds copies.
 """
 
 import json
@@ -15,9 +15,9 @@ from pyharness.model.listing import PROGRAMS
 from pyharness.thesis.cards import PORT, Card, port_file
 
 DATA = "pyharness/data"
-"""The path of the edition's data in the source repository."""
+"""Path of the edition's data in the source repository."""
 TABLES = (*(f"cards/{program}" for program in PROGRAMS), "apparatus")
-"""The tables in `data` that make up the edition's text, without the suffix `.toml`."""
+"""Tables in `data` that make up the edition's text, without the suffix `.toml`."""
 
 
 def content_identifier(content: bytes) -> str:
@@ -25,13 +25,13 @@ def content_identifier(content: bytes) -> str:
 
 
 def directory_identifier(files: Mapping[str, bytes]) -> str:
-    """Return the SWHID of a folder without links, empty folders and executable files."""
+    """Return the SWHID of a folder that has no links, empty folders or executable files."""
     return f"swh:1:dir:{_tree(files).hex()}"
 
 
 @cache
 def source_files() -> dict[str, bytes]:
-    """Return the files of the edition's data and of the Fortran port, by repository path."""
+    """Return the contents of the edition's data files and the Fortran port, by repository path."""
     folder = facts_folder()
     found = {
         f"{DATA}/{file.relative_to(folder).as_posix()}": file.read_bytes()
@@ -50,21 +50,21 @@ def data_identifier() -> str:
 
 
 def card_identifier(card: Card) -> str:
-    """Return the SWHID of a card: its deck's file, qualified by the card's line."""
+    """Return a card's SWHID: that of its deck's file, with the card's line."""
     content = source_files()[f"{DATA}/cards/{card.program}.toml"]
     return f"{content_identifier(content)};lines={card_lines(content)[card.number]}"
 
 
 @cache
 def card_lines(content: bytes) -> dict[int, int]:
-    """Return by card number each card's line number, from 1, in the file of a deck."""
+    """Return the line number (from 1) of each card in a deck's file, by card number."""
     lines = enumerate(content.decode().splitlines(), 1)
     keys = ((line.partition(" = ")[0], number) for number, line in lines)
     return {int(key): number for key, number in keys if key.isdigit()}
 
 
 def _hash(kind: str, content: bytes) -> bytes:
-    # SHA-1 by the standard; its resistance to attacks does not matter here.
+    # The standard prescribes SHA-1; resistance to attacks does not matter here.
     return sha1(f"{kind} {len(content)}\0".encode() + content, usedforsecurity=False).digest()
 
 
@@ -78,7 +78,7 @@ def _tree(files: Mapping[str, bytes]) -> bytes:
         else:
             entries.append((name, "100644", name, _hash("blob", content)))
     for name, within in folders.items():
-        # git sorts a folder as if its name ended with a slash.
+        # git sorts folders as if their names ended with a slash.
         entries.append((f"{name}/", "40000", name, _tree(within)))
     entries.sort(key=lambda entry: entry[0].encode())
     body = b"".join(f"{mode} {name}\0".encode() + hashed for _, mode, name, hashed in entries)
@@ -86,7 +86,7 @@ def _tree(files: Mapping[str, bytes]) -> bytes:
 
 
 def text_digest(table: Callable[[str], Mapping[str, Any]] = facts) -> str:
-    """Return the text's digest: 12 hexadecimal digits of the SHA-256 of `TABLES`."""
+    """Return the edition's digest: 12 hexadecimal digits of the SHA-256 of `TABLES`."""
     told = {name: table(name) for name in TABLES}
     text = json.dumps(told, ensure_ascii=False, sort_keys=True, separators=(",", ":"))
     return sha256(text.encode()).hexdigest()[:12]

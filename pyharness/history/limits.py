@@ -1,7 +1,7 @@
 """The limits of the original programs as the step size goes to zero.
 
-An original program may converge to the solution of Euler's equations, to another function, or to
-none (docs/article/article.md). Each limit is computed independently of the program, and compared
+An original program may converge to the solution of Euler's equations, to another function, or not
+at all (docs/article/article.md). Each limit is computed independently of the program, and compared
 with runs at halved step sizes. `effort` multiplies the work limit.
 """
 
@@ -25,7 +25,7 @@ from pyharness.thesis.programs import run_program
 from pyharness.truth.reference import Reference, reference
 
 _TOLERANCE = 1e-11
-_MOST_EVALUATIONS = 1_000_000  # right-hand sides, some ten seconds
+_MOST_EVALUATIONS = 1_000_000  # evaluated in some ten seconds
 
 TENDS_TO = {
     "two-term": "the solution of w' = F(w) - (2/9) t^2 Q(F(w)), Q the quadratic part of F",
@@ -52,7 +52,7 @@ Rate = Callable[[float, Sequence[float]], list[float]]
 
 @dataclass(frozen=True)
 class Halving:
-    """A run's largest distances (rad/s) from limit and reference; infinite after an overflow."""
+    """A run's largest distances (rad/s) from limit and reference, infinite after an overflow."""
 
     step_size: float
     from_limit: float
@@ -61,13 +61,13 @@ class Halving:
 
 @dataclass(frozen=True)
 class Limit:
-    """The convergence of an original program to its limit as the step size goes to zero."""
+    """The convergence of an original program as the step size goes to zero."""
 
     program: str
     tends_to: str
     halvings: tuple[Halving, ...]
-    order: float | None  # from the last two step sizes; None if not measurable
-    blow_up: float | None = None  # time (s) at which the limit is unbounded
+    order: float | None  # order of convergence from the last two step sizes, if measurable
+    blow_up: float | None = None  # time (s) at which the limit becomes unbounded
 
     @property
     def approach(self) -> str:
@@ -80,9 +80,9 @@ class Limit:
 
 
 def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) -> Limit:
-    """Return the convergence of an original program, without stop test, to its limit.
+    """Return the convergence of an original program, without the stop test, to its limit.
 
-    Under varying torque, only the Runge-Kutta program has one.
+    Under a varying torque only the Runge-Kutta program has a limit.
     """
     times = scene.times()
     truth = reference(scene, times, effort=effort)
@@ -114,7 +114,7 @@ def limit_solution(
 ) -> tuple[Array, str, float | None]:
     """Return an original program's limit: omega (rad/s), description, and blow-up time (s) or None.
 
-    The omega has the shape (times, 3); it is NaN without a limit.
+    Omega has the shape (times, 3), and is NaN without a limit.
     """
     scale = float(np.abs([scene.omega, *truth.omega]).max()) or 1.0
     start = list(scene.omega)
@@ -133,7 +133,7 @@ def limit_solution(
 
 
 def _extrapolated(scene: Scene) -> Rate:
-    """Return the right-hand side of the limit equation of the two-term program."""
+    """Return the right-hand side of the differential equation of the two-term program's limit."""
     # The original program adds the step size h to DT in every step. In step n the collocation
     # points are therefore t/3 and 2t/3 after the beginning of the step, with t = n h. Let F be the
     # right-hand side of Euler's equations at w, F' its Jacobian, and Q its quadratic part. The
@@ -151,10 +151,10 @@ def _extrapolated(scene: Scene) -> Rate:
 
 
 def _slow_slopes(scene: Scene) -> Rate:
-    """Return the right-hand side of the Runge-Kutta program's limit, under varying torque."""
+    """Return the right-hand side of the differential equation of the Runge-Kutta program's limit."""
     # Let p be the omega in U(1), at which a step's first slopes are evaluated, and F the right-hand
     # side of Euler's equations. Each step of size h adds (h/2) F(p) to p, and h F(p) to the printed
-    # omega. The state is p, then the printed omega.
+    # omega. The state has p, then the printed omega.
     right_hand_side = scene.right_hand_side()
 
     def rate(t: float, state: Sequence[float]) -> list[float]:
@@ -167,7 +167,7 @@ def _slow_slopes(scene: Scene) -> Rate:
 def _solved(
     rate: Rate, start: list[float], times: Sequence[float], scale: float, effort: float
 ) -> tuple[Array, float | None]:
-    """Return the solution (NaN after a blow-up), and the blow-up's time (s) or None."""
+    """Return the solution, NaN after a blow-up, and the time (s) of the blow-up or None."""
     from scipy.integrate import solve_ivp
 
     evaluations, latest = 0, 0.0
@@ -197,12 +197,12 @@ def _solved(
     rows = np.full((len(times), len(start)), math.nan)
     if len(result.t):  # without any time, y is an empty list
         rows[: len(result.t)] = result.y.T
-    # The solver may end just before the bound, if its step becomes too small.
+    # The solver may end just before the bound, if the step size becomes too small.
     return rows, latest if result.status else None
 
 
 def invisible(scene: Scene) -> dict[str, tuple[str, ...]]:
-    """Return by program the defects whose correction alone changes omega only by rounding."""
+    """Return by program the defects whose correction changes omega only by rounding errors."""
     found = {}
     for program in PROGRAMS:
         before = run_program(scene, Listing.original(program))

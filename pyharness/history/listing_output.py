@@ -1,4 +1,4 @@
-"""Comparison of any machine's printed page with ours, to find the machine's arithmetic."""
+"""Comparison of a machine's printed page with ours, to find the machine's arithmetic."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
@@ -16,11 +16,11 @@ from pyharness.thesis.decks import card_steps
 from pyharness.thesis.printer import page
 from pyharness.thesis.programs import BINARY64, WORD_NAMES, run_program
 
-_LARGEST = 1 << 24  # bytes of a page's file
+_LARGEST = 1 << 24  # largest size (bytes) of a page's file
 
 
 def read_page(path: str) -> list[list[str]]:
-    """Return a page's lines of numbers, of which one must have at least six numbers."""
+    """Return the numbers in each line of a page, of which one line must have at least six."""
     where = f"--listing-output '{path}'"
     content = read_input(path, where, _LARGEST, "what a program printed to TAPE6")
     found = printed_numbers(content.decode("ascii", "replace"))
@@ -37,7 +37,7 @@ def fits(
     cases: Sequence[int],
     progress: Progress = no_progress,
 ) -> list[Fit]:
-    """Return comparisons of a page with our pages of equal heading and width, nearest first."""
+    """Return comparisons of a page with our pages of the same heading and width, nearest first."""
     found: list[Fit] = []
     listings = {program: listings_of(program) for program in programs}
     every = len(cases) * len(WORD_NAMES) * sum(map(len, listings.values()))

@@ -1,8 +1,7 @@
 """The lost programs of section IV.2 of the thesis, and mistakes that may explain their failure.
 
-According to IV.2, the programs for the subdomain, Galerkin and least-squares methods, which the
-thesis does not print, gave no meaningful results in Cases 1 and 2. `data/lost.toml` has our
-conjectures on their mistakes.
+According to IV.2, the unprinted programs for the subdomain, Galerkin and least-squares methods gave
+no meaningful results in Cases 1 and 2. `data/lost.toml` has our conjectures on their mistakes.
 
 The trial function has two terms. One correction follows a first estimate with a constant right-hand
 side. A method fails if its error exceeds a tenth of the largest omega.
@@ -35,7 +34,7 @@ TERMS = 2
 
 @dataclass(frozen=True)
 class Attempt:
-    """The result of one method with one mistake.
+    """The result of a method with a mistake.
 
     `shares` are the errors by case, divided by the largest omega.
     """
@@ -54,12 +53,12 @@ class Ranked:
 
     @property
     def in_both(self) -> int:
-        """Return the number of methods that fail in both cases."""
+        """The number of methods that fail in both cases."""
         return sum(len(each.failed) == len(CASES) for each in self.attempts)
 
     @property
     def in_either(self) -> int:
-        """Return the number of methods that fail in either case."""
+        """The number of methods that fail in at least one case."""
         return sum(bool(each.failed) for each in self.attempts)
 
 
@@ -86,7 +85,7 @@ def _share(scene: Scene, weighting: str, mistake: str, word: str = BINARY64) -> 
 
 
 def integrate(scene: Scene, weighting: str, mistake: str = "none") -> Array:
-    """Return omega (rad/s) by a method with one mistake, under constant torque, shape (steps, 3).
+    """Return omega (rad/s) by a method with a mistake, under constant torque, shape (steps, 3).
 
     Rows after an overflow are NaN.
     """
@@ -120,7 +119,7 @@ def integrate(scene: Scene, weighting: str, mistake: str = "none") -> Array:
 
 
 def _rates(estimate: Array, coefficients: tuple[float, ...]) -> Array:
-    """Return the products in Euler's equations as columns of coefficients in t."""
+    """Return the products in Euler's equations as columns of coefficients of powers of t."""
     columns = [
         polynomial.polymul(estimate[:, j], estimate[:, k]) * a
         for a, j, k in zip(coefficients, (1, 0, 0), (2, 2, 1), strict=True)
@@ -130,7 +129,7 @@ def _rates(estimate: Array, coefficients: tuple[float, ...]) -> Array:
 
 
 def _matrix(weighting: str, length: float) -> Array:
-    """Return the weighted integrals of 1 and 2 t over (0, length) (s), a row for each weight."""
+    """Return the weighted integrals of 1 and 2 t over (0, `length`), a row for each weight."""
     columns = [_weighted(weighting, length, (i + 1) * np.eye(i + 1)[i]) for i in range(TERMS)]
     return np.array(columns).T
 
@@ -142,12 +141,12 @@ def _solved(matrix: Array, right: Array, mistake: str, second: bool) -> Array:
         matrix = matrix.T
     (a, b), (c, d) = matrix.tolist()
     if mistake == "matrix-used-up" and second:
-        # LEQT1F overwrites its matrix with Crout's L and U factors, which the second call then uses
-        # as its matrix.
+        # LEQT1F overwrites its matrix with Crout's L and U factors, which the second call takes
+        # for the matrix.
         matrix = np.array([[a, b], [c / a, d - c / a * b]])
     if mistake == "unscaled-solver":
         x, y = right.T
-        # With the array on the left, NumPy applies the number's arithmetic to each element.
+        # The array is on the left, so that NumPy applies each element's own arithmetic.
         second = (y - x * (c / a)) / (d - c / a * b)
         return np.array([(x - second * b) / a, second])
     solutions, _ = leqt1f(matrix.tolist(), right.tolist())
@@ -156,7 +155,7 @@ def _solved(matrix: Array, right: Array, mistake: str, second: bool) -> Array:
 
 def _weighted(weighting: str, length: float, residual: Array) -> list[Any]:
     """Return the integrals over (0, length) of a polynomial times each weight."""
-    # NumPy's polynomials of machine words are several times slower.
+    # Lists, because NumPy's polynomials are several times slower with simulated arithmetic.
     coefficients = residual.tolist()
     found = []
     for k in range(TERMS):
@@ -170,7 +169,7 @@ def _weighted(weighting: str, length: float, residual: Array) -> list[Any]:
         integral = [0.0] * (power + 1)
         integral += [factor * x / (i + power + 1) for i, x in enumerate(coefficients)]
         value = _value(integral, high)
-        # Every integral is 0 at 0.
+        # The antiderivative is 0 at 0.
         found.append(value if low == 0.0 else value - _value(integral, low))
     return found
 

@@ -1,6 +1,6 @@
-"""Disagreements of the decks and the thesis, as evidence on the origin of faults.
+"""Disagreements of the decks with each other and with the thesis, as evidence on faults' origins.
 
-`data/disagreements.toml` separates what the sources say from our inferences.
+`data/disagreements.toml` separates the sources' statements from our inferences.
 """
 
 from collections import Counter
@@ -14,7 +14,7 @@ from pyharness.thesis.collation import names_a_card, rows
 
 
 class Disagreement(NamedTuple):
-    """A disagreement of the decks with each other or with the thesis, and its supposed origin."""
+    """A disagreement of the decks with each other or with the thesis."""
 
     id: str
     title: str
@@ -29,7 +29,7 @@ class Disagreement(NamedTuple):
     origin: str  # kind of origin that we infer
     certainty: str
     entries: Sequence[str]
-    unnoticed: str  # why the test cases do not show the fault
+    unnoticed: str  # why the test cases do not reveal the fault
 
 
 def disagreements() -> list[Disagreement]:
@@ -45,12 +45,12 @@ def disagreements() -> list[Disagreement]:
 
 
 def origins() -> dict[str, str]:
-    """Return the descriptions of the kinds of origin, by name."""
+    """Return descriptions of the kinds of origin by name."""
     return dict(facts("disagreements")["origin"])
 
 
 def unexplained_defects() -> dict[str, str]:
-    """Return the defects that no disagreement explains, each with the reason."""
+    """Return the reasons for defects that no disagreement explains, by defect."""
     return dict(facts("disagreements")["unexplained"])
 
 

@@ -198,7 +198,7 @@ def _solid_angle(scene: Scene, period: float) -> float:
         axes = [(third + 1) % 3, (third + 2) % 3, third]
         m, omega = m[:, axes], rows[:, axes]
         if m[0, 2] < 0.0:
-            # Rotate by 180 degrees about the first axis; the formula needs a positive third component.
+            # Rotate by 180 degrees about the first axis: the formula needs m[2] > 0.
             m, omega = m * [1.0, -1.0, -1.0], omega * [1.0, -1.0, -1.0]
         rate = np.cross(m, omega)
         found = float(((m[:, 0] * rate[:, 1] - m[:, 1] * rate[:, 0]) / (1.0 + m[:, 2])).mean())

@@ -252,7 +252,7 @@ def _percentage_turned(atlas: Atlas) -> Table:
 
 
 def atlas_picture(atlas: Atlas) -> Picture:
-    """Return maps of the score over directions of omega(0), and claims' mean points by magnitude."""
+    """Return maps of the score over directions of omega(0), and claims' means by magnitude."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12.0, 7.2), dpi=100, layout="constrained")

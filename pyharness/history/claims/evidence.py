@@ -1,8 +1,8 @@
 """Evidence on the choices that the thesis leaves open: a score for every combination.
 
-A combination has an omega(0), readings, conjectures and a number of steps. Its omega(0) is one value
-for all cases in which the thesis gives none, or our value for each case. The score is the number of
-testable claims that the original programs reproduce; in part counts 1/2.
+A combination has an omega(0), readings, conjectures and a number of steps. Its omega(0) is one
+value for all cases in which the thesis gives none, or our value for each case. The score is the
+number of testable claims that the original programs reproduce; in part counts 1/2.
 """
 
 from collections import Counter

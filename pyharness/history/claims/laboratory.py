@@ -23,9 +23,9 @@ from pyharness.truth.reference import Reference, reference
 
 @dataclass(frozen=True)
 class Assumptions:
-    """One value for each choice that the thesis leaves open."""
+    """A value for each choice that the thesis leaves open."""
 
-    # omega(0) (rad/s) in the cases for which the thesis gives none; None: our values in cases.toml.
+    # omega(0) (rad/s) in all cases for which the thesis gives none; None: our values in cases.toml.
     start: Triple | None = None
     readings: frozenset[str] = frozenset()  # readings other than those that we adopt
     steps: int = 100
@@ -62,7 +62,7 @@ class Laboratory:
     def run_on(
         self, scene: Scene, listing: Listing, may_stop: bool = True, lipschitz: float = 500.0
     ) -> Trajectory:
-        """Return a listing's run in the assumed arithmetic, with the stop constant `lipschitz` (1/s)."""
+        """Return a listing's run in the assumed arithmetic; `lipschitz` is the stop constant (1/s)."""
         return _run(listing, scene, may_stop, lipschitz, self.assumptions.word)
 
     def truth(self, case: int) -> Reference:
@@ -81,7 +81,7 @@ class Laboratory:
         return self.truth(case).omega
 
     def error(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> float:
-        """Return the largest error (rad/s) of any component of omega, infinite after an overflow."""
+        """Return the largest error (rad/s) of omega's components, infinite after an overflow."""
         return float(largest_error(self, program, case, may_stop, parts))
 
     def models(self, case: int, terms: int) -> Array:

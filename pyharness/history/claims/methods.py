@@ -1,7 +1,7 @@
 """Tests of the thesis's claims about several cases.
 
 Arguments and verdicts are as in `verdicts`. The thesis prints no programs for weightings other than
-collocation; tests of these return "not testable" for the original programs.
+collocation, so that tests of other weightings return "not testable" for the original programs.
 """
 
 import math
@@ -42,7 +42,7 @@ def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Jud
 
 
 def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Judge whether the stop test applies eq. 19, the Lipschitz condition.
+    """Judge whether the stop test applies the Lipschitz condition, eq. 19.
 
     No quotient may exceed the largest norm of the Jacobian.
     """
@@ -52,11 +52,11 @@ def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
         run = lab.run("runge-kutta", case)
         points = np.vstack([lab.truth(case).omega, run.omega])
         matrices = ([[0, a * z, a * y], [b * z, 0, b * x], [c * y, c * x, 0]] for x, y, z in points)
-        # For the differential equations, no quotient of eq. 19 exceeds this norm.
+        # Quotients of exact differential equations do not exceed this norm.
         norm = max(float(np.linalg.norm(matrix, 2)) for matrix in matrices)
         if lab.listing("runge-kutta").has("lipschitz-tests-velocity"):
-            # The equations of V are bilinear in V and omega; these are the norms of their
-            # derivatives.
+            # Add the norms of the derivatives of the equations for V, which are bilinear in V and
+            # omega.
             assert run.velocity is not None
             norm += float(np.linalg.norm(points, axis=1).max())
             norm += float(np.linalg.norm(run.velocity, axis=1).max())
@@ -67,13 +67,13 @@ def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
 
 
 def higher_powers(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -> Judged:
-    """Judge whether more than four terms hardly reduce the error of a collocation model."""
+    """Judge whether more than four terms hardly reduce the error of collocation."""
     numbers = {}
     for case in cases:
         truth = lab.truth(case).omega
         four, *more = (float(np.abs(lab.models(case, n) - truth).max()) for n in (4, *terms))
         for n, error in zip(terms, more, strict=True):
-            # After an overflow, the gain counts as 0.
+            # After an overflow the gain counts as 0.
             gain = four / error if math.isfinite(error) else 0.0
             numbers[f"case {case}: error of four terms over that of {n}"] = gain
     most = max(numbers.values())
@@ -81,7 +81,7 @@ def higher_powers(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -
 
 
 def larger_constant(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Judge whether some case needs a larger Lipschitz constant than that on the cards."""
+    """Judge whether a case needs a larger Lipschitz constant than that on the cards."""
     numbers = {f"case {n}: constant needed (1/s)": lab.required_constant(n) for n in cases}
     return graded(numbers, max(numbers.values()) > facts("cases")["deck"]["lipschitz"])
 
@@ -116,7 +116,7 @@ def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
 
 
 def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
-    """Judge whether collocation improves if the step size is divided by ten.
+    """Judge whether a tenth of the step size improves collocation.
 
     The two-term program must not improve in case `exception`.
     """
@@ -128,7 +128,7 @@ def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
 
 
 def _by_literals(lab: Laboratory, cases: Sequence[int]) -> dict[str, float]:
-    """Return how many cases at least halve the error if some `LITERALS` are divided by ten."""
+    """Return the numbers of cases whose error is halved if some `LITERALS` are divided by ten."""
     scenes = tuple(lab.scene(case) for case in cases)
     numbers = {}
     for program, terms in zip(COLLOCATION, (2, 4), strict=True):
@@ -149,13 +149,13 @@ def suffices(
 ) -> Judged:
     """Judge whether three or four terms suffice for most problems.
 
-    Errors must not exceed `share` of the largest omega in `enough` cases.
+    In `enough` cases, errors must be at most `share` times the largest omega.
     """
     numbers, good = {}, 0
     for case in cases:
         truth = lab.truth(case)
         errors = [lab.error("four-term", case)]
-        # The three-term model of an original program needs a constant torque.
+        # `models` of original programs need a constant torque.
         if not (lab.is_original and lab.scene(case).torque.varies):
             errors.append(distance(lab.models(case, terms[0]), truth.omega))
         error = max(errors) / largest(truth)
@@ -170,7 +170,7 @@ def execution_time(
 ) -> Judged:
     """Judge whether collocation takes about twice the time of Runge-Kutta.
 
-    `unit_times` weights operations; `low` and `high` limit the ratio of times.
+    `unit_times` are the operations' times; `low` and `high` limit the ratio of times.
     """
     listings = {program: lab.listing(program) for program in PROGRAMS}
     counts = {name: operations_per_step(each) for name, each in listings.items()}
@@ -191,7 +191,7 @@ def execution_time(
 
 
 def seconds(lab: Laboratory) -> Judged:
-    """Return "not testable" for claims on run times, with the operations in 100 steps."""
+    """Return "not testable" for claims on run times, with the numbers of operations."""
     counts = {program: operations_per_step(lab.listing(program)).written for program in PROGRAMS}
     numbers = {f"{program}: operations in 100 steps": 100.0 * n for program, n in counts.items()}
     return Judged(NOT_TESTABLE, numbers)
@@ -200,7 +200,7 @@ def seconds(lab: Laboratory) -> Judged:
 def complexity(lab: Laboratory, factors: Sequence[float]) -> Judged:
     """Judge whether the three programs have about the same number of cards.
 
-    `factors` are alternative limits on the ratio to Runge-Kutta's number.
+    `factors` are alternative limits on the ratio to the number of Runge-Kutta.
     """
     cards = {each: deck_text(lab.listing(each)).count("\n") for each in PROGRAMS}
     numbers = {f"{program}: cards": float(n) for program, n in cards.items()}
@@ -230,7 +230,7 @@ def others_failed(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -
                 error = _error(lab, case, Member(weighting, n))
                 numbers[f"case {case}, {weighting}, {n} terms: error (rad/s)"] = error
                 useless |= error > scale
-                # Errors at the level of rounding count as equal.
+                # The bound on `best` makes errors at the level of rounding count as equal.
                 worst = max(worst, error / max(best, 1e-12 * scale))
     return graded(numbers, useless, worst > 10.0)
 
@@ -238,14 +238,14 @@ def others_failed(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -
 def computer_error(
     lab: Laboratory, limit: float, words: Sequence[str], cases: Sequence[int]
 ) -> Judged:
-    """Judge whether rounding error makes the weightings other than collocation fail.
+    """Judge whether weightings other than collocation fail because of rounding errors.
 
-    The claim holds if a rounding error (rad/s) reaches `limit`.
+    The claim holds if a rounding error reaches `limit` (rad/s).
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
     numbers = {}
-    # In Case 1, rounding error is the only error.
+    # Case 1 has only rounding errors.
     for parts in (1, 10, 100):
         scene = lab.scene(1, parts)
         for weighting in _OTHERS:
@@ -294,7 +294,7 @@ def all_succeed(
 
 
 def predict_correct(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Return "not testable" for the predict-correct technique, which the thesis only recommends."""
+    """Return "not testable" for the predict-correct technique, with errors by corrections."""
     best = Laboratory(False, lab.assumptions)
     numbers = {}
     for case in cases:

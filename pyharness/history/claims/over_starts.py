@@ -1,7 +1,7 @@
 """Verdicts on claims from many initial omegas (starts) at once, by `rules`.
 
-A sweep supplies the starts, the listing, and the number of steps. A start is used in all cases for
-which the thesis gives none.
+A sweep supplies starts, listing and number of steps. A start is used in all cases for which the
+thesis gives none.
 """
 
 from functools import cache, lru_cache, partial
@@ -27,18 +27,18 @@ from pyharness.thesis.many import run_many
 
 FAILS, HOLDS, SILENT, IN_PART = 0, 1, 2, 3
 _TOLERANCE = 1e-12
-_EFFORT = 1e9  # so large that there is no limit; a sweep reports its expected time beforehand
+_EFFORT = 1e9  # no effective work limit, because a sweep reports its expected time beforehand
 
 
 class Starts:
     """Runs for `rules` from n initial omegas `omega0` (rad/s), shape (n, 3).
 
-    Results have no axis n where the thesis gives omega(0).
+    Results have no axis n in cases for which the thesis gives omega(0).
     """
 
     def __init__(self, one: Laboratory, omega0: Array) -> None:
         self._one, self._omega0 = one, omega0
-        # As in `Laboratory`.
+        # With arguments as in `Laboratory`.
         self.scene = one.scene
         self.solution = cache(self._integrated)
         self.error = cache(partial(rules.largest_error, self))
@@ -46,7 +46,7 @@ class Starts:
         self._kept = cache(self._run)
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
-        # Only undivided runs are cached: the others are needed once, for their error.
+        # Runs with divided steps are not cached, because they are needed only once.
         return (self._kept if parts == 1 else self._run)(program, case, may_stop, parts)
 
     def _starts(self, case: int) -> Array:
@@ -90,7 +90,7 @@ JUDGED = tuple(entry["id"] for entry in claims() if entry["test"] in vars(rules)
 
 
 def codes(identity: str, batch: Batch) -> NDArray[np.int8]:
-    """Return a claim's verdict codes for a batch, shape (n,); all SILENT if no claim applies."""
+    """Return a claim's verdict codes for a batch, shape (n,); SILENT if no claim concerns it."""
     bench = _bench(batch)
     if bench is None:
         return np.full(len(batch.omega0), SILENT, np.int8)
@@ -98,21 +98,21 @@ def codes(identity: str, batch: Batch) -> NDArray[np.int8]:
 
 
 FUNCTIONS = {name: partial(codes, name) for name in JUDGED}
-"""The function of each claim, for a sweep."""
+"""The functions of a batch that return verdict codes, by claim."""
 
 
 def judged(entry: dict[str, Any], bench: Starts, n: int) -> NDArray[np.int8]:
-    """Return a claim's codes FAILS, HOLDS or IN_PART from n initial omegas, shape (n,)."""
+    """Return a claim's codes FAILS, HOLDS or IN_PART for n initial omegas, shape (n,)."""
     grade = vars(rules)[entry["test"]](bench, **entry["parameters"])
     found = np.where(grade.whole, HOLDS, np.where(grade.part, IN_PART, FAILS))
     return np.broadcast_to(found, (n,)).astype(np.int8)
 
 
-# All claims of a batch share its runs.
+# Cached, because all claims of a batch share its runs.
 @lru_cache(maxsize=1)
 def _bench(batch: Batch) -> Starts | None:
-    # The claims apply only to original or corrected programs, to bodies, torques and step sizes of
-    # the thesis's cases, and to the stop test as on the cards.
+    # Claims concern only original or corrected programs, the thesis's bodies, torques and step
+    # sizes, and the stop test as on the cards.
     if batch.listing is None or batch.arrays.keys() != {"omega"}:
         return None
     deck = facts("cases")["deck"]

@@ -1,12 +1,11 @@
 """Rules of the claims that depend on the initial omega (the start), for one start or many.
 
 A bench supplies runs and solutions: a `Laboratory` for one start, `Starts` for n starts. `parts`
-divides the step size; rows are at the undivided steps. Arrays of omega have the shape (steps, 3) or
-(n, steps, 3); values of a `Grade` have the shape () or (n,). `data/claims.toml` has each `rule` in
-words.
+divides the step size; results are at the undivided steps. Arrays of omega have the shape (steps, 3)
+or (n, steps, 3), values of a `Grade` the shape () or (n,). `data/claims.toml` describes each rule.
 
-An error is the largest deviation of any omega component from the reference solution, over the
-completed steps.
+An error is the largest deviation of a component of omega from the reference over the completed
+steps.
 """
 
 import functools
@@ -30,7 +29,7 @@ Flags = NDArray[np.bool_]
 
 
 class Runs(NamedTuple):
-    """The runs of a program on one case; `omega` (rad/s) is NaN at steps without result."""
+    """The runs of a program in a case; `omega` (rad/s) is NaN at steps without a result."""
 
     omega: Array
     steps: NDArray[Any]
@@ -39,7 +38,7 @@ class Runs(NamedTuple):
 
 
 class Grade(NamedTuple):
-    """The result of a claim's test: numbers, and whether it holds, in whole or in part."""
+    """The result of a claim's test: its numbers, and whether the claim holds, in whole or in part."""
 
     numbers: Mapping[str, Any]
     whole: Any
@@ -53,16 +52,13 @@ def omega3_varies(bench: Bench, case: int, limit: float) -> Grade:
 
 
 def no_deviation(bench: Bench, case: int, limit: float) -> Grade:
-    """Test whether errors are below `limit` (rad/s), half a unit of the last printed place."""
+    """Test whether errors in a case are below `limit` (rad/s)."""
     numbers = {f"{name}: largest error (rad/s)": bench.error(name, case) for name in PROGRAMS}
     return Grade(numbers, _most(numbers) < limit)
 
 
 def concur(bench: Bench, case: int, share: float) -> Grade:
-    """Test whether the two-term and the four-term program agree in a case.
-
-    Omegas may differ by `share` times the largest omega.
-    """
+    """Test whether the omegas of both collocation programs agree within `share` of the largest."""
     truth = bench.solution(case)
     two, four = (bench.runs(program, case) for program in COLLOCATION)
     apart = _farthest(two.omega, four.omega)
@@ -101,7 +97,7 @@ def models_concur(bench: Bench, case: int, share: float, terms: Sequence[int]) -
     numbers = {}
     for n in others:
         other = bench.models(case, n)
-        # An overflowed run agrees with no other.
+        # A run that overflows agrees with none.
         lost = ~(np.isfinite(other) & np.isfinite(model)).all(axis=(-1, -2))
         apart = np.where(lost, np.inf, _farthest(other, model).max(axis=-1)) / largest
         numbers[f"{n} terms against {first}, over the largest omega"] = apart
@@ -144,7 +140,7 @@ def small_step(bench: Bench, cases: Sequence[int], exception: int) -> Grade:
 
 
 def small_step_runge_kutta(bench: Bench, cases: Sequence[int]) -> Grade:
-    """Test whether a tenth of the step size fails to improve Runge-Kutta without the stop test."""
+    """Test whether a tenth of the step size does not improve Runge-Kutta without the stop test."""
     numbers = {}
     for case in cases:
         before, after = (
@@ -159,7 +155,7 @@ def small_step_runge_kutta(bench: Bench, cases: Sequence[int]) -> Grade:
 def largest_error(
     bench: Bench, program: str, case: int, may_stop: bool = True, parts: int = 1
 ) -> Array:
-    """Return the largest error of omega (rad/s) by initial omega, infinite after an overflow."""
+    """Return the largest error (rad/s) for each start, infinite after an overflow."""
     runs = bench.runs(program, case, may_stop, parts)
     error = _farthest(runs.omega, bench.solution(case)).max(axis=-1)
     return np.where(runs.overflow, np.inf, error)
@@ -175,17 +171,17 @@ def share_of_range(omega: Array, truth: Array) -> Array:
 
 
 def spread_of(omega: Array) -> Array:
-    """Return the range (rad/s) of each omega component over the steps, shape (..., 3)."""
+    """Return the range (rad/s) of each component of omega over the steps, shape (..., 3)."""
     return np.moveaxis(np.ptp(_by_component(omega), axis=-1), 0, -1)
 
 
 def largest_of(omega: Array) -> Array:
-    """Return the largest magnitude of any omega component over the steps (rad/s)."""
+    """Return the largest magnitude (rad/s) of omega's components over the steps."""
     return np.asarray(np.abs(omega).max(axis=(-1, -2)))
 
 
 def _farthest(first: Array, second: Array) -> Array:
-    """Return the largest difference of each omega component (rad/s) over common steps."""
+    """Return the largest difference (rad/s) of each component over common steps, (..., 3)."""
     with np.errstate(all="ignore"):
         apart = _by_component(first - second)
         np.abs(apart, out=apart)
@@ -193,7 +189,7 @@ def _farthest(first: Array, second: Array) -> Array:
 
 
 def _by_component(omega: Array) -> Array:
-    """Return omega as a contiguous array (3, ..., steps), for maxima ten times as fast."""
+    """Return omega as a contiguous array (3, ..., steps), whose maxima are ten times as fast."""
     return np.ascontiguousarray(np.moveaxis(omega, -1, 0))
 
 

@@ -1,6 +1,6 @@
-"""Sentences of the thesis with their claims, and each claim's story.
+"""Sentences of the thesis with their claims, and the claims' stories.
 
-`data/claims.toml` has the stories, with placeholders for the numbers of our verdict.
+The stories in `data/claims.toml` have placeholders for the numbers of our verdicts.
 """
 
 import re
@@ -11,10 +11,10 @@ from pyharness.history.claims.ledger import Judgement
 from pyharness.model.facts import facts
 
 FIELD = re.compile(r"\{(original|corrected): (?:(min|max) of )?(.+?)( in %)?\}")
-"""The pattern of a field, as in ``{original: max of case *: gain in %}``.
+"""Pattern of a placeholder, as in ``{original: max of case *: gain in %}``.
 
-A field has the programs, the name of the number, and perhaps `in %`. After `min of` or `max of`,
-the name is a file-name pattern, and the smallest or largest of all matching numbers is taken.
+It has the programs, the name of a number, and perhaps `in %`. After `min of` or `max of` the name
+is a wildcard pattern for several numbers, of which the smallest or largest is taken.
 """
 _TIMES = "\N{NO-BREAK SPACE}\N{MULTIPLICATION SIGN}\N{NO-BREAK SPACE}"
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -29,7 +29,7 @@ class Story(NamedTuple):
 
 
 def story(judgement: Judgement) -> Story:
-    """Return the story of a claim; raise ValueError if a placeholder matches no number."""
+    """Return a claim's story, or raise ValueError if a placeholder matches no number."""
     outcomes = {"original": judgement.original, "corrected": judgement.corrected}
 
     def number(field: re.Match[str]) -> str:
@@ -67,7 +67,7 @@ class Sentence(NamedTuple):
     text: str  # with formulas in LaTeX
     claims: tuple[str, ...] = ()
     why: str = ""  # explanation of a sentence without claims
-    laboratory: str = ""  # the run that shows it best, as in case=2&program=two-term
+    laboratory: str = ""  # run that shows the claims best, as in case=2&program=two-term
     command: str = ""  # command that shows more than `claims --explain`
 
 

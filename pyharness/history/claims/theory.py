@@ -1,7 +1,7 @@
 """Tests of the thesis's claims about history, theory and orders.
 
 Arguments and verdicts are as in `verdicts`, errors as in `rules`. `limit` is the largest allowed
-ratio of error to largest omega.
+error divided by the largest omega.
 """
 
 import math
@@ -28,7 +28,7 @@ Weights = Sequence[Callable[[Array], Any]]
 
 
 def known_in_closed_form(lab: Laboratory, cases: list[int], limit: float) -> Judged:
-    """Judge whether the solutions of some cases are unknown."""
+    """Judge whether the solutions of `cases` are unknown; a closed form refutes it."""
     numbers = {}
     for case in cases:
         scene, truth = lab.scene(case), lab.truth(case)
@@ -40,7 +40,7 @@ def known_in_closed_form(lab: Laboratory, cases: list[int], limit: float) -> Jud
 
 
 def by_sources(lab: Laboratory, holds: bool) -> Judged:
-    """Return the verdict on a historical statement; `holds` says whether sources support it."""
+    """Return the verdict on a historical statement, which holds if sources support it."""
     return Judged(REPRODUCED if holds else FALSE, {})
 
 
@@ -77,20 +77,20 @@ def _angle_rates_to_omega(angles: Sequence[float] | Array) -> Array:
 
 
 def _omega(moments: Triple, state: Array) -> Array:
-    """Return omega (rad/s) from a state: 3-1-3 Euler angles (rad), then their conjugate momenta."""
+    """Return omega (rad/s) from a state: 3-1-3 Euler angles (rad) and their conjugate momenta."""
     momentum = np.linalg.solve(_angle_rates_to_omega(state[:3]).T, np.asarray(state[3:]))
     return np.asarray(momentum / np.array(moments))
 
 
 def _hamilton(moments: Triple, state: Array) -> Array:
-    """Return dH/dp and -dH/dq of H = sum I omega**2 / 2; q are 3-1-3 angles (rad), p momenta."""
+    """Return dH/dp and -dH/dq of H = sum I omega**2 / 2, with q and p as in `_omega`."""
     theta, psi = float(state[1]), float(state[2])
     sin_theta, cos_theta = math.sin(theta), math.cos(theta)
     sin_psi, cos_psi = math.sin(psi), math.cos(psi)
     omega = _omega(moments, state)
     rates = np.linalg.solve(_angle_rates_to_omega(state[:3]), omega)
     momentum = omega * moments
-    # dH/dq at constant p is -L . (d matrix/dq) rates.
+    # dH/dq at constant p is -L . (dM/dq) rates, where the matrix M takes the rates to omega.
     by_theta, by_psi = np.zeros((3, 3)), np.zeros((3, 3))
     by_theta[:, 0] = cos_theta * sin_psi, cos_theta * cos_psi, -sin_theta
     by_psi[:2, :2] = [[sin_theta * cos_psi, -sin_psi], [-sin_theta * sin_psi, -cos_psi]]
@@ -101,7 +101,7 @@ def _hamilton(moments: Triple, state: Array) -> Array:
 def bounded_not_lipschitz(lab: Laboratory, decades: float, above: float) -> Judged:
     """Judge whether every bounded function satisfies a Lipschitz condition.
 
-    The claim is false if a quotient of the square root exceeds `above`.
+    The claim is false if a difference quotient of the square root exceeds `above`.
     """
     points = 10.0 ** -np.arange(2.0, decades + 1.0, 2.0)
     quotients = (np.sqrt(2.0 * points) - np.sqrt(points)) / points
@@ -112,7 +112,7 @@ def bounded_not_lipschitz(lab: Laboratory, decades: float, above: float) -> Judg
 def local_error(
     lab: Laboratory, cases: list[int], method: str, power: float, within: float
 ) -> Judged:
-    """Judge whether the error of one step is O(h**p), with step size h and p = `power`."""
+    """Judge whether the error of a step of size h is O(h**p), with p = `power`."""
     stepped = partial(_stepped, method=method)
     numbers = {f"case {n}: power of the step": _power(lab.scene(n), stepped) for n in cases}
     near = [abs(each - power) <= within for each in numbers.values()]
@@ -133,7 +133,7 @@ def same_as_taylor(lab: Laboratory, cases: list[int], within: float) -> Judged:
         numbers[f"case {case}: distance over the error of the series"] = apart / error
         numbers[f"case {case}: power of the step of the distance"] = power
         same &= apart <= 1e-14 * float(np.abs(truth).max())
-        # Reproduced in part if the results of one step differ by O(h**5).
+        # Reproduced in part if the results of a step differ by O(h**5).
         near &= abs(power - 5.0) <= within
     return graded(numbers, same, near)
 
@@ -145,7 +145,7 @@ def _stepped(scene: Scene, method: str) -> Array:
 def _power(
     scene: Scene, method: Callable[[Scene], Array], truth: Callable[[Scene], Array] | None = None
 ) -> float:
-    """Return p if a method's error in one step of size h is O(h**p)."""
+    """Return the measured p if a method's error in a step of size h is O(h**p)."""
     apart = []
     for step_size in (scene.step_size, scene.step_size / 2.0):
         short = replace(scene, step_size=step_size, steps=1)
@@ -155,7 +155,7 @@ def _power(
 
 
 def _taylor_step(scene: Scene, order: int) -> Array:
-    """Return omega (rad/s) after a Taylor step up to h**order, under constant torque."""
+    """Return omega (rad/s) after a Taylor step, up to h**order, under constant torque."""
     coefficients = np.array(scene.euler_coefficients)
     torque = np.array(scene.normalized_torque(0.0))
     terms = [np.array(scene.omega)]
@@ -170,14 +170,14 @@ def _taylor_step(scene: Scene, order: int) -> Array:
 
 
 def crandall_example(lab: Laboratory, best: list[str], rate: float) -> Judged:
-    """Judge whether four weightings beat the Taylor series in Crandall's example.
+    """Judge whether four weightings are better than the Taylor series in Crandall's example.
 
     `best` names the two that must be most accurate.
     """
     # The example is dx/dt = rate x, x(0) = 1 on (0, 1), with the trial function 1 + c1 t + c2 t**2.
     t, weight = np.polynomial.legendre.leggauss(12)
     t, weight = (t + 1.0) / 2.0, weight / 2.0
-    # The residual is R = -rate + c1 r1 + c2 r2; the columns are for r1, r2 and rate.
+    # The residual is -rate + c1 r1 + c2 r2; the columns of `rows` are for r1, r2 and rate.
     factors: Weights = (lambda s: 1 - rate * s, lambda s: 2 * s - rate * s**2)
     weighted = partial(_weighted, t, weight, factors, rate)
     points = np.array([1.0, 2.0]) / 3.0
@@ -203,7 +203,7 @@ def crandall_example(lab: Laboratory, best: list[str], rate: float) -> Judged:
 
 
 def _weighted(t: Array, weight: Array, factors: Weights, rate: float, by: Weights) -> Array:
-    """Return rows of Crandall's equations: integrals of each weight times `factors` and `rate`."""
+    """Return the integrals of `factors` and `rate`, a row for each weight function in `by`."""
     halves = [(t / 2.0, weight / 2.0), ((t + 1.0) / 2.0, weight / 2.0)]
     rows = []
     for function in by:
@@ -224,7 +224,7 @@ def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judge
             disturbance = 1e-8 * math.hypot(*each.omega) * np.array([0.6, 0.5, 0.4])
             start = tuple((each.omega + disturbance).tolist())
             rate = each.rates[0].real
-            # At this time the decaying part has vanished, and the growing part is still small.
+            # At these times the decaying part has vanished, and the growing part is still small.
             steady = np.linspace(0.1, 10.0, 100) * (each.period or 1.0)
             times = np.array([8.0, 10.0]) / rate if rate else steady
             found = solve(replace(scene, omega=start), times, tolerance=1e-14).omega - each.omega
@@ -235,7 +235,7 @@ def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judge
                 numbers[f"{name}: growth over Re Q"] = measured
                 told &= abs(measured - 1.0) <= within
             else:
-                # Without growth, the perturbation may become ten times as large in ten periods.
+                # Without growth, the perturbation may become at most ten times as large in ten periods.
                 largest_size = float(sizes.max() / np.linalg.norm(disturbance))
                 numbers[f"{name}: largest disturbance over the first"] = largest_size
                 told &= largest_size <= 10.0
@@ -243,7 +243,7 @@ def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judge
 
 
 def trial_form_solves(lab: Laboratory, cases: list[int], limit: float) -> Judged:
-    """Judge whether the trial solution of eq. 32 of the thesis solves some case exactly."""
+    """Judge whether the trial solution of eq. 32 of the thesis solves a case exactly."""
     numbers = {}
     for case in cases:
         scene, truth = lab.scene(case), lab.truth(case)
@@ -259,7 +259,7 @@ def trial_form_solves(lab: Laboratory, cases: list[int], limit: float) -> Judged
 
 
 def one_term_suffices(lab: Laboratory, case: int, limit: float) -> Judged:
-    """Judge whether one-term collocation suffices for a linear top (Case 1: a sphere)."""
+    """Judge whether one-term collocation suffices for the linear equations of a sphere (Case 1)."""
     found = run(lab.scene(case), Member("collocation", 1))
     truth = lab.truth(case)
     share = distance(found.omega, truth.omega) / largest(truth)
@@ -268,7 +268,7 @@ def one_term_suffices(lab: Laboratory, case: int, limit: float) -> Judged:
 
 
 def symmetric_uncoupled(lab: Laboratory, cases: list[int]) -> Judged:
-    """Judge whether Euler's equations of a symmetric body have no products of omegas."""
+    """Judge whether Euler's equations of a symmetric body have no products of components."""
     bodies = {case: lab.scene(case).euler_coefficients for case in cases}
     left = {f"case {n}: largest coefficient": max(map(abs, x)) for n, x in bodies.items()}
     none = [each == 0.0 for each in left.values()]
@@ -290,7 +290,7 @@ def points_inside(lab: Laboratory, cases: list[int]) -> Judged:
     numbers, shares = {}, []
     for program, last in (("two-term", 2.0 / 3.0), ("four-term", 0.8)):
         run_of = lab.run(program, case)
-        # The increments of TIME are the DT of the points.
+        # The increments of TIME are the lengths DT that determine the points.
         lengths = np.diff(run_of.recorded_time, prepend=0.0)
         inside = last * lengths < lab.scene(case).step_size
         shares.append(float(inside.mean()))

@@ -1,8 +1,8 @@
 """Tests of the thesis's claims about one case.
 
-Each function is the `test` of claims in `data/claims.toml`, where a claim's `rule` describes the
-decision, and `parameters` are the keyword arguments. `lab` runs the programs, original or
-corrected; `case` is a number of Table 1. Errors are defined in `rules`.
+Each function is the `test` of claims in `data/claims.toml`, where `rule` describes the decision, and
+`parameters` are the keyword arguments. `lab` runs the original or the corrected programs; `case` is
+a number in Table 1. Errors are defined in `rules`.
 """
 
 from dataclasses import dataclass, replace
@@ -25,7 +25,7 @@ UNDECIDED = "undecided"
 
 @dataclass(frozen=True)
 class Judged:
-    """The verdict on a claim, and its computed numbers by description."""
+    """The verdict on a claim, and the computed numbers by description."""
 
     verdict: str
     numbers: dict[str, float]
@@ -52,7 +52,7 @@ def known_solution(lab: Laboratory, case: int) -> Judged:
     t = truth.time
     printed = np.column_stack([np.sin(5 * t), np.cos(5 * t), np.full_like(t, 10.0)])
     apart = distance(printed, truth.omega)
-    # The phase 5 t is itself rounded, so the bound grows with t.
+    # The bound grows with t, because the phase 5 t is rounded.
     allowed = 1e-15 * (1.0 + 5.0 * float(t[-1]))
     return graded({"distance from the reference (rad/s)": apart}, apart <= allowed, False, FALSE)
 
@@ -62,7 +62,7 @@ def omega3_varies(lab: Laboratory, case: int, limit: float) -> Judged:
 
 
 def no_deviation(lab: Laboratory, case: int, limit: float) -> Judged:
-    """Judge whether all three programs coincide with the known solution of a case."""
+    """Judge whether all three programs coincide with a case's known solution within `limit`."""
     found = judged(rules.no_deviation(lab, case, limit))
     for start in starts():
         other = replace(lab, assumptions=replace(lab.assumptions, start=start))
@@ -72,7 +72,7 @@ def no_deviation(lab: Laboratory, case: int, limit: float) -> Judged:
 
 
 def coincident(lab: Laboratory, case: int, share: float) -> Judged:
-    """Judge whether collocation coincides with the known solution on the printed graph."""
+    """Judge whether collocation coincides with the known solution on the scale of the graph."""
     numbers = {}
     for program in COLLOCATION:
         runs, truth = lab.runs(program, case), lab.solution(case)
@@ -97,7 +97,7 @@ def poor(lab: Laboratory, case: int, share: float) -> Judged:
 
 
 def _amplitude(lab: Laboratory, case: int) -> float:
-    # Half the largest range of a component of the reference omega.
+    # Half the largest range of the components of the reference omega.
     return float(rules.spread_of(lab.truth(case).omega).max()) / 2.0
 
 
@@ -113,9 +113,9 @@ def error_constant(lab: Laboratory, case: int) -> Judged:
 
 
 def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
-    """Judge whether the stop test ended the Runge-Kutta run at step `step`."""
+    """Judge whether the stop test ended the Runge-Kutta run at `step`."""
     stop = lab.run("runge-kutta", case).stop
-    # Subsets of defects with which the run also stops at `step`.
+    # Find the subsets of defects with which the run also stops at `step`.
     name, readings = "runge-kutta", lab.listing("runge-kutta").readings
     every = [Listing(name, each, readings) for each in subsets(names_of("defect", name))]
     there = []
@@ -133,7 +133,7 @@ def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
 
 
 def growing(lab: Laboratory, case: int) -> Judged:
-    """Judge whether omega1 of Runge-Kutta becomes larger than the true sine function."""
+    """Judge whether the last omega1 of Runge-Kutta is larger than that of the true solution."""
     run = lab.run("runge-kutta", case)
     value, solution = float(run.omega[-1, 0]), float(lab.truth(case).omega[run.steps - 1, 0])
     numbers = {"omega1 at the end (rad/s)": value, "solution there (rad/s)": solution}
@@ -162,9 +162,9 @@ def more_reliable(lab: Laboratory, case: int) -> Judged:
 
 
 def too_fast(lab: Laboratory, case: int, same: float, worse: float) -> Judged:
-    """Judge whether the two-term error is due to a motion too fast for two terms.
+    """Judge whether the motion is too fast for two terms, from corrected programs and all starts.
 
-    The corrected programs run from all `starts`.
+    Two-term error over four-term error must exceed `worse` (in part: `same`, from any start).
     """
     numbers = {}
     for start in starts():

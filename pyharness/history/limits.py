@@ -133,7 +133,7 @@ def limit_solution(
 
 
 def _extrapolated(scene: Scene) -> Rate:
-    """Return the right-hand side of the differential equation of the two-term program's limit."""
+    """Return the right-hand side of the equation of the two-term program's limit."""
     # The original program adds the step size h to DT in every step. In step n the collocation
     # points are therefore t/3 and 2t/3 after the beginning of the step, with t = n h. Let F be the
     # right-hand side of Euler's equations at w, F' its Jacobian, and Q its quadratic part. The
@@ -151,7 +151,7 @@ def _extrapolated(scene: Scene) -> Rate:
 
 
 def _slow_slopes(scene: Scene) -> Rate:
-    """Return the right-hand side of the differential equation of the Runge-Kutta program's limit."""
+    """Return the right-hand side of the equation of the Runge-Kutta program's limit."""
     # Let p be the omega in U(1), at which a step's first slopes are evaluated, and F the right-hand
     # side of Euler's equations. Each step of size h adds (h/2) F(p) to p, and h F(p) to the printed
     # omega. The state has p, then the printed omega.

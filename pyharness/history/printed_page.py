@@ -40,7 +40,7 @@ class Fit:
     program: str
     case: int
     listing: str  # "original", "corrected" or "original with" a reading
-    word: str  # arithmetic
+    word: str  # arithmetic of the program
     fields: int  # number of compared numbers
     differences: tuple[Difference, ...]
 
@@ -82,7 +82,7 @@ def rows_of_form(
 
 
 def compared_steps(rows: int, steps: int, card_steps: int) -> int:
-    """Return `steps` (in the thesis's text) or, if the page has more rows, `card_steps`."""
+    """Return `steps`, by the thesis's text, or `card_steps`, if the page has more rows."""
     return card_steps if rows > steps else steps
 
 
@@ -100,7 +100,7 @@ def compare_rows(
 
 
 def stored_fits(lines: Sequence[Sequence[str]], folder: Path) -> list[Fit]:
-    """Return the comparisons with pages of equal heading and width in `folder`, nearest first."""
+    """Return comparisons with the pages in `folder` of the same heading and width, nearest first."""
     found = []
     with open(folder / PAGES, newline="", encoding="ascii") as file:
         for each in csv.DictReader(file):
@@ -115,7 +115,7 @@ def stored_fits(lines: Sequence[Sequence[str]], folder: Path) -> list[Fit]:
 
 
 def verdict(path: str, found: Sequence[Fit]) -> list[str]:
-    """Return lines that name our pages equal to the page in file `path`, or the nearest."""
+    """Return lines that name our pages equal to the page in `path` or, if none is, the nearest."""
     whole = [each for each in found if each.is_whole]
     said = "printed so by" if whole else "by none; the nearest is"
     return [f"{path}: {said} {each.name}" for each in whole or found[:1]]

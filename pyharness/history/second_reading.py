@@ -1,8 +1,8 @@
 """An estimate of remaining transcription errors, by capture and recapture.
 
 The first reading of the scan is our text of the cards; the second is of a random sample of cards
-(`data/cards/second-reading.toml`). The numbers of errors of the scanned text that each reading
-corrects, and that both correct, give an estimate of the remaining errors.
+(`data/cards/second-reading.toml`). The numbers of errors in the scanned text that each reading and
+that both correct give an estimate of the remaining errors.
 """
 
 from collections.abc import Iterator
@@ -16,7 +16,7 @@ from pyharness.model.report import Column, Report, Table, counted, digits, words
 from pyharness.thesis.cards import Card, deck, tight
 from pyharness.thesis.collation import witness_lines
 
-_TAIL = 0.025  # probability beyond each end of a 95 % interval
+_TAIL = 0.025  # probability on each side of a 95 % interval
 _COLUMNS = (
     *words("unit"), Column("first"), Column("second"), Column("both"),
     Column("estimate", digits(".1f")), Column("lower"), Column("upper"), Column("uncorrected"),
@@ -24,24 +24,21 @@ _COLUMNS = (
 
 
 class ReadCard(NamedTuple):
-    """A card of the sample: its text without blanks in the scan and in two readings."""
+    """A card of the sample: its text, without blanks, in the scan and in two readings."""
 
     card: Card
     scan: str
-    first: str  # our text, with names of variables as in the scan
+    first: str  # our text, with variables named as in the scan
     second: str
 
 
 def chapman(first: int, second: int, both: int) -> float:
-    """Return Chapman's estimate of a population's size from sample sizes and common members."""
+    """Return Chapman's estimate of a population from two samples' sizes and their common members."""
     return (first + 1) * (second + 1) / (both + 1) - 1
 
 
 def recapture_interval(first: int, second: int, both: int) -> tuple[int, int]:
-    """Return the limits of the 95 % confidence interval of a population's size.
-
-    The arguments are as in `chapman`.
-    """
+    """Return the 95 % confidence interval of a population's size, from arguments as in `chapman`."""
     if both < 1:
         raise ValueError("both must be positive")
     # For sizes in the interval, the hypergeometric probabilities of at most and of at least `both`
@@ -76,9 +73,9 @@ def read_cards() -> Iterator[ReadCard]:
 
 
 def misread_places(scan: str, reading: str) -> dict[int, str]:
-    """Return by index in `scan` the text of `reading` where the two differ.
+    """Return the text of `reading` where it differs from `scan`, by index in `scan`.
 
-    Insertions belong to the previous index, or to -1.
+    An insertion has the previous index, or -1.
     """
     found: dict[int, str] = {}
     matcher = SequenceMatcher(None, scan, reading, autojunk=False)
@@ -93,14 +90,14 @@ def misread_places(scan: str, reading: str) -> dict[int, str]:
 
 
 def recaptures() -> Table:
-    """Return the table of estimates, with characters and with whole cards as units."""
+    """Return a table of estimates, with characters and with whole cards as units."""
     places: tuple[set[tuple[str, int]], ...] = (set(), set())
     for each in read_cards():
         for found, reading in zip(places, (each.first, each.second), strict=True):
             found |= {(each.card.name, place) for place in misread_places(each.scan, reading)}
     cards = tuple({name for name, _ in found} for found in places)
     rows = []
-    # Only cards are independent: a machine repeats its misreading of a letter.
+    # Only cards are nearly independent, because character recognition repeats its misreadings.
     for unit, (one, other) in (("places", places), ("cards", cards)):
         counts = len(one), len(other), len(one & other)
         lower, upper = recapture_interval(*counts)

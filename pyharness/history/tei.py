@@ -23,7 +23,7 @@ from pyharness.model.listing import PROGRAMS
 from pyharness.thesis.cards import Card, deck, numbers, parallels
 
 SCHEMA = "https://www.tei-c.org/Vault/P5/4.12.0/xml/tei/custom/schema/relaxng/tei_all.rng"
-"""The schema of the document, of version 4.12.0 of the TEI guidelines."""
+"""Schema of the document, from version 4.12.0 of the TEI guidelines."""
 TITLE = "A Digital Computer Approach to the Unsymmetric Rigid Body Problem"
 AUTHOR = "Richard Jacobs"
 _XML = "{http://www.w3.org/XML/1998/namespace}"
@@ -33,7 +33,7 @@ _HEAD = (
     f'<?xml-model href="{SCHEMA}" type="application/xml" '
     'schematypens="http://relaxng.org/ns/structure/1.0"?>\n'
 )
-# Fields of an apparatus entry in the document.
+# Fields of apparatus entries that the document has.
 _TOLD = ("summary", "scan", "adopted", "original", "corrected", "evidence", "why")
 
 KINDS = {
@@ -48,10 +48,10 @@ KINDS = {
     "missing text": "cards or pages that the scan or the report does not have",
     "dialect": "what only the FORTRAN of the machine explains",
 }
-"""The kinds of apparatus entries, with their contents."""
+"""The kinds of apparatus entries, with descriptions."""
 
 CERTAINTY = {"certain": "high", "probable": "medium", "conjecture": "low", "undecidable": "unknown"}
-"""The degrees of certainty in the apparatus, with the values of `cert` in TEI."""
+"""The degrees of certainty in the apparatus, with TEI's values of `cert`."""
 
 
 def tei_document() -> bytes:
@@ -65,7 +65,7 @@ def tei_document() -> bytes:
     _write_apparatus(_add(back, "div", type="apparatus"))
     _write_places(_add(back, "div", type="places"))
     _write_bibliography(_add(back, "div", type="bibliography"))
-    # Indentation adds blanks, which are significant in cards; their texts therefore follow later.
+    # Fill in the cards after the indentation, whose blanks would be significant in them.
     xml.indent(root)
     for block, card in blocks:
         _fill(block, card)
@@ -142,12 +142,12 @@ def _deck(body: xml.Element, program: str) -> Iterator[tuple[xml.Element, Card]]
     pages = [(place, page) for place, page in scan if page["program"] == program]
     for place, page in sorted(pages, key=lambda each: first_card(each[1]["lines"])):
         begin = _add(div, "pb", n=str(place), edRef="#S")
-        if "moved" in page:  # the entry that explains an unexpected place
+        if "moved" in page:  # apparatus entry that explains the page's unexpected position
             begin.set("corresp", f"#{page['moved']}")
         for item in page["lines"]:
             if isinstance(item, str):
                 for number in numbers(item):
-                    # A lost card, which is on no page, precedes the next card on a page.
+                    # A lost card is on no page; write it before the next card.
                     while lost and lost[0] < number:
                         card = cards[lost.pop(0)]
                         yield _block(div, card), card
@@ -209,7 +209,7 @@ def _write_apparatus(div: xml.Element) -> None:
         classes += [_class_of("ground", siglum) for siglum in entry["grounds"]]
         ana = " ".join(f"#{each}" for each in classes)
         note = _add(div, "note", id=entry["id"], type="entry", ana=ana, resp=_RESPONSIBLE)
-        # The appendix of the thesis is a source unless the entry names no card.
+        # The appendix of the thesis is a source only if the entry names cards.
         parts = ["appendix"] if entry["cards"] else []
         if not parts or {"T", "R"} & set(entry["grounds"]):
             parts.append("text")

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from pyharness.model.facts import facts
 
 CHANGES = {"added": "new entries", "changed": "altered entries", "removed": "removed entries"}
-"""The fields of a revision that name apparatus entries, with their headings."""
+"""Fields of a revision that name apparatus entries, with their headings."""
 
 
 class Event(NamedTuple):
@@ -16,7 +16,7 @@ class Event(NamedTuple):
     id: str
     what: str
     where: str
-    # "certain" if the source names the date, "probable" if another entry implies it, or "unknown".
+    # "certain" if a source names the date, "probable" if another event implies it, or "unknown".
     certainty: str
     first: str = ""  # month, as in 1979-01
     last: str = ""
@@ -25,7 +25,7 @@ class Event(NamedTuple):
 
     @property
     def date(self) -> str:
-        """Return the date in words, as in ``January 1979 to April 1981``."""
+        """The date in words, as in ``January 1979 to April 1981``."""
         if not self.first:
             return "not dated"
         if self.first == self.last:
@@ -54,7 +54,7 @@ class Revision(NamedTuple):
 
     date: str
     what: str
-    digest: str = ""  # of the text after the change, if cards were data files
+    digest: str = ""  # digest of the text after the change, if cards were data files then
     added: tuple[str, ...] = ()
     changed: tuple[str, ...] = ()
     removed: tuple[str, ...] = ()

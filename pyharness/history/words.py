@@ -1,4 +1,4 @@
-"""The effect of word length: runs with p significand bits, compared with binary64.
+"""The effect of word length: runs with p significand bits.
 
 Printed pages are compared with the page in binary64, omega with the reference solution.
 """
@@ -39,12 +39,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 LENGTHS = (16, 20, 24, 28, 32, 36, 40, 44, 48, 53, 56, 60, 64, 80, 96, 113)
-# With 113 bits rounding is negligible, and the error is the method's truncation error.
+# With 113 bits rounding is negligible, so that the error is the truncation error.
 DOUBLE, WIDEST = Word(53), Word(113)
-# An error above this multiple of the error with 113 bits counts as rounding error.
+# An error of more than this multiple of the error with 113 bits counts as rounding.
 ROUNDS = 2.0
-_VISIBLE = 1e-9  # least error (rad/s) compared between arithmetics
-_SMALL = 0.01  # largest relative change of an error that leaves a result as it is
+_VISIBLE = 1e-9  # least error (rad/s) that is compared between arithmetics
+_SMALL = 0.01  # largest relative change of an error that does not count as a change
 _MACHINE = (("cdc48", 48, "FX"), ("rounded", 48, "RX"))
 _SHORT = {"nearest-even": "ne", "chop": "chop", "FX": "FX", "RX": "RX"}
 _STYLES: dict[str, dict[str, Any]] = {
@@ -56,33 +56,33 @@ _STYLES: dict[str, dict[str, Any]] = {
 
 
 class WordRun(NamedTuple):
-    """A run in one arithmetic, compared with binary64."""
+    """A run in an arithmetic, compared with binary64."""
 
     case: int
     program: str
     listing: str
-    p: int  # significand bits
+    p: int  # number of significand bits
     rule: str  # nearest-even, chop (towards zero), or the CDC's FX (truncating) or RX (rounding)
     stop: str  # reason and step of an early end, as in V2 at 25
-    fields: int  # numbers on the longer page
-    different: int  # numbers that differ
+    fields: int  # number of printed numbers on the longer page
+    different: int  # number of printed numbers that differ
     error: float  # largest error of omega, rad/s
-    singular: int  # steps with a singular matrix (IER = 129)
+    singular: int  # number of steps with a singular matrix (IER = 129)
 
 
 @dataclass(frozen=True)
 class WordCell:
-    """The runs of one program version on one case, in several arithmetics."""
+    """The runs of a program version in a case, in several arithmetics."""
 
     double: WordRun
-    widest: WordRun | None  # 113 bits; not computed for a verdict
+    widest: WordRun | None  # with 113 bits; not computed for a verdict
     runs: tuple[WordRun, ...]
 
     def find_run(self, p: int, rule: str) -> WordRun | None:
         return next((run for run in self.runs if (run.p, run.rule) == (p, rule)), None)
 
     def settled(self, rule: str, same: Sequence[WordRun]) -> int | None:
-        """Return the least p from which on all runs with `rule` are in `same`, or None."""
+        """Return the least p from which on all runs with the rounding `rule` are in `same`, or None."""
         of_rule = sorted((r for r in self.runs if r.rule == rule), key=lambda run: -run.p)
         return min((run.p for run in takewhile(same.__contains__, of_rule)), default=None)
 
@@ -103,7 +103,7 @@ def cells(
 def machine_cells(
     cases: Sequence[int], programs: Sequence[str] = PROGRAMS, progress: Progress = no_progress
 ) -> list[WordCell]:
-    """Return the runs of each original program on each case in the CDC's arithmetic."""
+    """Return the runs of original programs in the CDC's arithmetic, by case and program."""
     words = [Word(p, rule) for _, p, rule in _MACHINE]
     found = _runs(cases, list(map(Listing.original, programs)), words, progress)
     return [WordCell(double, None, tuple(runs)) for double, *runs in found]
@@ -112,7 +112,7 @@ def machine_cells(
 def _runs(
     cases: Sequence[int], listings: Sequence[Listing], words: Sequence[Word], progress: Progress
 ) -> Iterator[list[WordRun]]:
-    """Yield, by case and listing, the runs in binary64, then in `words`."""
+    """Yield the runs in binary64 and in `words`, for each case and listing."""
     every, done = len(cases) * len(listings) * len(words), 0
     truths = {case: reference(case_scene(case), case_scene(case).times()) for case in cases}
     for case, listing in product(cases, listings):
@@ -120,8 +120,7 @@ def _runs(
         pages: list[list[str]] = []
         found: list[WordRun] = []
         for word in (DOUBLE, *words):
-            # The compiled program has the same results, bit for bit, as its Python port with 53
-            # bits.
+            # In binary64 run the compiled program, which equals its Python port bit for bit.
             run = in_word.run(scene, listing, word) if found else run_program(scene, listing)
             lines = page(scene, listing.program, run).splitlines()
             pages.append(" ".join(lines[len(lines) - run.steps :]).split())

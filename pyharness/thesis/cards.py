@@ -1,6 +1,6 @@
 """The cards of the three programs, in our text and in the scan of the thesis.
 
-A card is a line of a printed program, a deck the cards of one program. `data/cards` has the decks,
+A card is a line of a printed program, a deck all cards of a program. `data/cards` has the decks,
 the scan's pages, and each card's lines in the Python port (the twin). A line of the scan has card
 number, dash and text; blanks are ignored. `data/apparatus.toml`, the critical apparatus, explains
 deviations of the scan.
@@ -20,13 +20,13 @@ _SPECIFICATION = re.compile(r"PROGRAM |DIMENSION |REAL |FORMAT\(|END$")
 _MARGIN = re.compile(r"^(.*?)\s*!\s*(\d+(?:[-,\s]+\d+)*)\s*$")
 _TWINS = Path(__file__).parent
 PORT = "fortran/original"
-"""The folder of the Fortran port in the source repository."""
+"""Folder of the Fortran port in the source repository."""
 
 
 class Difference(NamedTuple):
     """A passage of a card, without blanks, that differs between our text and the scan.
 
-    `entry` names its explanation in the apparatus.
+    The apparatus entry `entry` explains it.
     """
 
     ours: str
@@ -49,8 +49,8 @@ class Card(NamedTuple):
     number: int
     text: str  # our text of columns 1 to 72
     differences: tuple[Difference, ...] = ()  # from left to right
-    printed: tuple[str, str] | None = None  # other number in the scan, and its apparatus entry
-    lost: str | None = None  # apparatus entry, if the scan lacks the card
+    printed: tuple[str, str] | None = None  # wrong number in the scan, and its apparatus entry
+    lost: str | None = None  # apparatus entry if the scan lacks the card
 
     @property
     def name(self) -> str:
@@ -66,12 +66,12 @@ class Card(NamedTuple):
 
     @property
     def continues(self) -> bool:
-        """Return whether column 6 marks a continuation."""
+        """Whether column 6 marks a continuation."""
         return not self.is_comment and self.text[5:6].strip() != ""
 
     @property
     def scan(self) -> str | None:
-        """Return the card's line in the scan, without blanks; None if the scan lacks it."""
+        """The card's line in the scan, without blanks, or None if the scan lacks it."""
         if self.lost:
             return None
         number = self.printed[0] if self.printed else str(self.number)
@@ -84,7 +84,7 @@ class Card(NamedTuple):
         letters = tight(self.text)
         done = at = 0
         for each in self.differences:
-            # A difference begins where its characters first occur after the previous one.
+            # A difference begins where its text first occurs after the previous difference.
             first = letters.find(each.ours, at)
             if first < 0:
                 raise ValueError(f"{each.ours!r} does not stand in {self.text!r} where it should")
@@ -99,7 +99,7 @@ class Card(NamedTuple):
 
     @property
     def text_with_scanned_names(self) -> str:
-        """Return our text with normalised names as in the scan."""
+        """Our text, but with the scan's names of variables where we normalise them."""
         kinds = {each["id"]: each["kind"] for each in facts("apparatus")["entry"]}
         return "".join(
             each.scans if each and kinds[each.entry] == "normalization" else text
@@ -152,12 +152,12 @@ class Deck:
 
     @cached_property
     def absent(self) -> dict[int, str]:
-        """Return by card number why the Fortran port omits a card."""
+        """Reasons why the Fortran port omits cards, by card number."""
         return {n: why for cards, why in self._places["absent"] for n in numbers(cards)}
 
     @cached_property
     def otherwise(self) -> dict[int, str]:
-        """Return by card number why the Fortran port changes the form of a statement."""
+        """Reasons why the Fortran port changes the form of statements, by card number."""
         return {n: why for cards, why in self._places["otherwise"] for n in numbers(cards)}
 
     @cached_property
@@ -175,12 +175,12 @@ class Deck:
 
 @cache
 def deck(program: str) -> Deck:
-    """Return the deck of a program, which callers must not change."""
+    """Return a program's deck, which callers must not change."""
     return Deck(program)
 
 
 def statements_of(texts: Iterable[str]) -> list[list[str]]:
-    """Return [label, text] of each statement on cards with these `texts`, without blanks."""
+    """Return [label, text] of each statement on cards with `texts`, without blanks."""
     found: list[list[str]] = []
     for text in texts:
         if text.startswith("C"):
@@ -193,7 +193,7 @@ def statements_of(texts: Iterable[str]) -> list[list[str]]:
 
 
 def numbers(ranges: str) -> list[int]:
-    """Return the card numbers in a text: ``750-770, 800`` gives 750, 760, 770 and 800."""
+    """Return the card numbers in a text; ``750-770, 800`` gives 750, 760, 770 and 800."""
     found: list[int] = []
     for each in ranges.split(",") if ranges else ():
         first, _, last = each.strip().partition("-")
@@ -204,7 +204,7 @@ def numbers(ranges: str) -> list[int]:
 def chosen(asked: Iterable[str]) -> list[Card]:
     """Return the cards that `asked` names, by default all.
 
-    Items are as in ``two-term``, ``two-term:1660``, ``1660`` or ``1040-1090``.
+    Names are as in ``two-term``, ``two-term:1660``, ``1660`` or ``1040-1090``.
     """
     every = (card for each in list(asked) or PROGRAMS for card in _cards_of(each))
     return list(dict.fromkeys(every))
@@ -270,14 +270,17 @@ def port_file(program: str) -> str:
 
 
 def switch_at(place: Place) -> tuple[str, bool] | None:
-    """Return the defect or reading on which a Fortran line depends, and if it must be active."""
-    # The innermost `if` around the line that tests a defect or reading alone decides.
+    """Return the defect or reading on which a Fortran line depends, and whether it must be active.
+
+    Return None if the line does not depend on one.
+    """
+    # Seek the innermost `if` around the line that tests only a defect or reading.
     lines = _lines(shipped(PORT) / place.file)
     depth = _indentation(lines[place.line - 1])
     beyond_else = False
     for line in filter(str.strip, reversed(lines[: place.line - 1])):
         text, here = line.strip(), _indentation(line)
-        # The line opens a block around the place, or the branch before the `else` around it.
+        # `line` opens a block around the place, or the branch before the `else` around the place.
         if here < depth or (beyond_else and here == depth and text.startswith(("if ", "else if "))):
             if match := re.fullmatch(r"if \(listing%(\w+)\) then", text):
                 return match[1].replace("_", "-"), not beyond_else
@@ -286,7 +289,7 @@ def switch_at(place: Place) -> tuple[str, bool] | None:
 
 
 def twin_line(file: str, text: str) -> Place:
-    """Return the only line of a Python port with this text."""
+    """Return the only line of a Python port that has this text."""
     where = [n for n, line in enumerate(_lines(_TWINS / file), 1) if line.strip() == text]
     if len(where) != 1:
         raise ValueError(f"{text!r} occurs {len(where)} times in {file}")

@@ -1,7 +1,7 @@
 """Comparisons of the scan with our text of the cards, and of the three decks with the thesis.
 
-`data/cards/collation.toml` has each operation's cards, and the statement of sections II to V about
-it. Whether the decks agree is computed.
+`data/cards/collation.toml` has each operation's cards, and the thesis's statement about the
+operation. Whether the decks agree is computed.
 """
 
 import difflib
@@ -21,9 +21,9 @@ _OF_THE_SCAN = ("misreading", "missing text", "normalization")
 
 
 def expected_lines() -> list[tuple[str, str]]:
-    """Return text without blanks and name of each expected line of the scanned appendix.
+    """Return pairs (text without blanks, name) for each expected line of the scanned appendix.
 
-    The name is a card's, ``furniture`` or ``phantom``.
+    The name is a card's, ``furniture`` (a heading) or ``phantom`` (text that belongs to no card).
     """
     found = []
     for page in facts("cards/scan")["page"]:
@@ -33,7 +33,6 @@ def expected_lines() -> list[tuple[str, str]]:
                     assert card.scan is not None
                     found.append((card.scan, card.name))
             else:
-                # A heading of the editor, or text that belongs to no card at this place.
                 kind = "furniture" if "furniture" in item else "phantom"
                 found.append((tight(item[kind]), kind))
     return found
@@ -56,7 +55,7 @@ def witness_lines() -> dict[str, str]:
 
 
 def unexplained(scan: str) -> list[str]:
-    """Return a sentence for each line of a scan's text that disagrees with `expected_lines`."""
+    """Return a sentence for each line of a scan that disagrees with `expected_lines`."""
     _, heading, appendix = scan.rpartition(HEADING)
     if not heading or not re.search(r"^\s*\d+-", appendix, re.MULTILINE):
         raise InputError(
@@ -123,13 +122,13 @@ class Row(NamedTuple):
 
     what: str
     cards: dict[str, str]  # numbers by program, as in 750-770, 800
-    # "agree"; "names" if only names differ; "order" if order, too; "differ"; "-" without cards.
+    # "agree", "names" (only names differ), "order" (order, too), "differ", or "-" (no cards).
     decks: str
     thesis: str  # "agrees" with the decks, "differs" or "silent"
     text: str  # place in the thesis
     says: str  # statement at this place
     entries: tuple[str, ...]  # apparatus entries that explain a disagreement
-    reason: str  # another explanation
+    reason: str  # explanation if no entry is
 
     @property
     def is_explained(self) -> bool:
@@ -151,7 +150,7 @@ def rows() -> list[Row]:
 
 
 def faults(found: list[Row]) -> list[str]:
-    """Return a sentence for each mistake or unexplained disagreement in the rows `found`."""
+    """Return a sentence for each mistake or unexplained disagreement in `found`."""
     told = [f"{row.what}: no entry or reason" for row in found if not row.is_explained]
     known = {entry["id"]: entry for entry in facts("apparatus")["entry"]}
     for row in found:
@@ -178,7 +177,7 @@ def faults(found: list[Row]) -> list[str]:
 
 
 def statements(program: str, cards: str) -> list[str]:
-    """Return the statements on a program's `cards`, without blanks, labels and comments."""
+    """Return the statements on a program's `cards`, without blanks, labels or comments."""
     texts = (deck(program).cards[number].text for number in numbers(cards))
     return [text for _, text in statements_of(texts)]
 
@@ -210,7 +209,7 @@ def _same(found: dict[str, list[str]]) -> bool:
 
 
 def _renamed(statement: str, names: str) -> str:
-    """Return a statement with replaced names; ``A=A1 B=B1`` replaces A by A1, and B by B1."""
+    """Return a statement with replaced names; ``A=A1 B=B1`` replaces A by A1 and B by B1."""
     changes = dict(each.split("=") for each in names.split())
     return re.sub(r"[A-Z][A-Z0-9]*", lambda name: changes.get(name[0], name[0]), statement)
 

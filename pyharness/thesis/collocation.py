@@ -1,8 +1,8 @@
-"""Collocation with up to five terms (section IV.2 of the thesis): one step, and a run.
+"""Collocation with up to five terms (section IV.2 of the thesis): a step and a run.
 
 In a step, each unknown is a polynomial x(0) + c1 t + c2 t**2 + ... (eq. 34). With n terms after
 x(0), its derivative equals the right-hand side at n collocation points (eq. 36). A first estimate
-assumes a constant right-hand side; one correction evaluates it along the estimate.
+assumes a constant right-hand side; one correction evaluates it along this estimate.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,9 +15,9 @@ from pyharness.thesis.equations import Record, Vector, all_finite, initial_torqu
 from pyharness.thesis.linear_solver import leqt1f
 
 Rates = Callable[[int, Vector], list[float]]
-"""A function of k and the unknowns that returns the right-hand sides of all unknowns.
+"""A function of k and the unknowns that returns the right-hand sides.
 
-k is the number of a collocation point, or 0 for the start of the interval.
+k is the number of a collocation point, or 0 for the start of the step.
 """
 
 
@@ -29,7 +29,7 @@ def integrate(
 ) -> Trajectory:
     """Run a collocation program, whose points (s) are `points_of(DT)`.
 
-    `rates` takes the torques over moments (rad/s2), and then the arguments of `Rates`.
+    `rates` takes the torques divided by moments (rad/s2), then the arguments of `Rates`.
     """
     h = scene.step_size
     dt = h
@@ -61,9 +61,9 @@ def integrate(
 def interval(
     start: Vector, points: Sequence[float], end: float, rates: Rates
 ) -> tuple[list[float], int]:
-    """Return all unknowns after one step, and the correction's error code IER.
+    """Return the unknowns at `end` (s after the start), and the correction's error code IER.
 
-    `points` and `end` are times (s) after the start.
+    `points` are the collocation points, in s after the start.
     """
     constant = rates(0, start)
     estimate, _ = fit(points, [constant] * len(points))

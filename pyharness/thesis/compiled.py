@@ -1,4 +1,4 @@
-"""Runs of the thesis's compiled programs (Fortran ports)."""
+"""Runs of the thesis's programs compiled from the Fortran ports."""
 
 from dataclasses import replace
 from typing import Any
@@ -31,10 +31,7 @@ def read_rows(
     listing: Listing, rows: Array, ier: NDArray[np.int32], status: int, evaluations: int,
     stop_variable: int, stop_quotient: float,
 ) -> Trajectory:  # fmt: skip
-    """Return the output of a compiled program as a trajectory.
-
-    `rows` is as in `trajectory_of`; `stop_quotient` is in 1/s.
-    """
+    """Return a compiled program's output as a trajectory; `rows` are as in `trajectory_of`."""
     n = len(rows)
     return trajectory_of(
         rows,

@@ -25,11 +25,11 @@ from pyharness.thesis.printer import TAPE5
 # As printed; adapted to a modern compiler; for CDC's FTN. The last two add the torque of Case 7.
 DIALECTS = ("1982", "gfortran", "ftn")
 SYSTEMS = ("nos", "nosbe")
-# Numbers of terms of two more collocation programs, which V.2 of the thesis uses for Case 6, but
-# does not print.
+# Numbers of terms of two more collocation programs, which the thesis uses for Case 6 (V.2), but does
+# not print.
 MODELS = (3, 5)
 COMPILER = "gfortran"
-# REAL is binary64, variables are 0 until they are set, and no operations are fused.
+# Options for REAL in binary64, variables that are 0 until set, and no fused operations.
 FLAGS = (
     "-std=legacy", "-fdefault-real-8", "-fno-automatic", "-finit-real=zero", "-ffp-contract=off",
     "-fno-sign-zero",
@@ -42,7 +42,7 @@ class Run(NamedTuple):
     """The output of a compiled deck."""
 
     tape5: np.ndarray  # shape (n, 7): TIME (s), U1 to U3 (rad/s), V1 to V3 (m/s)
-    page: str  # TAPE6 without carriage control and trailing blanks
+    page: str  # TAPE6 without carriage control or trailing blanks
 
 
 def deck_text(
@@ -50,7 +50,7 @@ def deck_text(
 ) -> str:
     """Return a deck as fixed-form FORTRAN, with the printed data or those of `scene`.
 
-    `terms`, 3 or 5, requests `model_cards`.
+    With `terms`, 3 or 5, the deck is that of `model_cards`.
     """
     if dialect not in DIALECTS:
         raise unknown("dialect", dialect, DIALECTS, "--dialect")
@@ -76,12 +76,12 @@ def deck_text(
             cards |= new
             if "dialect" in each:
                 marked |= set(new)
-    # Column 73 marks cards of the dialect; columns 74 to 80 have the card number.
+    # Column 73 marks the dialect's cards; columns 74 to 80 have the card number.
     return "".join(f"{cards[n]:72}{_MARK if n in marked else '':1}{n:7d}\n" for n in sorted(cards))
 
 
 def card_steps(program: str) -> int:
-    """Return the number of steps in a program's published DO statement."""
+    """Return the number of steps in a program's printed DO statement."""
     number = facts("cards/alterations")["case"][program]["steps"]
     return int(deck(program).cards[number].text.split(",")[1])
 
@@ -92,7 +92,7 @@ def corrected_cards(program: str) -> dict[int, str]:
 
 
 def corrections(program: str) -> dict[int, list[str]]:
-    """Return by card number the defects whose correction changes the card."""
+    """Return the defects whose correction changes a card, by card number."""
     found: dict[int, list[str]] = {}
     for each in facts("cards/alterations")["alteration"]:
         if each["program"] == program and "corrects" in each and "case" not in each:
@@ -104,7 +104,7 @@ def corrections(program: str) -> dict[int, list[str]]:
 
 
 def job_text(deck: str, system: str = "nos", rounds: bool = False) -> str:
-    """Return a batch job that compiles and runs a deck of the dialect `ftn` with CDC's FTN.
+    """Return a batch job that compiles and runs a deck (dialect `ftn`) with CDC's FTN.
 
     `rounds` sets FTN's option ROUND.
     """
@@ -115,14 +115,14 @@ def job_text(deck: str, system: str = "nos", rounds: bool = False) -> str:
     compiles = job["compile"].format(rounds=jobs["rounds"] if rounds else "")
     control = [*job["before"], compiles, *job["after"], jobs["record"]]
     statements = "".join(f"{each}\n" for each in control)
-    named = statements.format(user="USERNAME", password="PASSWORD")  # the site assigns them
+    named = statements.format(user="USERNAME", password="PASSWORD")  # assigned by the site
     return named + deck + (_SOLVER.read_text() if "LEQT1F" in deck else "")
 
 
 def _is_made(
     alteration: Mapping[str, Any], listing: Listing, dialect: str, case: int | None
 ) -> bool:
-    """Return whether an alteration's conditions hold; `case` is None for the published data."""
+    """Return whether an alteration's conditions hold; `case` is None for the printed data."""
     named = alteration.get
     return (
         named("program") == listing.program
@@ -149,7 +149,7 @@ def _model(terms: int, listing: Listing, scene: Scene | None) -> dict[int, str]:
 
 
 def model_cards(terms: int) -> dict[int, str]:
-    """Return by number the cards of our conjectural collocation deck with `terms` terms."""
+    """Return the cards of our conjectural collocation deck with `terms` terms, by number."""
     text = [card.text for card in deck("four-term").cards.values()]
     terms_range = range(1, terms + 1)
     end = f"T{terms + 1}"
@@ -166,7 +166,7 @@ def model_cards(terms: int) -> dict[int, str]:
     text[:6] = [each.replace("(6)", "(8)") for each in heads]
     name = {3: "THREE", 5: "FIVE"}.get(terms, "FOUR")
     text[text.index("C FOUR TERM APPROXIMATION")] = f"C {name} TERM APPROXIMATION, A CONJECTURE"
-    # New statements, by the first and the last statement of the cards that they replace.
+    # New statements, by the first and the last statement that they replace.
     groups = {
         ("T1=DT*.2", "T5=.01"): [f"T{k}=DT*{k}./{terms + 1}." for k in terms_range]
         + [f"{end}=.01"],
@@ -197,7 +197,7 @@ def model_cards(terms: int) -> dict[int, str]:
             text[first : after + 1] = [f"      {each}" for each in new]
     tail = next(n for n, each in enumerate(text) if each.strip().startswith("WRITE(6,5)"))
     text[tail:] = [each.replace("(6)", f"({terms + 2})") for each in text[tail:]]
-    # Cards that end with an operator continue on the next one.
+    # A card that ends with an operator continues on the next card.
     for n, each in enumerate(text[:-1]):
         if each.rstrip().endswith("+"):
             text[n + 1] = "     C" + text[n + 1].strip().removeprefix("C")
@@ -213,7 +213,7 @@ def _case_cards(program: str, scene: Scene) -> dict[int, str]:
     for name, values in (("moments", scene.moments), ("torque", torque), ("omega", scene.omega)):
         for axis, value in enumerate(values):
             number = first[name] + 10 * axis
-            # Without a digit after the point of a whole number.
+            # Whole numbers have no digit after the point.
             written = repr(value).removesuffix("0") if value == int(value) else repr(value)
             left = deck(program).cards[number].text.partition("=")[0]
             found[number] = f"{left}={written}"
@@ -231,7 +231,7 @@ def compiler() -> str | None:
 
 
 def run_deck(text: str, folder: Path | None = None) -> Run:
-    """Compile and run a deck of the dialect `gfortran`, and return its output.
+    """Compile and run a deck (dialect `gfortran`), and return its output.
 
     `folder` keeps the compiled solver for later calls.
     """

@@ -16,7 +16,7 @@ Vector = Sequence[float]
 
 
 def omega_rate(coefficients: Vector, m: Vector, u: Vector) -> list[float]:
-    """Return domega/dt, eqs. 16-18, from A, B, C, torque over moment (rad/s2) and omega (rad/s)."""
+    """Return domega/dt (eqs. 16-18) from A, B, C, torque over moment (rad/s2) and omega (rad/s)."""
     a, b, c = coefficients
     return [m[0] + a * u[1] * u[2], m[1] + b * u[0] * u[2], m[2] + c * u[0] * u[1]]
 
@@ -31,13 +31,13 @@ def velocity_rate(acceleration: Vector, u: Vector, v: Vector) -> list[float]:
 
 
 def accelerations(scene: Scene, listing: Listing) -> list[float]:
-    """Return force over mass (m/s2); with the defect `three-masses` each axis has its own mass."""
+    """Return force over mass (m/s2); with the defect `three-masses`, each axis has its own mass."""
     masses = scene.masses if listing.has("three-masses") else scene.masses[:1] * 3
     return [force / mass for force, mass in zip(scene.forces, masses, strict=True)]
 
 
 def initial_torque(scene: Scene) -> Vector | None:
-    """Return the torque over moments (rad/s2) by the conjecture `initial-torque`, or None."""
+    """Return the conjecture `initial-torque`'s torque divided by moments (rad/s2), or None."""
     given = card_torque(scene)
     if given is None or scene.moments is None:
         return None
@@ -45,7 +45,7 @@ def initial_torque(scene: Scene) -> Vector | None:
 
 
 def card_torque(scene: Scene) -> Vector | None:
-    """Return the initial torque (N m) of a case in Table 1 with a varying torque, else None."""
+    """Return the initial torque (N m) in Table 1 of a case with a varying torque, else None."""
     if not scene.law.varies:
         return None
     given = {each["case"]: each["torque"] for each in facts("printer")["initial_torque"]}
@@ -62,7 +62,7 @@ def trajectory_of(rows: NDArray[np.float64], **others: Any) -> Trajectory:
 
 
 class Record:
-    """The results of a Python port's run, a row for each step."""
+    """The results of a Python port's run, with a row for each step."""
 
     def __init__(self, scene: Scene, evaluations_per_step: int) -> None:
         self._step_size = scene.step_size
@@ -71,7 +71,7 @@ class Record:
         self._ier: list[int] = []
 
     def add(self, recorded_time: float, omega: Vector, velocity: Vector, ier: int = 0) -> None:
-        """Add a step: TIME (s) as computed, omega (rad/s), velocity (m/s), the solver's IER."""
+        """Add a step: its TIME (s), omega (rad/s), velocity (m/s) and the solver's IER."""
         true_time = (len(self._rows) + 1) * self._step_size
         self._rows.append([true_time, recorded_time, *omega, *velocity])
         self._ier.append(ier)
@@ -84,7 +84,7 @@ class Record:
         rows = given.astype(np.float64)
         return trajectory_of(
             rows,
-            # A step that overflows has no row, but its evaluations count.
+            # A step that overflows has no row, but its evaluations count too.
             evaluations=self._per_step * (len(rows) + (ended == "overflow")),
             ended=ended,
             stop=stop,

@@ -1,7 +1,7 @@
 """Runs of the programs in a floating-point format of `word.py`, such as the CDC's.
 
-Python ports run in every format, compiled programs only in formats of IEEE 754. The Fortran
-extension takes numbers as bytes in the machine's order.
+Python ports run in all formats, compiled programs only in those of IEEE 754. The Fortran extension
+takes numbers as bytes in the machine's order.
 """
 
 import copy
@@ -37,7 +37,7 @@ def run(
 ) -> Trajectory:
     """Run a listing's Python port in the arithmetic `word`, without checks.
 
-    Results are floats; the trajectory's `exact` has them unrounded.
+    Results are rounded to floats; the trajectory's `exact` has them unrounded.
     """
     twin = importlib.import_module(f"pyharness.thesis.{listing.program.replace('-', '_')}")
     found: Trajectory = twin.run(scene_in(scene, word), listing, lipschitz, may_stop)
@@ -56,7 +56,7 @@ def scene_in(scene: Scene, word: Word) -> Scene:
         return None if value is None else word(value)
 
     def copied(frozen: Of, names: Sequence[str]) -> Of:
-        # Checks would convert the values to floats.
+        # Copied without checks, which would convert the values to floats.
         changed = copy.copy(frozen)
         vars(changed).update({name: converted(getattr(frozen, name)) for name in names})
         return changed
@@ -73,7 +73,7 @@ def run_compiled(
 ) -> Trajectory:
     """Run a compiled program in the arithmetic `word`, with the same result as `run`.
 
-    Raise InputError if the compiler lacks this arithmetic, or an angle is too large for its sine.
+    Raise InputError if the compiler lacks this arithmetic, or a wave's angle is too large.
     """
     if word.p > 53:
         _check_angles(scene)
@@ -137,7 +137,7 @@ def to_bytes(numbers: Iterable[Any], word: Word, *shape: int) -> Bytes:
     """
     size = n_bytes(word)
     written = b"".join(_pattern(each).to_bytes(size, sys.byteorder) for each in numbers)
-    # The copy is aligned for any number.
+    # Copied, because a new array is aligned for any number.
     return np.array(np.frombuffer(written, np.int8).reshape((size, *shape), order="F"), order="F")
 
 

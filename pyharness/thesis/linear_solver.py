@@ -9,7 +9,7 @@ SINGULAR = 129
 def leqt1f(
     matrix: list[list[float]], right_hand_sides: list[list[float]]
 ) -> tuple[list[list[float]], int]:
-    """Return the solutions x of A x = b and IER = 0 or, if A is singular, each b and IER = 129."""
+    """Return the solutions x of A x = b and IER = 0 or, if A is singular, all b and IER = 129."""
     factors = [list(row) for row in matrix]
     pivots = _factor(factors)
     if pivots is None:
@@ -35,7 +35,7 @@ def _factor(a: list[list[float]]) -> list[int] | None:
                 total = total - row[k] * a[k][j]
             row[j] = total
 
-        # The first of several elements with the largest scaled magnitude is the pivot.
+        # The pivot is the first of the elements with the largest scaled magnitude.
         biggest = 0.0
         pivot = j
         for i in range(j, n):

@@ -30,7 +30,7 @@ from pyharness.thesis.compiled import stop_reads_velocity
 from pyharness.thesis.equations import card_torque
 
 _LEAST_WORK = 100_000  # fewest steps, over all bodies, that are worth a thread
-_PIECES = 8  # kernel calls for each thread, because some runs may end early
+_PIECES = 8  # number of kernel calls for each thread, because some runs may end early
 _NOT_REACHED = -1
 
 
@@ -73,7 +73,7 @@ class ProgramEnsemble(BatchResult):
     ier: NDArray[np.int32] | None
 
 
-# As text, because the signature would otherwise repeat ArrayLike's 300 characters.
+# ArrayLike as text, because the signature would repeat its 300 characters.
 def run_many(
     scene: Scene,
     listing: Listing,
@@ -202,7 +202,7 @@ def _run(
     scene: Scene, listing: Listing, by_moments: bool, inputs: dict[str, Array], n: int,
     wanted: NDArray[np.int32], may_stop: bool, velocity: bool, threads: int,
 ) -> ProgramEnsemble:  # fmt: skip
-    """Run a program; `inputs` are arrays by name, "body" for moments or coefficients."""
+    """Run a program; `inputs` has arrays by name, with "body" for moments or coefficients."""
     program = extension().run_programs
     one_step_size = bool((inputs["step_size"] == inputs["step_size"].flat[:1]).all())
     rows = (spread(each, n) for each in inputs.values())
@@ -212,7 +212,7 @@ def _run(
     # The kernel needs at least one requested step.
     at = np.unique(wanted) if wanted.size else np.full(1, scene.steps, dtype=np.int32)
     back = np.searchsorted(at, wanted)
-    # The body is the first axis, so that transposes are the kernel's column-major arrays.
+    # Bodies are the first axis, so that transposes are the kernel's column-major arrays.
     omega_rows = np.full((n, at.size, 3), np.nan)
     velocity_rows = np.full((n * velocity, at.size, 3), np.nan)
     times = np.full((1 if one_step_size else n, at.size), np.nan)
@@ -253,7 +253,7 @@ def _pieces(n: int, steps: int, threads: int) -> Iterator[slice]:
     if threads > 1:
         fair = -(-n // (_PIECES * threads))
         size = max(fair, _LEAST_WORK // steps, 1)
-        # A whole number of blocks: the kernel integrates LANE_COUNT bodies at once.
+        # A multiple of LANE_COUNT, the number of bodies that the kernel integrates at once.
         size = -(-size // Blocks.LANE_COUNT) * Blocks.LANE_COUNT
     for begin in range(0, n, max(1, size)):
         yield slice(begin, min(n, begin + size))

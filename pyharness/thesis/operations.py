@@ -83,7 +83,7 @@ class _Array(defaultdict[tuple[int, ...], Any]):
 
 
 def operations_per_step(listing: Listing, times: Mapping[str, int] = ALIKE) -> Count:
-    """Return the operations in a listing's first step; `times` weights each kind of operation."""
+    """Return the count for a listing's first step; `times` has the time of each operation."""
     statements = statements_of(deck_text(listing).splitlines())
     begin = next(n for n, (_, text) in enumerate(statements) if _DO.match(text))
     label = _DO.match(statements[begin][1])

@@ -2,7 +2,7 @@
 
 The page omits each record's carriage control, a blank. `data/printer.toml` has the FORMATs, with
 conjectural parts marked. The package `fortranformat` writes all values except negative zeros and
-those not finite.
+values that are not finite.
 """
 
 import math
@@ -20,10 +20,9 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.thesis.equations import card_torque
 
-# Zero is printed without minus sign (FORTRAN 77, 13.5.9).
+# Zero is printed without a minus sign (FORTRAN 77, 13.5.9).
 _MINUS_ZERO = re.compile(r"-(0?\.0*)(?!\d)")
-# A value that is not finite is printed as asterisks, like a value that is too wide for its field.
-# The CDC printed R or I instead.
+# Replaces a value that is not finite, so that it is printed as asterisks; the CDC printed R or I.
 _TOO_WIDE = 1e300
 _PLACES = re.compile(r"F\d+\.(\d+)")
 
@@ -48,13 +47,13 @@ def _printed_rows(trajectory: Trajectory, form: str) -> list[list[float]]:
     if trajectory.exact is None:
         assert trajectory.velocity is not None
         return np.hstack([trajectory.omega, trajectory.velocity]).tolist()  # type: ignore[no-any-return]
-    # Numbers of another arithmetic than binary64 are first rounded to the decimals of the FORMAT.
+    # Numbers of another arithmetic than binary64 are rounded to the decimals of the FORMAT here.
     (places,) = {int(each) for each in _PLACES.findall(form)}
     return [[_to_places(x, places) for x in row[2:]] for row in trajectory.exact.tolist()]
 
 
 def _to_places(x: Any, places: int) -> float:
-    """Return a number rounded to `places` decimals, ties away from zero; nan if not finite."""
+    """Return a number rounded to `places` decimals, ties away from zero, or nan if not finite."""
     if not is_finite(x):
         return math.nan
     value = Fraction(x) if isinstance(x, float) else x.fraction()
@@ -89,7 +88,7 @@ TAPE5 = np.dtype([("head", "<i4"), ("items", "<f8", (7,)), ("tail", "<i4")])
 
 
 def tape5(trajectory: Trajectory) -> bytes:
-    """Return the bytes of TAPE5 for a trajectory with velocity, in records of today's compilers."""
+    """Return a trajectory with velocity as the bytes of TAPE5, in today's compilers' records."""
     assert trajectory.velocity is not None
     # The author's tape had other record marks and, we infer, 60-bit words.
     result = np.empty(len(trajectory.time), dtype=TAPE5)

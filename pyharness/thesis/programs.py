@@ -23,7 +23,7 @@ class Program:
     """One of the three programs of the appendix."""
 
     name: str
-    order: int  # of the corrected version's global error
+    order: int  # order of convergence of the corrected version
     source: str  # where the thesis describes the program
 
     def run(
@@ -72,7 +72,7 @@ class Program:
 
 
 def work_of(word: str, implementation: str) -> str:
-    """Return the key of an arithmetic and implementation in `check_steps`' work limits."""
+    """Return the key for the work limit of an arithmetic and implementation in `check_steps`."""
     if word == BINARY64:
         return implementation
     return "another word" if implementation == "python" else word

@@ -38,7 +38,7 @@ class Runs(NamedTuple):
 
 
 class Grade(NamedTuple):
-    """The result of a claim's test: its numbers, and whether the claim holds, in whole or in part."""
+    """The result of a claim's test: numbers, and whether the claim holds, in whole or in part."""
 
     numbers: Mapping[str, Any]
     whole: Any

@@ -235,7 +235,7 @@ def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judge
                 numbers[f"{name}: growth over Re Q"] = measured
                 told &= abs(measured - 1.0) <= within
             else:
-                # Without growth, the perturbation may become at most ten times as large in ten periods.
+                # Without growth, the perturbation may become ten times as large in ten periods.
                 largest_size = float(sizes.max() / np.linalg.norm(disturbance))
                 numbers[f"{name}: largest disturbance over the first"] = largest_size
                 told &= largest_size <= 10.0

@@ -1,6 +1,6 @@
 """Tests of the thesis's claims about one case.
 
-Each function is the `test` of claims in `data/claims.toml`, where `rule` describes the decision, and
+Each function is the `test` of claims in `data/claims.toml`, where `rule` describes the decision and
 `parameters` are the keyword arguments. `lab` runs the original or the corrected programs; `case` is
 a number in Table 1. Errors are defined in `rules`.
 """

@@ -26,7 +26,7 @@ _HIGHEST = 40.0
 
 
 def check_port(options: argparse.Namespace, programs: Sequence[str], cases: Sequence[int]) -> int:
-    """Check the port started by `options.port`; return 1 if a check fails, else 0."""
+    """Check the port that `options.port` starts; return 1 if a check fails, else 0."""
     shared.refuse(options, "--port", _OF_THE_CHECKS)
     names, seed = shared.names(options.cell), shared.chosen_seed(options)
     count = shared.chosen_count(options.draws, "--draws", 0, 0, shared.CHECKS)
@@ -83,7 +83,7 @@ def _port_self_test(options: argparse.Namespace, cells: Sequence[Cell]) -> int:
 
 
 def check_integrator(options: argparse.Namespace) -> int:
-    """Check the integrator started by `options.integrator`; return 1 if a check fails, else 0."""
+    """Check the integrator of `options.integrator`; return 1 if a check fails, else 0."""
     shared.refuse(options, "--integrator", (*_OF_THE_CHECKS, "port", "program", "case"))
     command = options.integrator
     due = shared.positive(options.order, "--order", 1.0)
@@ -140,16 +140,16 @@ def _integrator_self_test(
 
 def show_self_test(
     options: argparse.Namespace,
-    outcomes: Iterable[Outcome],  # the first is the control, a run without fault
-    count: int,  # of planted faults
+    outcomes: Iterable[Outcome],  # the first is the control, a run without a fault
+    count: int,  # number of planted faults
     title: Sequence[str],
     again: str,
     refuse: Callable[[], None] = lambda: None,
     **extra: Any,
 ) -> int:
-    """Write the report of a self-test; return 1 if an outcome fails, else 0.
+    """Write the report of a self-test; return 1 if an outcome failed, else 0.
 
-    `refuse` is called if the control fails.
+    `refuse` is called if the control failed.
     """
     found = []
     for each in outcomes:

@@ -1,4 +1,4 @@
-"""The data of the API page: public names and docstrings."""
+"""The API page's data: public names and their docstrings."""
 
 import inspect
 import re
@@ -28,8 +28,8 @@ class Entry(NamedTuple):
     kind: str  # "function", "class" or "property"
     signature: str
     summary: Markup  # first line of the docstring
-    text: list[Markup]  # its other paragraphs
-    groups: list[tuple[str, list[Item]]]  # its sections, by title
+    text: list[Markup]  # other paragraphs of the docstring
+    groups: list[tuple[str, list[Item]]]  # sections of the docstring, by title
     methods: "list[Entry]"
 
 
@@ -59,7 +59,7 @@ def _entry(name: str, of: Any, of_class: str = "") -> Entry:
 
 
 def _methods(owner: str, of: type) -> Iterator[Entry]:
-    # Some methods are inherited from base classes of this package.
+    # Include methods inherited from base classes of this package.
     named: dict[str, Any] = {}
     for base in of.__mro__:
         if base.__module__.startswith(pyharness.__name__):
@@ -78,7 +78,7 @@ def _signature(of: Any) -> str:
             told = re.sub(r" -> \w+$", "", told)
     except (TypeError, ValueError):
         return ""
-    # Types are written without their modules; array types are written as in the source files.
+    # Write types without their modules, and array types as in the source files.
     told = re.sub(r"<class '(.*?)'>", r"\1", told).replace("NoneType", "None")
     told = re.sub(r"numpy\.ndarray\[tuple\[.*?\], numpy\.dtype\[(.*?)\]\]", _array, told)
     return re.sub(r"\b(?:[a-z_]+\.)+(?=[A-Za-z])", "", told)

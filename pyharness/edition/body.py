@@ -1,6 +1,6 @@
 """The data of the page that animates a torque-free body.
 
-Readers without JavaScript see a picture, and a Python program with its output.
+Without JavaScript, the page shows a picture, and a Python program with its output.
 """
 
 import contextlib
@@ -27,25 +27,25 @@ found = solve(body, [1.0, 1e3, 1e6], "closed-form", attitude=True)
 print(found.omega.round(6))
 print(found.attitude.round(6))
 """
-"""The program shown on the page, which solves Case 4 of the thesis."""
+"""Program shown on the page, which solves Case 4 of the thesis."""
 
 AGREEMENT = 2e-15
-"""The largest difference between closed-form solutions by the page's script and by Fortran.
+"""Largest difference between closed-form solutions by the page's script and by Fortran.
 
-It applies to each attitude component, and to omega relative to its largest component.
+It applies to each component of the attitude, and to omega relative to its largest component.
 """
 
 SPEEDS = (0.1, 0.25, 0.5, 1, 2, 10, 100, 1000)
-"""The speeds that the page offers, in seconds of motion per second."""
+"""Speeds that the page offers, in seconds of motion per second."""
 
-_FLIPS = 3.0  # length of the motion, in times between flips
+_FLIPS = 3.0  # duration of the motion, in times between flips
 _POINTS = 601
 _COLOURS = ("#1040a0", "#b02018", "#107040")
 _STYLES = ("-", "--", "-.")
 
 
 def context() -> dict[str, Any]:
-    """Return the values for the page's template; `flip` is the time (s) between flips."""
+    """Return the values for the page's template; `flip` is the time between flips (s)."""
     first = _first()
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
@@ -58,7 +58,7 @@ def context() -> dict[str, Any]:
 
 
 def data() -> dict[str, Any]:
-    """Return the page's bodies (kg m2, rad/s), the one shown first, and the largest time (s)."""
+    """Return the page's bodies (kg m2, rad/s), the name of the first, and the largest time (s)."""
     known = facts("bodies")
     bodies: list[dict[str, Any]] = []
     for each in known["body"]:
@@ -72,7 +72,7 @@ def data() -> dict[str, Any]:
 
 
 def moments_of_box(edges: list[float], mass: float) -> list[float]:
-    """Return the moments (kg m2) of a homogeneous box (edges in m, mass in kg), rounded once."""
+    """Return the moments (kg m2) of a homogeneous box with `edges` (m) and `mass` (kg)."""
     squares = [Fraction(str(edge)) ** 2 for edge in edges]
     twelfth = Fraction(str(mass)) / 12
     return [float(twelfth * (sum(squares) - square)) for square in squares]
@@ -129,7 +129,7 @@ def _draw_polhode(axes: Any, moments: Array, found: Trajectory) -> None:
 
 
 def _in_plane(found: Trajectory) -> Array:
-    """Return omega's components (rad/s) in the plane normal to the momentum, shape (n, 2)."""
+    """Return omega's components (rad/s) in the plane normal to the angular momentum, (n, 2)."""
     assert found.attitude is not None
     momentum = found.angular_momentum("space")[0]
     up = momentum / np.linalg.norm(momentum)

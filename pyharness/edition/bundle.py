@@ -1,8 +1,8 @@
 """Bundling of JavaScript (ES) modules into one classic script.
 
 Browsers do not import modules into a page opened from a file. In the script, each module is a
-function that returns its exports, after its imports. Only the project's forms of import and export
-are supported.
+function that returns its exports, and follows the modules that it imports. Only the project's forms
+of import and export are supported.
 """
 
 import re
@@ -12,14 +12,14 @@ _IMPORT = re.compile(
     r'^import (?:\{(?P<names>[^}]*)\}|\* as (?P<all>\w+)) from "(?P<path>\.\.?/[\w./-]+)";$', re.M
 )
 _EXPORT = re.compile(r"^export (?=(?:function|const|class) (?P<name>\w+))", re.M)
-# An unsupported import or export, which remains after replacing the supported ones.
+# An import or export that remains after replacing the supported forms.
 _UNKNOWN = re.compile(r"^\s*(?:import|export)\b.*|\bimport\s*[(.]", re.M)
-# Comments are removed; readers find them in the modules.
+# Comments, which are omitted from the script.
 _COMMENT = re.compile(r"^ *//.*\n", re.M)
 
 
 def bundle(entry: Path) -> str:
-    """Return the module in `entry` and all its imports as one script without global names.
+    """Return the module in `entry` and all imported modules as one script without global names.
 
     Raise ValueError for anything unsupported or missing.
     """
@@ -32,7 +32,7 @@ def bundle(entry: Path) -> str:
 def _add(
     path: Path, importing: tuple[Path, ...], exports: dict[Path, list[str]], parts: list[str]
 ) -> None:
-    """Append a module, imported through `importing`, to `parts` after its own imports."""
+    """Append a module, imported through the chain `importing`, and its imports to `parts`."""
     text = path.read_text(encoding="utf-8")
 
     def declare(found: re.Match[str]) -> str:
@@ -49,7 +49,7 @@ def _add(
             if name not in exports[needed]:
                 raise _error(path, text, found.start(), f"{needed.name} exports no {name}")
             constants.append(f"{name}: {alias or name}")
-        # The number of lines is kept for error messages.
+        # Keep the number of lines, for error messages.
         lines = "\n" * found[0].count("\n")
         left = found["all"] or f"{{ {', '.join(constants)} }}"
         return f"const {left} = module{list(exports).index(needed)};{lines}"

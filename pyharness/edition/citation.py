@@ -1,4 +1,4 @@
-"""The citation of edition and thesis, and the RO-Crate 1.1 of the data."""
+"""Citations of the edition and the thesis, and the RO-Crate 1.1 of the data."""
 
 import json
 import tomllib
@@ -12,14 +12,14 @@ from pyharness.model.errors import InputError
 from pyharness.model.facts import facts, shipped
 
 _NO_NUMBER = "The number of the report is unknown to us"
-# Words of CITATION.cff for an editor to replace.
+# Words in CITATION.cff that an editor must replace.
 _PLACEHOLDERS = ("SURNAME", "GIVEN NAMES", "YYYY-MM-DD", "ADDRESS OF THE REPOSITORY", "DOI OF THE")
 PUBLISH = (
     "These pages have no address of their own yet, so that a citation names the page in the "
     "edition. Whoever publishes them sets address in pyharness/data/edition.toml, fills in "
     "CITATION.cff, and builds them again."
 )
-"""The text for pages without an address."""
+"""Text for pages without an address."""
 
 # Properties that schema.org defines for source code.
 _OF_SOURCE_CODE = (
@@ -41,12 +41,12 @@ def release_date() -> str:
 
 
 def address() -> str:
-    """Return the published pages' address, ending with a slash; "" before publication."""
+    """Return the published pages' address, which ends with a slash, or "" before publication."""
     return str(facts("edition")["address"])
 
 
 def check_publishable() -> None:
-    """Raise InputError if the pages have an address, but CITATION.cff has placeholders."""
+    """Raise InputError if the pages have an address but CITATION.cff has placeholders."""
     lines = shipped("CITATION.cff").read_text(encoding="utf-8").splitlines()
     for number, line in enumerate(lines, 1):
         found = [each for each in _PLACEHOLDERS if each in line]
@@ -58,7 +58,7 @@ def check_publishable() -> None:
 
 
 def bibtex(place: str = "", path: str = "") -> str:
-    """Return BibTeX entries of the thesis and of the edition, or a `place` in it.
+    """Return BibTeX entries of the thesis and of the edition, or a `place` in the edition.
 
     `path` is appended to the pages' address.
     """
@@ -96,8 +96,8 @@ def csl(place: str = "", path: str = "") -> list[dict[str, Any]]:
 
 
 def cite_data() -> dict[str, Any]:
-    """Return the data from which the script of the pages cites a part of the edition."""
-    # The script replaces these by the name and the path of the part.
+    """Return the data from which the pages' script cites a part of the edition."""
+    # Placeholders that the script replaces by the part's name and path.
     place = "@PLACE@", "@PATH@"
     return {
         "address": address(), "publish": PUBLISH, "digest": text_digest(),
@@ -114,7 +114,7 @@ def thesis_record() -> dict[str, Any]:
 
 
 def linked_data() -> dict[str, Any]:
-    """Return the records of software and data as JSON-LD for search engines."""
+    """Return records of software and data as JSON-LD, for search engines."""
     described = codemeta()
     software = {name: described[name] for name in _OF_SOURCE_CODE if name in described}
     names = {name: described[name] for name in ("version", "license", "copyrightYear")}
@@ -152,7 +152,7 @@ def _entry(kind: str, key: str, fields: dict[str, str]) -> str:
 class Part(NamedTuple):
     """A file of the data package; `path` is relative to the package.
 
-    `content` is empty for files that describe the others.
+    `content` is empty for files that describe other files.
     """
 
     path: str
@@ -163,7 +163,7 @@ class Part(NamedTuple):
 
 
 def described(name: str, content: bytes = b"", /, **values: Any) -> Part:
-    """Return the file described by table `name` of `package.toml`, with `values` filled in."""
+    """Return the file that table `name` of `package.toml` describes, with `values` filled in."""
     texts = (text.format(**values) for text in _descriptions()[name].values())
     path, title, description, media_type = texts
     return Part(path, title, description, media_type, content)
@@ -175,9 +175,9 @@ def _descriptions() -> dict[str, dict[str, str]]:
 
 
 KEPT = tuple(map(described, ("crate", "mark", "manifest")))
-"""The files of the package that describe its other files."""
+"""Files of the package that describe its other files."""
 CRATE, PACKAGE_MARK, MANIFEST = (each.path for each in KEPT)
-"""The paths of `KEPT`. `PACKAGE_MARK` marks a folder as a data package, and lists its files."""
+"""Paths of `KEPT`. `PACKAGE_MARK` marks a folder as a data package, and lists its files."""
 _VERSION = "https://w3id.org/ro/crate/1.1"
 _LICENCE = "The licence of the edition; the file LICENSE has its text."
 _DATA = "Software Heritage identifier of the edition's data"

@@ -1,6 +1,6 @@
 """The edition as plain data: cards, apparatus, verdicts, runs and printed pages.
 
-The RO-Crate contains neither times nor paths of the machine, and is the same in every run.
+The RO-Crate has no times or paths of the machine, so that it is the same in every run.
 """
 
 from collections.abc import Iterator, Mapping
@@ -57,25 +57,25 @@ _COLUMNS = "card kind text scan entries port twin swhid"
 
 
 def data_package(progress: Progress = no_progress) -> dict[str, bytes]:
-    """Return all files of the data package, content by path."""
+    """Return the contents of all files of the data package by path."""
     parts = [*_list_files(progress)]
     parts.append(_readme(parts))
     content = {each.path: each.content for each in parts}
     content[CRATE] = json_text(crate_record(parts), indent=2).encode()
     listed = {path: content_identifier(each) for path, each in content.items()}
     mark = {"schema": SCHEMAS["data package"], "version": codemeta()["version"]}
-    # The manifest contains the checksum of the mark, which therefore can't identify the manifest.
+    # The mark cannot identify the manifest, which contains the mark's checksum.
     files = {**listed, MANIFEST: None}
     mark |= {"text": text_digest(), "data": data_identifier(), "files": files}
     content[PACKAGE_MARK] = json_text(mark, indent=2).encode()
-    # For `sha256sum -c`.
+    # The format of `sha256sum -c`.
     lines = (f"{sha256(content[path]).hexdigest()}  {path}\n" for path in sorted(content))
     content[MANIFEST] = "".join(lines).encode()
     return dict(sorted(content.items()))
 
 
 def archive(content: Mapping[str, bytes], folder: str) -> bytes:
-    """Return a ZIP file, without times, of `content` in `folder`."""
+    """Return a ZIP file, without times, that has `content` in `folder`."""
     found = BytesIO()
     with ZipFile(found, "w") as packed:
         for path, each in content.items():
@@ -133,7 +133,7 @@ def _readme(parts: list[Part]) -> Part:
 
 
 FAULTS_CASE = 5
-"""The case for the effects of single faults; its initial omega is on the cards."""
+"""Case for the effects of single faults, whose initial omega is on the cards."""
 
 _ENDS = "case program listing steps ended stop_step stop_variable"
 _ROWS = "program listing step time omega1 omega2 omega3 velocity1 velocity2 velocity3"
@@ -184,7 +184,7 @@ def _rows(case: int) -> Iterator[list[Any]]:
             yield [*names, step, *state]
 
 
-# The arithmetics of the original machine, one for each option of its compiler.
+# Arithmetics of the original machine, by options of its compiler.
 _MACHINE = ("cdc48", "cdc48-rounded")
 _PAGES = "program case listing word steps card_steps page"
 _SYSTEMS = {"nos": "NOS", "nosbe": "NOS/BE"}
@@ -202,7 +202,7 @@ def machine_parts() -> Iterator[Part]:
             text = our_page(listing, case, card_steps(program), word)
             name = _name(program, case, title, word)
             first = first_with.setdefault(text, name)
-            # Equal pages are stored once, except predictions for the machine.
+            # Equal pages are stored once, except those predicted for the original machine.
             if title != "original" or word not in _MACHINE:
                 name = first
             texts[name] = text
@@ -233,7 +233,7 @@ def _name(program: str, case: int, listing: str, word: str) -> str:
 
 
 def _jobs(texts: dict[str, str]) -> Iterator[Part]:
-    """Yield each system's jobs, also with the option ROUND if it changes the printed page."""
+    """Yield each system's jobs, also with the option ROUND if this changes the printed page."""
     for program, case in facts("cases")["published"].items():
         first, second = (texts[_name(program, case, "original", word)] for word in _MACHINE)
         for system in SYSTEMS:
@@ -247,7 +247,7 @@ def _jobs(texts: dict[str, str]) -> Iterator[Part]:
 
 
 def _shared(texts: dict[str, str], rows: list[list[Any]]) -> Iterator[list[str]]:
-    """Yield the file and number of rows of each page, and the runs that print it."""
+    """Yield each page's file, number of rows, and runs that print it."""
     for name, text in texts.items():
         _, printed = printed_page.split_page(printed_page.printed_numbers(text))
         words: dict[str, list[str]] = {}

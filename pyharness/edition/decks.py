@@ -1,4 +1,4 @@
-"""The data of the pages on the listings, card by card, with scan and ports.
+"""The data of the pages on the programs, card by card, with scan and ports.
 
 A note is a numbered entry of the apparatus.
 """
@@ -55,7 +55,7 @@ class Corrected(NamedTuple):
     """The corrected form of a card, with the cards `inserted` after it."""
 
     text: str | None  # None for a deleted card
-    changes: bool  # true for a deleted or replaced card
+    changes: bool  # whether the card is deleted or replaced
     inserted: list[tuple[int, str]]
     defects: list[str]
 
@@ -70,11 +70,11 @@ class CardView(NamedTuple):
     after: list[Run]  # next lines of the scan, which belong to no card
     scan: list[Run] | None  # line of the scan
     corrected: Corrected
-    # Each line of the Fortran port, the defect or reading that switches it, and whether the line is
-    # executed if this is active.
+    # Lines of the Fortran port, each with the defect or reading on which it depends, and whether
+    # this must be active.
     port: list[tuple[Place, str | None, bool]]
-    notes: list[Note]  # the most important kind first
-    begins: list[Note]  # notes on a range of cards that begins here, each with only this range
+    notes: list[Note]  # by precedence of their kinds
+    begins: list[Note]  # notes on ranges of cards that begin here, each with only this range
     kinds: list[str]  # kinds of the notes, by precedence
 
 
@@ -83,7 +83,7 @@ class Sheet(NamedTuple):
 
     number: int
     cards: list[CardView]
-    moved: str | None  # note that the page is out of place in the scan
+    moved: str | None  # apparatus entry if the page is out of place in the scan
 
 
 def sheets(program: str) -> list[Sheet]:
@@ -99,7 +99,7 @@ def sheets(program: str) -> list[Sheet]:
 
 
 def notes(program: str) -> list[Note]:
-    """Return a program's notes, sorted by kind, then size of effect, then card."""
+    """Return a program's notes, sorted by kind, size of effect and card."""
     having = [each for each in entries() if each["cards"].get(program)]
 
     def place(entry: dict[str, Any]) -> tuple[float, ...]:
@@ -164,14 +164,14 @@ def kinds_of(views: Iterable[CardView]) -> dict[str, int]:
 def _card(card: Card) -> list[Run]:
     if card.lost:
         statement = card.text.lstrip()
-        # The bracket replaces a blank, so that the statement keeps its columns.
+        # The bracket replaces a blank, to keep the statement's columns.
         blanks = card.text[: max(len(card.text) - len(statement) - 1, 0)]
         return [Run(f"{blanks}[{statement}]")]
     return [Run(text, each and each.entry) for text, each in card.passages()]
 
 
 def _phantoms(program: str) -> dict[int, list[Run]]:
-    """Return the scan's lines that belong to no card, by the card before them."""
+    """Return the scan's lines that belong to no card, by the preceding card's number."""
     found: dict[int, list[Run]] = {}
     for page in facts("cards/scan")["page"]:
         for each in page["lines"] if page["program"] == program else ():

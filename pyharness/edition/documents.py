@@ -1,6 +1,6 @@
 """The documents of `docs` as pages of the web site and as Jupyter notebooks.
 
-`folder` has the documents; `name` is a path in it.
+`folder` has the documents; `name` is a path in `folder`.
 """
 
 import base64
@@ -19,9 +19,9 @@ from pyharness.views.render import json_text
 
 _PICTURES = (".png", ".svg")
 _BESIDE = (*_PICTURES, ".csv", ".schema.json")
-# Folder for contributors, which the site omits.
+# Folder that the site omits.
 _OFF_SITE = "contributing/"
-# Folders whose documents also become notebooks if they have Python examples.
+# Folders whose documents become notebooks too if they have Python examples.
 _NOTEBOOKS = ("gallery", "tutorials")
 # Documents to which other pages of the site link.
 _LINKED = (
@@ -30,7 +30,7 @@ _LINKED = (
     "explanation/about-the-text.md",
     "explanation/methods.md",
 )
-# An example with its output, or a picture.
+# An example with any output, or a picture.
 _PART = re.compile(
     r"```python\n(?P<code>.*?)```(?:\n*```output\n(?P<output>.*?)```)?"
     r"|!\[[^]]*\]\((?P<picture>[^)/]+\.(?P<form>svg|png))\)",
@@ -40,7 +40,7 @@ _LINK = re.compile(r"(?<!!)\[((?:[^][]|\[[^]]*\])*)\]\([^):]*\)")
 
 
 def documents_folder(given: str | None = None) -> Path:
-    """Return `given`, or `docs` of the checkout or the current folder.
+    """Return the folder `given` or, by default, `docs` of the checkout or in the current folder.
 
     Raise InputError if a document is missing there.
     """
@@ -59,7 +59,7 @@ def documents_folder(given: str | None = None) -> Path:
 
 
 def documents(folder: Path) -> Iterator[tuple[str, Document]]:
-    """Yield path and text of each document, except those for contributors."""
+    """Yield the site's path and the rendered text of each document of the site."""
     for file in sorted(folder.rglob("*.md")):
         name = file.relative_to(folder).as_posix()
         if not name.startswith(_OFF_SITE):
@@ -72,7 +72,7 @@ def page_of(name: str) -> str:
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    """Return the documents' pictures, tables and schemas, by path in the site."""
+    """Return the documents' pictures, tables and schemas, by path on the site."""
     found = {}
     for file in sorted(folder.rglob("*")):
         name = file.relative_to(folder).as_posix()
@@ -97,9 +97,9 @@ def notebooks(folder: Path) -> dict[str, bytes]:
 
 
 def notebook(text: str, pictures: Mapping[str, bytes]) -> bytes:
-    """Return a document as a notebook, JSON in format 4.5.
+    """Return a document as a notebook (JSON, format 4.5), with links to documents as plain text.
 
-    `pictures` maps file names to contents. Links to other documents become text.
+    `pictures` maps file names to contents.
     """
     cells: list[dict[str, Any]] = []
 
@@ -136,7 +136,7 @@ def _display(form: str, content: bytes) -> dict[str, Any]:
 
 
 def _link(folder: Path, name: str, target: str) -> str | None:
-    """Return a document's link as in the site; None if the site lacks the target."""
+    """Return a document's link as on the site, or None if the site lacks the target."""
     path, hash_, anchor = target.partition("#")
     if "://" in target or not path:
         return target

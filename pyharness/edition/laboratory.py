@@ -1,7 +1,4 @@
-"""The data of the page that runs the programs in the browser.
-
-Readers without JavaScript see one run.
-"""
+"""The data of the page that runs the programs in the browser; without JavaScript, it shows a run."""
 
 import re
 from typing import Any
@@ -23,9 +20,9 @@ from pyharness.thesis.programs import run_program
 from pyharness.truth.reference import reference
 
 DEFAULTS: dict[str, Any] = {"case": 2, "program": "runge-kutta", "listing": "original"}
-"""The run that the page shows if its address specifies none."""
+"""Run that the page shows if its address specifies none."""
 MOST_STEPS = 3000
-"""The largest number of steps of a run that the page draws without noticeable delay."""
+"""Largest number of steps that the page draws without noticeable delay."""
 _KINDS = {
     "defect": "Faults left in",
     "reading": "Other readings of doubtful cards",
@@ -37,8 +34,7 @@ _SHOWN = 3
 def context() -> dict[str, Any]:
     """Return the values for the page's template.
 
-    `switches` has defects, readings and conjectures under headings; `first` is the run with
-    `DEFAULTS`.
+    `switches` has defects, readings and conjectures by heading; `first` is the run with `DEFAULTS`.
     """
     titles, flags = {n: case_scene(n).name for n in case_numbers()}, data()["flags"]
     by_kind = {kind: [flag for flag in flags if flag["kind"] == kind] for kind in _KINDS}
@@ -82,11 +78,11 @@ def _printed_parts(program: str) -> dict[str, Any]:
 
 
 def _deck_data() -> dict[str, Any]:
-    """Return the cards that are executed in a step, and their alterations by corrections."""
+    """Return the cards that are executed in a step, and alterations by corrections."""
     order = facts("cards/passes")
     found: dict[str, Any] = {}
     for program in PROGRAMS:
-        # A pass is a part of a step that is executed once, with constant subscripts.
+        # A pass is a part of a step that is executed once with constant subscripts.
         passes = []
         for each in order[program]["pass"]:
             first, last = map(int, each["cards"].split("-"))
@@ -130,7 +126,7 @@ def _first() -> dict[str, Any]:
     assert run.velocity is not None
     values = np.column_stack([run.time, run.omega, run.velocity, run.recorded_time]).tolist()
     numbers = [*range(_SHOWN), *range(run.steps - _SHOWN, run.steps)]
-    # The Runge-Kutta program has no IER.
+    # The empty text is for IER, which the Runge-Kutta program lacks.
     rows = [[str(n + 1), *map(repr, values[n]), "", short(float(error[n]))] for n in numbers]
     fragment = "&".join(f"{word}={value}" for word, value in DEFAULTS.items())
     found = {"state": DEFAULTS, "fragment": fragment, "command": f"pyharness run {options}"}

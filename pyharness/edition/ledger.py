@@ -1,4 +1,4 @@
-"""The data of the pages on claims, thesis, figures and apparatus (list of defects).
+"""The data of the pages on claims, thesis, figures and apparatus.
 
 A claim is a tested statement of the thesis; a judgement has our verdicts on it, for original and
 corrected programs. `judged` has the judgements of all claims, `told` all sentences with judgements,
@@ -51,7 +51,7 @@ class Formula(NamedTuple):
 
 
 def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
-    """Return by verdict the counts of claims on results, for original and corrected programs."""
+    """Return the numbers of claims on results, for original and corrected programs, by verdict."""
     results = [each for each in judged if each.claim["kind"] == "result"]
     pairs = [(each.original.verdict, each.corrected.verdict) for each in results]
     original, corrected = map(Counter, zip(*pairs, strict=True))
@@ -60,7 +60,7 @@ def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
 
 
 def verdicts(judgement: Judgement) -> list[tuple[str, str]]:
-    """Return one or two pairs: the programs, as printed or corrected, and their verdict."""
+    """Return pairs of the programs ("as printed", "corrected" or "") and their verdict."""
     original, corrected = judgement.original.verdict, judgement.corrected.verdict
     if judgement.claim["kind"] == "result":
         return [("as printed", original), ("corrected", corrected)]
@@ -68,7 +68,7 @@ def verdicts(judgement: Judgement) -> list[tuple[str, str]]:
 
 
 def assumption(case: int, programs: Iterable[str] = (), listing: str = "original") -> str:
-    """Return a text on our assumptions in a case and in runs of `programs`, or ""."""
+    """Return a text on our assumptions in a case and runs of `programs`, or "" without any."""
     found = ["its initial omega"] if case in open_starts() else []
     start = " and ".join([*found, *(["its cards"] if case_scene(case).torque.varies else [])])
     among = assumed(case_scene(case), map(SETS[listing], programs))
@@ -77,7 +77,7 @@ def assumption(case: int, programs: Iterable[str] = (), listing: str = "original
 
 
 def counted(judged: Sequence[Judgement]) -> str:
-    """Return a sentence with the counts of verdicts."""
+    """Return a sentence with the numbers of verdicts."""
     results = counts(judged)
     others = [verdicts(each)[0][1] for each in judged if each.claim["kind"] != "result"]
     number = Counter(others)
@@ -91,14 +91,14 @@ def counted(judged: Sequence[Judgement]) -> str:
 
 
 def account() -> dict[str, Markup]:
-    """Return HTML by id: the statements of `data/account.toml`, and the effect of each defect."""
+    """Return HTML of the statements of `data/account.toml` and of each defect's effect, by id."""
     texts = {each["id"]: each["text"] for each in facts("account")["statement"]}
     texts |= {each["id"]: each["part"] for each in entries() if "part" in each}
     return {name: inline(text) for name, text in texts.items()}
 
 
 def claims_context(judged: Sequence[Judgement], told: Sequence[SentenceVerdicts]) -> dict[str, Any]:
-    """Return the data of the claims page.
+    """Return the claims page's data.
 
     `groups` has, by kind, each claim with its verdicts, story and sentences.
     """
@@ -155,7 +155,7 @@ def formulas() -> dict[str, list[Formula]]:
 
 
 def draw_figures(figures: Mapping[str, FigureFinding]) -> dict[str, bytes]:
-    """Return the files of the figures, and of a picture of Figure 7 in both versions."""
+    """Return the files of the figures, and of a picture of both versions of Figure 7."""
     together = together_picture(figures["figure-07"], figures["figure-07-corrected"])
     files = saved(together, "figure-07-together.svg", "preview.png")
     for stem, each in figures.items():
@@ -168,7 +168,7 @@ def printed_figures(
 ) -> list[dict[str, Any]]:
     """Return the thesis's figures in order, with our drawings (`drawn`) or our text (`ours`).
 
-    `says` has the thesis's sentences and their anchors.
+    `says` has the thesis's sentences with their anchors.
     """
     found = []
     for each in facts("figures")["printed"]:
@@ -184,7 +184,7 @@ def printed_figures(
 
 
 def apparatus() -> dict[str, list[tuple[dict[str, Any], Markup]]]:
-    """Return each apparatus entry and its report as HTML, by the programs of its cards."""
+    """Return each apparatus entry with its report as HTML, by the programs of its cards."""
     found: dict[str, list[tuple[dict[str, Any], Markup]]] = {name: [] for name in PROGRAMS}
     found |= {"several programs": [], "no card": []}
     for entry in entries():

@@ -1,6 +1,6 @@
 """Conversion of the project's Markdown to HTML.
 
-Headings get GitHub's anchors, formulas become MathML, and links between documents become links
+Headings get anchors as on GitHub, formulas become MathML, and links between documents become links
 between pages.
 """
 
@@ -18,7 +18,7 @@ from mdit_py_plugins.dollarmath import dollarmath_plugin
 
 
 class Part(NamedTuple):
-    """The text under a heading, for the search."""
+    """Text under a heading, for the search."""
 
     anchor: str
     title: str
@@ -26,7 +26,7 @@ class Part(NamedTuple):
 
 
 class Document(NamedTuple):
-    """A rendered document: title, HTML without the title, and text by heading."""
+    """A rendered document: title, HTML without title, and text by heading."""
 
     title: str
     html: Markup
@@ -34,7 +34,7 @@ class Document(NamedTuple):
 
 
 def document(text: str, link: Callable[[str], str | None]) -> Document:
-    """Return a Markdown text, which begins with its title, as a Document.
+    """Return the rendered Markdown `text`, which begins with its title.
 
     `link` returns a target's address on the site, or None.
     """
@@ -73,7 +73,7 @@ def _parser() -> MarkdownIt:
     parser.use(dollarmath_plugin, allow_digits=False, allow_space=False, renderer=write)
     renderer: Any = parser.renderer
     rules = renderer.rules
-    # Elements wider than the page scroll separately; the keyboard can scroll them too.
+    # Elements wider than the page scroll separately, also by keyboard.
     opening = '<div class="wide" role="group" tabindex="0" aria-label="table"><table>\n'
     rules["table_open"] = lambda *_: opening
     rules["table_close"] = lambda *_: "</table></div>\n"

@@ -20,11 +20,11 @@ _PART = re.compile(
     r"(?P<operator>\.[A-Z]+\.|\*\*|[-+*/=]|\.(?!\d))|(?P<name>[A-Z][A-Z0-9]*)"
     r"|(?P<number>\d+\.?\d*|\.\d+)|(?P<punctuation>\S)"
 )
-# Two cards are aligned only if at least this fraction of their parts is equal.
+# Least fraction of equal parts of two aligned cards.
 _ALIKE = 0.5
 _LABEL = "statement number"
 KINDS = (_LABEL, "name", "number", "operator", "punctuation")
-"""The kinds of differences between two statements, in the order of display."""
+"""Kinds of differences between two statements, in the order of display."""
 
 
 class _Part(NamedTuple):
@@ -34,7 +34,7 @@ class _Part(NamedTuple):
 
 
 class Cell(NamedTuple):
-    """A card in an aligned row, in pieces whose `entry` is their kind of difference, if any."""
+    """A card in an aligned row, in pieces whose `entry` is the kind of difference, if any."""
 
     card: Card
     runs: list[Run]
@@ -55,7 +55,7 @@ def operations() -> list[Operation]:
 
 
 def thesis_on(disagreement: Disagreement) -> str:
-    """Return a text that names a disagreement's equations and place in the thesis."""
+    """Return a text on a disagreement's equations and place in the thesis."""
     given = ", ".join(disagreement.equations)
     noun = "equations" if "," in given or "-" in given else "equation"
     return "; ".join(filter(None, (given and f"{noun} {given}", disagreement.where)))
@@ -70,8 +70,8 @@ def _aligned(ranges: dict[str, str]) -> list[AlignedRow]:
 
 
 def _merged(rows: Sequence[dict[str, Card]], cards: Sequence[Card]) -> list[dict[str, Card]]:
-    """Return rows joined with a deck's most similar cards, in order; others become new rows."""
-    # best[i][j] is the largest sum for the rows from i on and the cards from j on.
+    """Return rows joined with a deck's most similar cards, in order; other cards are new rows."""
+    # best[i][j] is the largest sum of likenesses for rows from i on and cards from j on.
     best = [[0.0] * (len(cards) + 1) for _ in range(len(rows) + 1)]
     pairs = [[max(_likeness(x, card) for x in row.values()) for card in cards] for row in rows]
     for i in reversed(range(len(rows))):

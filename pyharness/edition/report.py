@@ -1,6 +1,6 @@
-"""The reports of `edition`, and the check of its libraries.
+"""The reports of the command `edition`, and the check of its libraries.
 
-`content` maps paths of written files to their contents.
+`content` has the written files' contents by path.
 """
 
 import shlex
@@ -18,7 +18,7 @@ LIBRARIES = (
     "docstring_parser", "jinja2", "latex2mathml", "markdown_it", "markupsafe", "matplotlib",
     "mdit_py_plugins",
 )  # fmt: skip
-# The file that marks a folder as written by `edition`, and lists the files of the site.
+# File that marks a folder as written by `edition`, and lists the site's files.
 MARK = "edition.json"
 _KINDS = (*words("files"), Column("number"), Column("kB", digits(".0f", 1e-3)))
 

@@ -59,20 +59,20 @@ class Found(NamedTuple):
 
 
 class Page(NamedTuple):
-    """A page before rendering, and the places that the search finds."""
+    """A page before rendering, with the places that the search finds."""
 
     path: str
     title: str
     template: str
     context: Mapping[str, Any] = {}
     found: Sequence[Found] = ()
-    menu: str = ""  # path of the menu entry to highlight, by default the page's own
+    menu: str = ""  # path of the highlighted menu entry, by default the page's
 
 
 def build_site(progress: Progress = no_progress, docs: Path | None = None) -> dict[str, bytes]:
-    """Return all files of the site, content by path.
+    """Return the contents of all files of the site by path.
 
-    `docs` is by default the folder `docs` of the checkout.
+    The default of `docs` is as in `documents_folder`.
     """
     check_publishable()
     docs = docs or documents.documents_folder()
@@ -198,7 +198,7 @@ def _sections(path: str, html: str) -> Iterator[Found]:
 def _rendered(page: Page) -> bytes:
     here = page.menu or page.path
     section = next(name for name, of in MENU.items() if here in of.values())
-    # Links are relative, so that the site works under any path.
+    # Relative links, so that the site works under any path.
     root = "../" * page.path.count("/")
     html = _templates().get_template(page.template).render(
         {"page": page, "root": root, "menu": MENU, "here": here, "section": section,
@@ -230,13 +230,13 @@ def _assets(places: Sequence[Found]) -> dict[str, bytes]:
 
 
 def script(name: str, value: Any) -> bytes:
-    """Return JavaScript that sets `name` to `value`; pages opened from files can't load JSON."""
+    """Return JavaScript that sets `name` to `value`; pages opened from files cannot load JSON."""
     text = json.dumps(value, ensure_ascii=False, separators=(",", ":"))
     return f"window.{name}={text};\n".encode()
 
 
 def vendor() -> list[dict[str, Any]]:
-    """Return the entries of `vendor.toml`, the list of third-party JavaScript."""
+    """Return the entries of `vendor.toml`, a list of third-party JavaScript."""
     text = (shipped("web") / "vendor" / "vendor.toml").read_text(encoding="utf-8")
     return list(tomllib.loads(text)["package"])
 

@@ -28,12 +28,12 @@ from pyharness.thesis.programs import run_program
 LETTERS = {"A": "two-term", "B": "runge-kutta", "C": "four-term"}
 BLIND_CASES = (1, 2, 5)
 RACE_CASES = (2, 3, 4, 5, 6, 7)
-# Plot area in the chart's units: left, top, right, bottom.
+# Plot area of a chart, in its units: left, top, right, bottom.
 BOX = (40, 10, 350, 196)
-# The step shown at first, in which the two-term program overflows.
+# The step shown first, in which the two-term program overflows.
 POINTS_STEP = 57
 STEP_SIZES = (0.01, 0.005, 0.0025, 0.00125)  # s
-_LOG_STEP = 2  # powers of ten between labels
+_LOG_STEP = 2  # number of powers of ten between labels
 Range = tuple[float, float]
 Names = tuple[str, ...]
 
@@ -57,7 +57,7 @@ class Chart(NamedTuple):
     curves: list[Curve]
     is_logarithmic: bool = False
     is_marked: bool = False  # whether curves are points without lines
-    marks: Sequence[Curve] = ()  # distinguish coincident curves
+    marks: Sequence[Curve] = ()  # points that distinguish coincident curves
 
 
 def data() -> dict[str, Any]:
@@ -130,7 +130,7 @@ def context() -> dict[str, Any]:
 def _run(
     case: int, program: str, listing: str = "original", without: Names = (), may_stop: bool = True
 ) -> Trajectory:
-    """Return a run in Python: corrected, or original without the defects in `without`."""
+    """Return a run in Python, corrected or original, the latter without the defects `without`."""
     active = set(switches(program)) - set(without) if listing == "original" else set()
     return run_program(case_scene(case), Listing(program, active), "python", may_stop=may_stop)
 
@@ -241,7 +241,7 @@ def _up(chart: Chart, y: float) -> float:
     _, top, _, bottom = BOX
     value = math.log10(y) if chart.is_logarithmic else y
     share = (value - chart.y[0]) / (chart.y[1] - chart.y[0])
-    # Kept near the plot area.
+    # Keep the point near the plot area.
     return bottom - min(max(share, -1.0), 2.0) * (bottom - top)
 
 

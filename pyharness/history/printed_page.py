@@ -100,7 +100,7 @@ def compare_rows(
 
 
 def stored_fits(lines: Sequence[Sequence[str]], folder: Path) -> list[Fit]:
-    """Return comparisons with the pages in `folder` of the same heading and width, nearest first."""
+    """Return comparisons with pages in `folder` of the same heading and width, nearest first."""
     found = []
     with open(folder / PAGES, newline="", encoding="ascii") as file:
         for each in csv.DictReader(file):

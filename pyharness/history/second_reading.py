@@ -33,12 +33,12 @@ class ReadCard(NamedTuple):
 
 
 def chapman(first: int, second: int, both: int) -> float:
-    """Return Chapman's estimate of a population from two samples' sizes and their common members."""
+    """Return Chapman's estimate of a population from two samples' sizes and common members."""
     return (first + 1) * (second + 1) / (both + 1) - 1
 
 
 def recapture_interval(first: int, second: int, both: int) -> tuple[int, int]:
-    """Return the 95 % confidence interval of a population's size, from arguments as in `chapman`."""
+    """Return a population's 95 % confidence interval, from arguments as in `chapman`."""
     if both < 1:
         raise ValueError("both must be positive")
     # For sizes in the interval, the hypergeometric probabilities of at most and of at least `both`

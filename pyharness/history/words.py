@@ -82,7 +82,7 @@ class WordCell:
         return next((run for run in self.runs if (run.p, run.rule) == (p, rule)), None)
 
     def settled(self, rule: str, same: Sequence[WordRun]) -> int | None:
-        """Return the least p from which on all runs with the rounding `rule` are in `same`, or None."""
+        """Return the least p from which on all runs with this rounding are in `same`, or None."""
         of_rule = sorted((r for r in self.runs if r.rule == rule), key=lambda run: -run.p)
         return min((run.p for run in takewhile(same.__contains__, of_rule)), default=None)
 

@@ -118,7 +118,7 @@ def undeclared() -> list[str]:
 
 
 class Row(NamedTuple):
-    """A comparison of the decks and the thesis in one operation (`what`) of the programs."""
+    """A comparison of the decks and the thesis in an operation (`what`) of the programs."""
 
     what: str
     cards: dict[str, str]  # numbers by program, as in 750-770, 800

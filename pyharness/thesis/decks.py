@@ -22,11 +22,11 @@ from pyharness.thesis.cards import deck, numbers
 from pyharness.thesis.equations import card_torque
 from pyharness.thesis.printer import TAPE5
 
-# As printed; adapted to a modern compiler; for CDC's FTN. The last two add the torque of Case 7.
+# As printed, for GNU Fortran, and for CDC's FTN. The last two add the torque of Case 7.
 DIALECTS = ("1982", "gfortran", "ftn")
 SYSTEMS = ("nos", "nosbe")
-# Numbers of terms of two more collocation programs, which the thesis uses for Case 6 (V.2), but does
-# not print.
+# Numbers of terms of two more collocation programs, which the thesis uses for Case 6 (V.2), but
+# does not print.
 MODELS = (3, 5)
 COMPILER = "gfortran"
 # Options for REAL in binary64, variables that are 0 until set, and no fused operations.

@@ -28,9 +28,9 @@ ALIKE = dict.fromkeys(_OPERATIONS, 1)
 
 
 class Count(NamedTuple):
-    """The number, or total time, of arithmetic operations in a step."""
+    """The number of arithmetic operations in a step, or their time in the unit of `times`."""
 
-    written: int  # every operation on the cards
+    written: int  # all operations on the cards
     once: int  # repeated operations count once
 
 
@@ -83,7 +83,7 @@ class _Array(defaultdict[tuple[int, ...], Any]):
 
 
 def operations_per_step(listing: Listing, times: Mapping[str, int] = ALIKE) -> Count:
-    """Return the count for a listing's first step; `times` has the time of each operation."""
+    """Return the count for a listing's first step; `times` has each operation's time."""
     statements = statements_of(deck_text(listing).splitlines())
     begin = next(n for n, (_, text) in enumerate(statements) if _DO.match(text))
     label = _DO.match(statements[begin][1])

@@ -20,7 +20,7 @@ WORD_NAMES = (*COMPILED_WORDS, "cdc48", "cdc48-rounded")
 
 @dataclass(frozen=True)
 class Program:
-    """One of the three programs of the appendix."""
+    """A program of the appendix."""
 
     name: str
     order: int  # order of convergence of the corrected version

@@ -24,13 +24,13 @@ from pyharness.thesis.equations import (
 def run(
     scene: Scene, listing: Listing, lipschitz: float = 500.0, may_stop: bool = True
 ) -> Trajectory:
-    """Run the program on a scene; `lipschitz` (1/s) is the constant of its stop test."""
+    """Run the program on a scene; `lipschitz` is the constant of its stop test (1/s)."""
     a, b, c = scene.euler_coefficients
     acceleration = accelerations(scene, listing)
     dt = scene.step_size
     time = 0.0
     base = [*scene.omega, 0.0, 0.0, 0.0]
-    # The indices are those of the program.
+    # The indices are the program's.
     zero = [0.0] * 6
     point = {1: base, 2: zero, 3: zero, 4: zero}
     slope = {1: zero, 2: zero, 3: zero, 4: zero}
@@ -103,7 +103,7 @@ def lipschitz_test(
 ) -> tuple[str, float] | None:
     """Return a variable that violates eq. 19, and its quotient (1/s), or None.
 
-    `change_k` belongs to right-hand sides, `change_u` to unknowns.
+    `change_k` has the changes of right-hand sides, `change_u` those of unknowns.
     """
     velocity_counts = listing.has("lipschitz-tests-velocity")
     last = 6 if velocity_counts else 3

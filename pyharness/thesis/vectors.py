@@ -5,7 +5,7 @@ negative number are complemented. The exponent is the field minus 2000 (octal), 
 field is below 2000.
 
 The test vectors in `data/words/cdc.json` follow from the CYBER 170 hardware reference, CDC
-60463560; a public emulator agrees.
+60463560; a public emulator confirms them.
 """
 
 import json
@@ -44,7 +44,7 @@ class Vector(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """A test vector, and `found`, the result of our arithmetic (octal)."""
+    """A test vector, and the result `found` by our arithmetic, in octal."""
 
     vector: Vector
     found: str
@@ -88,7 +88,7 @@ def _answer(where: str, entry: Any) -> Answer:
 def from_octal(text: str) -> Pair:
     """Return (m, e) of the number m 2**e in a CDC word of 20 octal digits.
 
-    The coefficient must be normalised.
+    The coefficient must be normalised; m is 0 and e a float for zero, infinity and nan.
     """
     digits = "".join(text.split()) if isinstance(text, str) else ""
     if not _WORD.fullmatch(digits):
@@ -111,7 +111,7 @@ def from_octal(text: str) -> Pair:
 
 
 def to_octal(number: Pair) -> str:
-    """Return the CDC word of a pair (m, e) as in `from_octal`, in groups of four octal digits."""
+    """Return the CDC word, in groups of four octal digits, of (m, e) as in `from_octal`."""
     m, e = number
     if m:
         return _written(m < 0, e, abs(m))

@@ -18,12 +18,12 @@ from pyharness.model.errors import InputError, unknown
 
 # To nearest, ties to even; towards zero; the CDC's, truncating and rounding.
 RULES = ("nearest-even", "chop", "FX", "RX")
-# Additional bits of a sine or cosine before rounding.
+# Number of additional bits of a sine or cosine before rounding.
 _GUARD_BITS = 40
 Pair = tuple[int, Any]
 Rounding = Callable[[int, int], Pair]
 Operation = Callable[[int, int, int, int], Pair]
-# Exponents of an integer coefficient, for the octal exponent fields 0000 and 3776 of a CDC word.
+# Exponents of an integer coefficient for the exponent fields 0000 and 3776 (octal) of a CDC word.
 _LEAST, _MOST = -1023, 1022
 
 
@@ -35,12 +35,12 @@ class Rules(NamedTuple):
     add: Operation
     multiply: Operation
     divide: Operation
-    difference: Operation  # only for tests of equality
+    difference: Operation  # a sum, only for tests of equality
     signed_zero: bool
 
 
 def rounding(p: int, least: int, most: int, cut: bool, gradual: bool) -> Rounding:
-    """Return a function that rounds m 2**e to a p-bit integer times 2**k, k `least` to `most`."""
+    """Return a function that rounds m 2**e to a p-bit integer times 2**k, k = `least` to `most`."""
     shortened = _cut if cut else _to_even
 
     def rounded(m: int, e: int) -> Pair:
@@ -62,7 +62,7 @@ def rounding(p: int, least: int, most: int, cut: bool, gradual: bool) -> Roundin
     def small(m: int, e: int) -> Pair:
         if not gradual:
             return 0, 0.0
-        # A multiple of 2**least, as the subnormal numbers of IEEE 754.
+        # A multiple of 2**least, like the subnormal numbers of IEEE 754.
         short = shortened(m, least - e) if e < least else m << (e - least)
         return (short, least) if short else (0, math.copysign(0.0, m))
 
@@ -82,7 +82,7 @@ def ieee(p: int, largest: int, cut: bool) -> Rules:
 
     If `cut`, operations truncate towards zero.
     """
-    # Too large truncated results are infinite, though IEEE 754 requires the largest number.
+    # Truncated results that are too large are infinite; IEEE 754 requires the largest number.
     least, most = 2 - largest - p, largest - p + 1
     fit = rounding(p, least, most, cut, gradual=True)
 
@@ -91,7 +91,7 @@ def ieee(p: int, largest: int, cut: bool) -> Rules:
             xm, xe, ym, ye = ym, ye, xm, xe
         apart = xe - ye
         if apart > p + 2:
-            # All y below an eighth of the last unit of x, with the same sign, have the same effect.
+            # All y of one sign below an eighth of the last unit of x have the same effect.
             return fit((xm << 3) + (1 if ym > 0 else -1), xe - 3)
         return fit((xm << apart) + ym, ye)
 
@@ -111,7 +111,7 @@ def ieee(p: int, largest: int, cut: bool) -> Rules:
 def cdc(p: int, rounds: bool) -> Rules:
     """Return the arithmetic of CDC 6600 and CYBER 70 for p-bit coefficients.
 
-    `rounds` selects rounding instructions (RX), not truncating ones (FX).
+    `rounds` selects rounding instructions (RX) instead of truncating ones (FX).
     """
     # By the CYBER 170 hardware reference, CDC 60463560. In the order +, -, *, /, the instructions
     # FX are octal 30, 31, 40 and 44, RX 34, 35, 41 and 45; NX, octal 24, normalises a sum.
@@ -129,17 +129,17 @@ def cdc(p: int, rounds: bool) -> Rules:
 
     def add(rounds: bool, xm: int, xe: int, ym: int, ye: int) -> Pair:
         frame, e = framed(p, rounds, xm, xe, ym, ye)
-        # There is no guard bit: bits below the unit of the larger operand are truncated.
+        # Without a guard bit, bits below the last unit of the larger operand are truncated.
         return settled(_cut(frame, p), e)
 
-    # For literals, an assumption: no source states the rule of CDC's FTN.
+    # Rounding of literals is an assumption, because no source states the rule of CDC's FTN.
     nearest = rounding(p, _LEAST, _MOST, cut=False, gradual=False)
     total, plain = partial(add, rounds), partial(add, False)
     return Rules(nearest, settled, total, multiply, divide, plain, signed_zero=False)
 
 
 def framed(p: int, rounds: bool, xm: int, xe: int, ym: int, ye: int) -> tuple[int, int]:
-    """Return (frame, e) of a CDC sum before normalisation, as frame 2**(e - p).
+    """Return (frame, e) of a CDC sum frame 2**(e - p) before normalisation.
 
     The frame has 2 p bits.
     """
@@ -163,7 +163,7 @@ def _quotient(x: float, y: float) -> float:
 def _operator(
     rule: str, of_floats: Callable[[float, float], float], negates: bool = False
 ) -> Callable[["Number", Any], "Number"]:
-    """Return the operator of `rule`, a field of Rules; `negates` negates its operand."""
+    """Return the operator of `rule`, a field of Rules; `negates` negates the second operand."""
 
     def operate(self: "Number", other: Any) -> "Number":
         own = self.__class__
@@ -182,7 +182,7 @@ def _comparison(compare: Callable[[float, float], bool]) -> Callable[["Number", 
 
 
 class Number:
-    """A number of a floating-point format, the integer `m` times 2**`e`.
+    """A number of a floating-point format: the integer `m` times 2**`e`.
 
     If `m` is 0, `e` is the value as a float.
     """
@@ -217,7 +217,7 @@ class Number:
     def __eq__(self, other: object) -> bool:
         """Return whether the difference, computed in this format, is zero.
 
-        It may be zero for two neighbouring CDC numbers.
+        The difference of two neighbouring CDC numbers may be zero.
         """
         x, y = self, self.word(other)
         if x.m and y.m:
@@ -251,7 +251,7 @@ class Number:
         return Fraction(self.m) * Fraction(2) ** self.e if self.m else Fraction(self.e)
 
     def sqrt(self) -> "Number":
-        """Return the square root, rounded to nearest; nan for a negative number."""
+        """Return the square root, rounded to nearest, or nan for a negative number."""
         if self.m <= 0:
             return self._without_sign_of_zero(
                 self.e if not self.m and not self.e < 0.0 else math.nan
@@ -282,8 +282,7 @@ class Number:
 
     def _special(self, operation: Callable[[float, float], float], other: "Number") -> "Number":
         """Return the result of an operation with an operand that is zero, infinite or nan."""
-        # If the shadows give a finite result other than 0, one operand is 0, and the other is the
-        # result.
+        # If the shadows' result is finite and not 0, one operand is 0, and the other is the result.
         found = operation(self._shadow, other._shadow)
         if found and math.isfinite(found):
             return self if self.m else other
@@ -294,13 +293,13 @@ class Number:
 
     @property
     def _shadow(self) -> float:
-        """Return a zero, infinity or nan as a float, other numbers as their sign."""
+        """This number as a float if it is zero, infinite or nan, else its sign."""
         if self.m:
             return 1.0 if self.m > 0 else -1.0
         return float(self.e)
 
     def _order(self, other: Any) -> float:
-        """Return a number with the exact sign of self - other; nan if an operand is nan."""
+        """Return a number with the exact sign of self - other, or nan if an operand is nan."""
         x, y = self, self.word(other)
         if not (x.m and y.m):
             return 0.0 if x._shadow == y._shadow else x._shadow - y._shadow
@@ -311,7 +310,7 @@ class Number:
 class Word:
     """A floating-point format of p bits with a rounding rule.
 
-    IEEE formats have numbers below 2**(largest + 1); `cut_literals` truncates converted values.
+    Numbers of IEEE formats are below 2**(largest + 1); `cut_literals` truncates converted values.
     """
 
     def __init__(
@@ -329,7 +328,7 @@ class Word:
         if rule in ("FX", "RX"):
             rules = cdc(p, rounds=rule == "RX")
         else:
-            # By default the largest exponent of binary64 or binary128.
+            # The default is the largest exponent of binary64 or binary128.
             exponent = largest or (1023 if p <= 53 else 16383)
             rules = ieee(p, exponent, cut=rule == "chop")
         self.rules = rules

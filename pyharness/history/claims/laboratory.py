@@ -62,7 +62,7 @@ class Laboratory:
     def run_on(
         self, scene: Scene, listing: Listing, may_stop: bool = True, lipschitz: float = 500.0
     ) -> Trajectory:
-        """Return a listing's run in the assumed arithmetic; `lipschitz` is the stop test's (1/s)."""
+        """Return a listing's run in the assumed arithmetic, with a stop constant (1/s)."""
         return _run(listing, scene, may_stop, lipschitz, self.assumptions.word)
 
     def truth(self, case: int) -> Reference:

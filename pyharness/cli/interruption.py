@@ -19,8 +19,8 @@ from typing import Any
 from pyharness.cli import end_progress, say
 
 _AGAIN = 0.25  # time (s) after which a dropped interrupt is raised again
-_MOST = 3  # the interrupt with this number ends the process at once
-_PATIENCE = 2.0  # longest time (s) of the cleanup at the end of an interrupted process
+_MOST = 3  # number of interrupts after which the process ends at once
+_PATIENCE = 2.0  # longest time (s) of an interrupted process's cleanup
 CODE = 130
 LINE = "pyharness: interrupted\n"
 
@@ -31,7 +31,7 @@ class _Interruption:
         self.is_reported = False
 
     def leave_at_once(self, *_: object) -> None:
-        """Print "pyharness: interrupted", if not yet done; end the process without cleanup."""
+        """End the process without cleanup, and print LINE if not yet done."""
         try:
             if not self.is_reported:
                 os.write(2, LINE.encode())
@@ -39,17 +39,17 @@ class _Interruption:
             os._exit(CODE)
 
     def interrupt(self, number: int, frame: FrameType | None) -> None:
-        """Raise KeyboardInterrupt; at the third interrupt, end the process at once."""
+        """Raise KeyboardInterrupt or, at the third interrupt, end the process at once."""
         self.count += 1
         if self.count >= _MOST:
             self.leave_at_once()
-        # The timer raises it again until the interrupt is reported.
+        # The timer repeats the exception until the interrupt is reported.
         signal.signal(signal.SIGALRM, self._again)
         signal.setitimer(signal.ITIMER_REAL, _AGAIN, _AGAIN)
         raise KeyboardInterrupt
 
     def _again(self, *_: object) -> None:
-        # Code with its own handler of SIGINT is not interrupted.
+        # Do not interrupt code with its own handler of SIGINT.
         is_ours = signal.getsignal(signal.SIGINT) == self.interrupt
         if is_ours and not self.is_reported and not _is_pending():
             raise KeyboardInterrupt
@@ -69,7 +69,7 @@ def leave_when_interrupted() -> bool:
 
     Call this only while nothing needs cleanup.
     """
-    # A shell starts background processes with SIGINT ignored, which must remain so.
+    # Shells start background processes with SIGINT ignored, which must remain so.
     if not callable(signal.getsignal(signal.SIGINT)):
         return False
     signal.signal(signal.SIGINT, _STATE.leave_at_once)
@@ -77,7 +77,7 @@ def leave_when_interrupted() -> bool:
 
 
 def run_interruptible(main: Callable[[], int]) -> int:
-    """Run a command; return its exit status, 130 if interrupted."""
+    """Run a command; return its exit status, or 130 if interrupted."""
     hook, escaped, code = sys.unraisablehook, False, CODE
     try:
         sys.unraisablehook = partial(_report_unraisable, hook)
@@ -86,7 +86,7 @@ def run_interruptible(main: Callable[[], int]) -> int:
             signal.signal(signal.SIGINT, _STATE.interrupt)
         code = main()
     except BaseException as error:
-        # After an interrupt, any exception counts as its consequence.
+        # Any exception after an interrupt counts as a consequence.
         if not came() and not isinstance(error, KeyboardInterrupt):
             raise
         escaped = True
@@ -99,7 +99,7 @@ def run_interruptible(main: Callable[[], int]) -> int:
 
 
 def report() -> int:
-    """Print "pyharness: interrupted", at most once; return 130."""
+    """Print LINE, at most once, and return 130."""
     if not _STATE.is_reported:
         _STATE.is_reported = came()
         end_progress()
@@ -110,10 +110,10 @@ def report() -> int:
 def leave(code: int) -> None:
     """Remove temporary files and end the process with exit status `code`.
 
-    If `code` is 130, child processes are killed.
+    If `code` is 130, kill child processes.
     """
     if code == CODE:
-        # Messages of ending threads and finalizers would follow the report of the interrupt.
+        # Suppress messages of ending threads and finalizers.
         with contextlib.suppress(OSError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
         if "multiprocessing" in sys.modules:
@@ -129,7 +129,7 @@ def leave(code: int) -> None:
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(Exception):
             stream.flush()
-    # Python's own exit would wait for threads; Ctrl-C might be ignored or kill the process.
+    # Python's own exit would wait for threads, and Ctrl-C might be ignored or kill the process.
     os._exit(code)
 
 
@@ -143,7 +143,7 @@ def _is_pending() -> bool:
 
 
 def _show_warning(*arguments: Any, **more: Any) -> None:
-    # After an interrupt, warnings come from other threads and unfinished work.
+    # Suppress warnings from other threads and unfinished work after an interrupt.
     if not came():
         _SHOW_WARNING(*arguments, **more)
 

@@ -1,4 +1,4 @@
-"""The fields of a verb's JSON output, from their JSON Schema."""
+"""The fields of a command's JSON output, from their JSON Schema."""
 
 import json
 import textwrap
@@ -9,13 +9,13 @@ from pyharness.model.facts import facts_folder
 
 
 def schema() -> dict[str, Any]:
-    """Return the JSON Schema of all verbs' output; `$defs` has `verb-NAME` for each verb."""
+    """Return the JSON Schema of all commands' output; `$defs` has `verb-NAME` for each command."""
     found: dict[str, Any] = json.loads((facts_folder() / "output.schema.json").read_text())
     return found
 
 
 def fields(whole: dict[str, Any], part: dict[str, Any], path: str) -> Iterator[tuple[str, str]]:
-    """Yield path (beginning with `path`) and meaning of each field in `part` of a schema."""
+    """Yield path (which begins with `path`) and meaning of each field in `part` of a schema."""
     for name, each in part.get("properties", {}).items():
         own = each
         if "description" not in each:

@@ -46,12 +46,12 @@ VERBS = {verb: about for group in _GROUPS.values() for verb, about in group.item
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line, by default this process's; return the exit status.
 
-    Status 1 is for unexpected results, such as failed checks.
+    Status 1 is for unexpected results, as failed checks.
     """
-    # Garbage collection during the imports takes 4 % of a command's time and frees nothing.
+    # Garbage collection during imports takes 4 % of a command's time and frees nothing.
     gc.set_threshold(100_000)
-    # The package's matrices are too small for a second thread, and starting a thread pool takes a
-    # seventh of the time of `compare`. The variable must be set before NumPy is imported.
+    # The package's matrices are too small for a second thread, and the start of a thread pool takes
+    # a seventh of the time of `compare`. Set the variable before NumPy is imported.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if sys.stderr is None:  # closed by the caller, as in 2>&-
         sys.stderr = open(os.devnull, "w")  # noqa: SIM115  (as long as the process)
@@ -117,15 +117,15 @@ def _run(arguments: list[str]) -> int:
 
 
 def _complete() -> int:
-    """Print completions for the shell; return 1 without argcomplete."""
+    """Print completions for the shell; return 1 if argcomplete is missing."""
     from argparse import ArgumentParser
 
     try:
         import argcomplete
-    except ImportError:  # installed for the shell, but not in this environment
+    except ImportError:  # argcomplete is installed for the shell, but not in this environment
         return 1
     line, first = os.environ["COMP_LINE"], int(os.environ["_ARGCOMPLETE"])
-    # A word of the command line is complete only if a blank follows.
+    # An argument is complete only if a blank follows.
     typed = f"{line[: int(os.environ['COMP_POINT'])]}|".split()[:-1]
     verb = typed[first] if len(typed) > first else ""
     parser = ArgumentParser("pyharness", add_help=False)
@@ -152,7 +152,7 @@ def _overview() -> str:
 
 
 def _leave_stdout() -> None:
-    # Otherwise Python would flush the stream at exit and report the error again.
+    # Prevents Python from flushing the stream at exit and reporting the error again.
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 

@@ -26,7 +26,7 @@ from pyharness.model.values import parsed_float, parsed_whole
 FORMATS = ("table", "json", "csv", "markdown")
 # Part of the usage of verbs that require one of two options.
 ONE_SCENE = "(--case N | --scene FILE)"
-# A placeholder after an option's name, as N in "--case N", means that the option takes a value.
+# A placeholder after an option's name, as N in "--case N", stands for the option's value.
 BODY = {
     "--case N": "Case 1 to 7 of the thesis.",
     "--scene FILE": "Scene file (sample: `pyharness scene new`).",
@@ -57,14 +57,14 @@ STRICT = {
 }
 ALSO = {"--also FILE,...": "Write the result also to these files (.md, .json; .xml: JUnit)."}
 _BY_SUFFIX = {".md": "markdown", ".xml": "junit", ".json": "json"}
-# Options and arguments that name a file to read; --check names several.
+# Options and arguments that name a file to read; --check, which names several, is separate.
 _INPUTS = ("scene", "file", "scan", "vectors", "external", "listing_output", "sweep")
 _MORE_OUTPUTS = {"animate": "the animation", "certificate": "the certificate"}
 _WORTH_SAYING = 60.0  # run time (s) above which a forecast is printed
 
 
 class Cost(NamedTuple):
-    """The time and memory of a random draw on a core of 2026, and the largest number of draws."""
+    """The cost of a random draw on a core of 2026, and the largest number of draws."""
 
     what: str  # plural noun for the draws, as in "random scenes"
     seconds: float  # run time (s) of a draw
@@ -79,7 +79,7 @@ SCENES = Cost("random scenes", 8.0, 1e5, 10_000)
 
 
 def outputs(formats: Sequence[str] = FORMATS, plot: str = "the results") -> dict[str, str]:
-    """Return the help texts of --format, --plot and --out, by option.
+    """Return the helps of --format, --plot and --out, by option.
 
     The first format is the default; an empty `plot` omits --plot.
     """
@@ -123,7 +123,7 @@ def check_known(what: str, name: str | None, allowed: Sequence[str]) -> None:
 
 
 def chosen_names(text: str | None, what: str, allowed: Sequence[str]) -> list[str]:
-    """Return the names in --only, beginnings of check ids, as in ``cells/two-term``.
+    """Return the names in --only, which are beginnings of checks' ids, as in ``cells/two-term``.
 
     The part before the slash must be in `allowed`.
     """
@@ -190,7 +190,7 @@ def changes_of(options: argparse.Namespace) -> dict[str, Any]:
     fixed = {*names(options.fix)}
     for name in sorted({*names(options.keep)} - fixed):
         having = [each for each in chosen_programs(options) if name in names_of("defect", each)]
-        # With names to fix, and no --listing, a program is changed from the original.
+        # With names to fix and no --listing, the original program is changed.
         changed = options.listing is None and all(fixed & {*switchable(each)} for each in having)
         if having and (changed or options.listing == "original"):
             chosen = f"--listing {options.listing}" if options.listing else "--fix"
@@ -201,7 +201,7 @@ def changes_of(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def tell_inactive(options: argparse.Namespace, listings: Iterable[Listing]) -> None:
-    """Warn of readings, conjectures and corrections that are requested but have no effect."""
+    """Warn of requested readings, conjectures and corrections that have no effect."""
     asked = {*names(options.reading), *names(options.conjecture)} - {"none"}
     active = {name for listing in listings for name in listing.active}
     for name in sorted(asked - active - set(names(options.fix))):
@@ -227,7 +227,7 @@ def listing_text(listing: Listing) -> str:
 
 
 def chosen_stops(options: argparse.Namespace) -> dict[str, Any]:
-    """Return a run's arguments `lipschitz` (limit of the stop test, 1/s) and `may_stop`."""
+    """Return a run's arguments `lipschitz` (constant of the stop test, 1/s) and `may_stop`."""
     if options.program not in (None, "runge-kutta"):
         refuse(options, f"--program {options.program}", ("lipschitz", "no_stop"))
     if options.no_stop:
@@ -239,7 +239,7 @@ def chosen_stops(options: argparse.Namespace) -> dict[str, Any]:
 def refuse(
     options: argparse.Namespace, chosen: str, names: Iterable[str], allowed: str = ""
 ) -> None:
-    """Raise InputError if an option of `names` is given besides `chosen`.
+    """Raise InputError if an option in `names` is specified together with `chosen`.
 
     Names are as in `options` ("no_stop") or OPTIONS ("--case N").
     """
@@ -294,7 +294,7 @@ def whole_up_to(most: int, text: str | None, option: str, default: int) -> int:
 def chosen_count(text: str | None, option: str, default: int, least: int, cost: Cost) -> int:
     """Return an option's number of draws, from `least` to `cost.most`, or the default.
 
-    Print a forecast of a long run.
+    If the draws take long, print a forecast.
     """
     if text is None:
         return default
@@ -332,7 +332,7 @@ def also_files(options: argparse.Namespace) -> dict[str, str]:
 
 
 def check_outputs(options: argparse.Namespace) -> None:
-    """Raise InputError if an output file can't be written, or is an input or another output."""
+    """Raise InputError if an output file cannot be written, or is an input or another output."""
     also = also_files(options)
     for path in also:
         check_writable(path, "--also")
@@ -362,7 +362,7 @@ def check_outputs(options: argparse.Namespace) -> None:
     inputs = [getattr(options, name, None) for name in _INPUTS]
     for read in [*filter(None, inputs), *names(getattr(options, "check", None))]:
         for path, option, _ in files:
-            # Of devices, such as a terminal, input and output may be the same.
+            # Input and output may be the same device, as a terminal.
             if os.path.isfile(read) and _is_same(path, read):
                 raise InputError(
                     f"{option} '{path}': is the input file '{read}'; give another name"
@@ -386,9 +386,9 @@ def show(
     own: Mapping[str, Callable[[], str | bytes]] | None = None,
     failed: object = False,
 ) -> int:
-    """Write what --format, --plot and --also request; return 1 if `failed`, else 0.
+    """Write the outputs of --format, --plot and --also; return 1 if `failed`, else 0.
 
-    `own` maps formats of this report alone to functions.
+    `own` has functions for formats that only this report has.
     """
     from pyharness.views.render import render
 
@@ -412,7 +412,7 @@ def emit(content: str | bytes, out: str | None) -> None:
         data = content if isinstance(content, bytes) else shown(content).encode()
         write_files({out: data}, "--out")
         return
-    # If the reader of a pipe closed it, as `grep -q` does, the exit status is that of the verb.
+    # If the reader closed the pipe, as `grep -q` does, keep the command's exit status.
     with suppress(BrokenPipeError):
         if isinstance(content, bytes):
             sys.stdout.buffer.write(content)

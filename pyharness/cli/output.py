@@ -18,7 +18,7 @@ _LARGEST_MARK = 1 << 24  # bytes of the file that lists the files written by a v
 
 
 def check_folder(path: str, names: Iterable[str], option: str) -> None:
-    """Raise InputError if files `names` can't be written in folder `path`, which may be new."""
+    """Raise InputError if files `names` cannot be written in folder `path`, which may be new."""
     folder = Path(path)
     if not path or "\0" in path or os.path.lexists(folder):
         if not path or "\0" in path or not folder.is_dir():
@@ -33,10 +33,10 @@ def check_folder(path: str, names: Iterable[str], option: str) -> None:
 
 
 def _why_not_made(folder: Path) -> str:
-    """Return ": " and the reason why a folder can't be made, or "" if it can."""
+    """Return ": " and the reason why a folder cannot be made, or "" if it can."""
     if not folder.parent.is_dir():
         return ": there is no such folder"
-    # Permissions do not show, for example, that a name is too long.
+    # Try it, because permissions do not show, for example, that a name is too long.
     try:
         folder.mkdir()
         folder.rmdir()
@@ -124,7 +124,7 @@ def _beside(folder: Path) -> tuple[Path, Path]:
 
 
 def write_tree(path: str, contents: dict[str, bytes], option: str) -> None:
-    """Replace a folder by one with only the files in `contents`, by path.
+    """Replace a folder by one that has only the files in `contents`, by path.
 
     On failure the old folder remains.
     """

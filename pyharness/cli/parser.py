@@ -1,4 +1,4 @@
-"""The parser of a verb's options, with grouped help and errors in one line."""
+"""The parser of a command's options, with grouped help and errors in one line."""
 
 import argparse
 import re
@@ -47,7 +47,7 @@ class _Once(argparse.Action):
 
 
 class Parser(argparse.ArgumentParser):
-    """The parser of one verb's options, whose errors suggest the nearest name."""
+    """The parser of a command's options, whose errors suggest the nearest name."""
 
     def __init__(self, verb: str, description: str = "") -> None:
         self._width = _WIDEST
@@ -59,7 +59,7 @@ class Parser(argparse.ArgumentParser):
             epilog=f"example:\n  pyharness {self.module.EXAMPLE}",
             allow_abbrev=False,
             add_help=False,
-            # Without a width, argparse would import `shutil` for every command.
+            # Specify a width, because argparse would import `shutil` to find it.
             formatter_class=lambda prog: _Formatter(prog, width=self._width),
         )
         own = {
@@ -93,7 +93,7 @@ class Parser(argparse.ArgumentParser):
         return super().format_help()
 
     def error(self, message: str) -> NoReturn:
-        """Raise InputError, because argparse would also print the usage."""
+        """Raise InputError instead of printing the usage too."""
         raise InputError(message)
 
     def option_names(self) -> list[str]:
@@ -112,7 +112,7 @@ class Parser(argparse.ArgumentParser):
 
     def _joined(self, arguments: Sequence[str]) -> list[str]:
         """Return the arguments, with negative numbers joined to their options, as in --x=-1."""
-        # Argparse would take negative numbers for options. Old option names are replaced.
+        # Argparse would take negative numbers for options. Replace old option names too.
         result: list[str] = []
         for argument in arguments:
             old, equals, value = argument.partition("=")

@@ -23,9 +23,9 @@ TITLES = {
     "four-term": "Four-term collocation",
     "runge-kutta": "Runge-Kutta",
 }
-"""The names of the programs in headings."""
+"""Names of the programs in headings."""
 
-# The kinds of entries by precedence: the first kind of a card determines its colour.
+# Kinds of entries by precedence; a card's first kind determines its colour.
 _ORDER = (
     "defect", "reading", "conjecture", "missing text", "unreachable", "unread", "redundant",
     "dialect", "normalization", "misreading",
@@ -33,14 +33,14 @@ _ORDER = (
 
 
 class Run(NamedTuple):
-    """Successive characters of a card or its line in the scan."""
+    """Successive characters of a card or of its line in the scan."""
 
     text: str
-    entry: str | None = None  # the note, if card and scan differ here
+    entry: str | None = None  # apparatus entry if card and scan differ here
 
 
 class Note(NamedTuple):
-    """A numbered note (apparatus entry), and the cards of one program to which it applies."""
+    """A numbered apparatus entry, and the cards of a program to which it applies."""
 
     number: int
     entry: dict[str, Any]
@@ -64,10 +64,10 @@ class CardView(NamedTuple):
     """A card as shown on a page."""
 
     number: int
-    card: list[Run]  # our text, in brackets if the scan lacks it
-    # Our text with the scan's names; None if equal to `card`, empty if the scan lacks it.
+    card: list[Run]  # our text, in brackets if the scan lacks the card
+    # Our text with the scan's names; None if equal to `card`, "" if the scan lacks the card.
     witness: str | None
-    after: list[Run]  # next lines of the scan, which belong to no card
+    after: list[Run]  # following lines of the scan that belong to no card
     scan: list[Run] | None  # line of the scan
     corrected: Corrected
     # Lines of the Fortran port, each with the defect or reading on which it depends, and whether
@@ -79,7 +79,7 @@ class CardView(NamedTuple):
 
 
 class Sheet(NamedTuple):
-    """A printed page, numbered from 1."""
+    """A printed page."""
 
     number: int
     cards: list[CardView]

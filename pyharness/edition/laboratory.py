@@ -1,4 +1,7 @@
-"""The data of the page that runs the programs in the browser; without JavaScript, it shows a run."""
+"""The data of the page that runs the programs in the browser.
+
+Without JavaScript, the page shows one run.
+"""
 
 import re
 from typing import Any

@@ -1,6 +1,6 @@
 """The data of the page that compares the programs' cards.
 
-Within an operation of `data/cards/collation.toml`, cards are aligned by similarity.
+Cards of an operation in `data/cards/collation.toml` are aligned by similarity.
 """
 
 import difflib
@@ -15,7 +15,7 @@ from pyharness.model.listing import PROGRAMS
 from pyharness.thesis import collation
 from pyharness.thesis.cards import Card, deck, numbers
 
-# The parts of a card, by kind; an operator may be a relation such as .GT., or a power.
+# Parts of a card by kind; operators include relations such as .GT., and powers.
 _PART = re.compile(
     r"(?P<operator>\.[A-Z]+\.|\*\*|[-+*/=]|\.(?!\d))|(?P<name>[A-Z][A-Z0-9]*)"
     r"|(?P<number>\d+\.?\d*|\.\d+)|(?P<punctuation>\S)"

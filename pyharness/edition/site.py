@@ -1,6 +1,6 @@
 """The pages of the web site: templates filled with data and reports.
 
-They work from a server or a file, under any path and without JavaScript, and load nothing from
+Pages work from a server or a file, under any path and without JavaScript, and load nothing from
 other sites.
 """
 
@@ -45,7 +45,7 @@ from pyharness.model.schema import SCHEMAS
 from pyharness.thesis.cards import deck, parallels
 from pyharness.views.render import json_text
 
-# For each section of the menu, the path of each page by title.
+# Paths of pages by section of the menu and title.
 MENU = tomllib.loads(Path(__file__).with_name("menu.toml").read_text(encoding="utf-8"))
 
 

@@ -1,4 +1,4 @@
-"""Charts and numbers of the home page, a story, from runs of the Python ports.
+"""Charts and numbers of the home page's story, from runs of the Python ports.
 
 The page's script runs the programs with a visitor's values.
 """
@@ -24,7 +24,7 @@ from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.thesis.programs import run_program
 
-# The first scene hides the names of the programs.
+# Letters that hide the programs' names in the first scene of the story.
 LETTERS = {"A": "two-term", "B": "runge-kutta", "C": "four-term"}
 BLIND_CASES = (1, 2, 5)
 RACE_CASES = (2, 3, 4, 5, 6, 7)

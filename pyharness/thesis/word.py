@@ -16,7 +16,7 @@ from typing import Any, ClassVar, NamedTuple
 
 from pyharness.model.errors import InputError, unknown
 
-# To nearest, ties to even; towards zero; the CDC's, truncating and rounding.
+# To nearest, ties to even; towards zero; the CDC's truncating and rounding instructions.
 RULES = ("nearest-even", "chop", "FX", "RX")
 # Number of additional bits of a sine or cosine before rounding.
 _GUARD_BITS = 40

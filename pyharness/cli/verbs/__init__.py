@@ -1,4 +1,4 @@
-"""The verbs of the command line, one module each.
+"""The verbs of the command line, a module for each.
 
 Each `run` prints the results and returns the exit status, 0 unless stated otherwise.
 """

@@ -18,7 +18,7 @@ from pyharness.model.errors import InputError, unknown
 from pyharness.model.scene_file import case_scene
 
 _Named = TypeVar("_Named", bound=Contender)
-# Longest horizon, s; beyond it the reference solution, in decimal arithmetic, takes too long.
+# Longest horizon (s) for which the reference, in decimal arithmetic, does not take too long.
 _LONGEST = 1e3
 _BODIES, _MOST_BODIES, _MOST_GROWN = 100_000, 1_000_000, 10_000_000
 _TERM_BODIES = 1000
@@ -115,7 +115,7 @@ def _absent() -> str:
 
 
 def _count(options: argparse.Namespace) -> int:
-    """Return the number of draws, or 0; set the seed, by default the present year and week."""
+    """Return the number of draws or 0, and set the seed, by default the present year and week."""
     if options.draws is None:
         if options.seed is not None:
             raise InputError("--seed has no meaning without --draws, --ensemble or --terms")
@@ -132,7 +132,7 @@ def chosen(
 ) -> list[SceneContender]:
     """Return the solvers named in `text`, by default all.
 
-    With `attitude`, named solvers must compute attitudes.
+    With `attitude`, the named solvers must compute attitudes.
     """
     found = named(contenders, text, what)
     lacking = [each.name for each in found if not each.attitude]
@@ -212,9 +212,9 @@ def _terms(options: argparse.Namespace) -> int:
     shared.check_outputs(options)
     shared.progress(0, 1, "references")
     loads = term_loads.term_loads(scenes)
-    # The first solver imports modules, whose time belongs to no preparation.
+    # Run once to import modules, whose time must not count as preparation.
     methods[0].prepare(scenes[0].scene)(1.0, 1e-9).run()
-    # All solvers run on one core and are timed in processor time, which other load hardly affects.
+    # All solvers run on one core, in processor time, which other load hardly affects.
     single = measure(loads, contenders, shared.progress, process_time)
     packages = {each.package for each in contenders}
     bodies = term_loads.term_bodies(scenes, options.seed, n)
@@ -235,7 +235,7 @@ def _choose_bodies(options: argparse.Namespace, default: int) -> int:
 
 
 def named(contenders: Sequence[_Named], text: str | None, what: str) -> list[_Named]:
-    """Return the solvers whose names or packages are in `text`, the value of option `what`.
+    """Return the solvers whose names or packages are in `text`, the value of the option `what`.
 
     None selects all, "none" no solver.
     """

@@ -19,8 +19,8 @@ from pyharness.model.pipes import read_input
 from pyharness.thesis.cards import chosen
 from pyharness.thesis.collation import expected_lines, faults, rows, undeclared, unexplained
 
-_LARGEST_SCAN = 1 << 24  # largest size (bytes) of a text
-# Outputs instead of cards. TEI, with its header and apparatus, is always of all cards.
+_LARGEST_SCAN = 1 << 24  # largest size (bytes) of a scan's text
+# Outputs instead of selected cards; TEI always has all cards.
 _KINDS = ("--format tei", "--classes", "--collate", "--origins", "--second-reading", "--scan")
 FORMATS = (*shared.FORMATS, "tei")
 OPTIONS = {
@@ -48,7 +48,7 @@ EXAMPLE = "cards runge-kutta:860"
 def run(options: argparse.Namespace) -> int:
     """Print cards with scan, ports and notes, or a requested comparison.
 
-    Return 1 for an unexplained difference or a mistake in data.
+    Return 1 for an unexplained difference or a mistake in the data.
     """
     given = [options.format == "tei", options.classes, options.collate, options.origins]
     given += [options.second_reading, options.scan is not None]

@@ -85,7 +85,7 @@ def _atlas(options: argparse.Namespace) -> int:
     sweep = read_sweep(options.sweep, over_starts.FUNCTIONS)
     if not check_store(sweep, options.atlas):
         raise InputError(f"--atlas '{options.atlas}': does not exist; 'pyharness sweep' writes it")
-    # Other fields may vary along the same dimension.
+    # Other fields may vary along the dimension of an axis.
     fields = {axis.field: axis.coordinates() for axis in sweep.axes}
     axes = {each: fields.get(each, ()) for each in sweep.dimensions}
     with opened(sweep, options.atlas) as store:

@@ -32,7 +32,7 @@ OPTIONS = {
     **shared.EFFORT,
     **shared.outputs(),
 }
-# Without --numerics, these formats show no method of `solve_ivp`, and no verdict depends on one.
+# Formats that show methods of `solve_ivp` only with --numerics; no verdict depends on methods.
 _WITHOUT_METHODS = {"table", "markdown"}
 USAGE = shared.ONE_SCENE
 EXAMPLE = "compare --case 3 --listing original --plot case-3.png"

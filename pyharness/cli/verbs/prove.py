@@ -36,7 +36,7 @@ EXAMPLE = "prove --case 3 --times 1,3"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print an enclosure of the solution, or check certificates; return 1 if one is invalid."""
+    """Print an enclosure of the solution, or check certificates (return 1 if one is invalid)."""
     if options.check is not None:
         return _check(options)
     kinds = ("any_axes", "any_torque", "any_state", "changing")

@@ -24,7 +24,7 @@ from pyharness.thesis.programs import (
     run_program,
 )
 
-# Output formats of programs only: the line printer's page, and the binary file TAPE5.
+# Output formats for programs only: the line printer's page, and the binary file TAPE5.
 PROGRAM_FORMATS = ("printer", "tape5")
 FORMATS = (*shared.FORMATS, *PROGRAM_FORMATS)
 OPTIONS = {
@@ -56,7 +56,7 @@ EXAMPLE = "run --case 5 --method auto --times 1,2,3"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print one trajectory by a program of the thesis or another method.
+    """Print a trajectory by a program of the thesis or another method.
 
     With --strict, return 1 unless the trajectory's ending is "complete".
     """
@@ -98,7 +98,7 @@ def run(options: argparse.Namespace) -> int:
     report = trajectory_report(scene, name, listing, title, trajectory, form, word, bound)
     failed = options.strict and trajectory.ended != "complete"
     own = {each: partial(write, each) for each in PROGRAM_FORMATS}
-    # Of a program of the thesis, an overflow may be the expected result.
+    # No warning for programs of the thesis, whose expected result may be an overflow.
     if by_method and options.format in ("csv", "markdown") and not trajectory.has_all_rows:
         shared.warn(ending(trajectory))
     return shared.show(report, options, own, failed)
@@ -150,7 +150,7 @@ def _program(options: argparse.Namespace, scene: Scene) -> tuple[str, Listing, s
 
 
 def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajectory]:
-    # A run of a program does not need these modules.
+    # Imported here, because a program's run does not need these modules.
     from pyharness.engine.registry import METHODS
     from pyharness.engine.solve import solve
 
@@ -172,7 +172,7 @@ def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajec
         check_animation(options.animate, scene.changing or principal(scene)[0].moments)
         attitude = True
     is_dense = options.animate is not None
-    # Other methods would solve again.
+    # Only with these methods: for dense output, others would solve again.
     is_dense |= options.plot is not None and name in ("auto", "taylor", "closed-form")
     more: dict[str, Any] = {"attitude": attitude, "dense_output": is_dense}
     trajectory = solve(scene, times, name, tolerance, effort=shared.chosen_effort(options), **more)

@@ -25,7 +25,7 @@ EXAMPLE = "stress --only separatrix --plot separatrix.png"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Test every method against bounds from theory, by trials; return 1 if a check fails."""
+    """Test every method against bounds from theory; return 1 if a check fails."""
     trials = None if options.scene is None else _of_scene(options)
     only = shared.chosen_names(options.only, "trial", tuple(trials or TRIALS))
     if options.plot is not None and len(_chosen(only)) != 1:
@@ -48,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
     failed = [check for check in checks if not check.passed]
     if options.save is not None:
         _save(options.save, checks)
-    # A scene whose check is requested by id is not saved: an earlier failed run has saved it.
+    # For checks requested by id, an earlier failed run has saved the scenes.
     elif trials is None and not any("/" in each for each in only):
         try:
             _save(_FOLDER, failed)

@@ -12,7 +12,7 @@ from pyharness.sweep.run import Estimate, swept
 from pyharness.sweep.store import check_zarr
 from pyharness.sweep.sweep_file import read_sweep
 
-# The functions that judge a claim for many initial conditions, by the claim's identifier.
+# Functions that judge a claim for many initial conditions, by the claim's id.
 CLAIMS = over_starts.FUNCTIONS
 _MOST_WORKERS = 1024
 OPTIONS = {

@@ -21,7 +21,7 @@ from pyharness.model.errors import InputError
 from pyharness.thesis.decks import compiler
 
 FORMATS = ("table", "json", "junit", "markdown")
-# Options that apply to only one kind of check, by kind.
+# Options that apply to only one kind of checks, by kind.
 _OF_ONE_KIND = {"random": ("seed", "draws"), "golden": ("record",)}
 _OF_THE_CHECKS = ("only", "seed", "draws", "external", "self_test", "update", "record", "also")
 _ABOUT = {
@@ -190,7 +190,7 @@ def _title(chosen: Selection) -> list[str]:
 
 
 def _unjudged(chosen: Selection, checks: list[Check]) -> list[str]:
-    """Return at most one line, on checks that were not made or have no verdict."""
+    """Return a line on checks that were not made or have no verdict, or []."""
     if chosen.may_ask("decks") and compiler() is None:
         return ["decks: not run, as there is no gfortran on the PATH"]
     count = sum(check.passed and check.value is None for check in checks)

@@ -176,7 +176,6 @@ def _settings_of(each: Row | Refusal) -> dict[str, Any]:
 
 
 def microseconds(seconds: float | None) -> str:
-    """Return a time (s) as text in microseconds, or "-" for None."""
     if seconds is None:
         return "-"
     value = seconds * 1e6

@@ -209,7 +209,7 @@ def _as_far_as_solved(
 
 
 def _results(problem: Problem, method: str, values: Sequence[Value]) -> list[_Result | None]:
-    """Return omega and its error bound (rad/s) at each value's time, or None."""
+    """Return omega and its error bound (rad/s) for each value, or None without a result."""
     if method in PROGRAMS:
         return [_program(problem, value, method) for value in values]
     scene, times = problem.scene, [float(value.time) for value in values]

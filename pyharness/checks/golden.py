@@ -192,7 +192,7 @@ def update(folder: Path) -> tuple[dict[str, bytes], list[str]]:
 
 
 def mathematics() -> str:
-    """Return the name of this system's mathematical library."""
+    """Return names and versions of the C library and the machine, on which sines depend."""
     return " ".join([*platform.libc_ver(), platform.system(), platform.machine()]).strip()
 
 

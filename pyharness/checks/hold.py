@@ -161,7 +161,7 @@ def _derived(truth: Truth, tried: MethodRun) -> float | None:
         # A closed form has no steps, only the rounding of A, B and C.
         return min(MOST, (made or 0.0) + truth.data + truth.relative_error)
     if made is None:
-        # Fixed steps under a torque have no bound.
+        # For a fixed step, no bound is known for Gauss collocation, or under a torque.
         return None
     growth, steps = truth.flow.amplification, _roundings(tried, truth)
     return linear(allowed(truth, made, growth, steps=steps))
@@ -222,10 +222,8 @@ def promised_sum(tried: MethodRun, truth: Truth) -> float | None:
 
 
 def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:
-    """Return the smallest error of `omega` that explains its drift of energy and momentum.
-
-    The error is relative to `largest` (rad/s).
-    """
+    """Return the least error of `omega`, relative to `largest`, that explains the drifts."""
+    # The drifts are changes of energy and squared angular momentum since time 0.
     assert scene.moments is not None
     if not np.isfinite(omega).all():
         return math.inf

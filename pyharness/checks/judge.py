@@ -84,7 +84,7 @@ def by_rows(method: str, tolerance: float, scene: Scene, times: Sequence[float])
 def by_end(
     method: str, candidate: Candidate, tolerance: float, scene: Scene, time: float
 ) -> MethodRun:
-    """Return a deferred run of a candidate to `time` (s); its limits are those for `method`."""
+    """Return a deferred run of a candidate to `time` (s), with limits as for `method`."""
     return MethodRun(method, tolerance, scene, lambda: of_end(method, candidate.end(scene, time)))
 
 
@@ -100,7 +100,7 @@ class Truth:
     angle_error: float = 0.0  # bound on the error of the attitude, rad
     is_signed: bool = False  # whether the sign of a quaternion counts
     data: float = 0.0  # change of omega by rounding A, B and C, relative to the largest omega
-    exact: bool = False  # whether it is the torque-free closed form, with known `data`
+    exact: bool = False  # whether `omega` is from the torque-free closed form, with known `data`
     # Scene, solution and factor on the work limit, if `omega` is from the reference.
     scene: Scene | None = None
     reference: Reference | None = None

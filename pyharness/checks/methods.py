@@ -2,9 +2,6 @@
 
 The limit of an error is the tolerance. Errors of omega are relative to the largest omega; errors of
 the attitude are angles (rad).
-
-To measure orders of convergence, the programs' omega is compared with `solve_ivp`; their velocity,
-and fixed-step methods, with the reference.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -162,7 +159,7 @@ _FEWEST, _MOST = 16, 4096
 
 
 def orders(chosen: Selection) -> Iterator[Attempt]:
-    """Yield checks of orders of convergence: a value is the theoretical minus the measured one."""
+    """Yield checks of orders of convergence; a value is theoretical minus measured order."""
     for case in cases(chosen, (5,)):
         scene = case_scene(case)
         known = cache(partial(reference, scene, scene.times()))
@@ -204,7 +201,6 @@ def _order_of_method(scene: Scene, method: str, truth: Reference, **limits: Any)
 
 
 def in_few_steps(scene: Scene, time: float) -> Scene:
-    """Return the scene in 16 steps until `time` (s)."""
     return replace(scene, step_size=time / _FEWEST, steps=_FEWEST)
 
 

@@ -211,7 +211,6 @@ def port_report(command: str, checks: Sequence[PortCheck], asked: int, seed: str
 
 
 def step_section(check: PortCheck) -> Section:
-    """Return a table of the values in the first step that differs."""
     assert check.difference is not None
     rows = []
     for each in check.difference["values"]:

@@ -4,8 +4,8 @@ The true omega is from `integer_series`, the true attitude from `reference`. An 
 `solve` or a prepared solver, with one method. The tolerance limits the error of the attitude (rad),
 or of omega relative to its largest component.
 
-Torques that depend on omega or attitude are sums of recorded functions or ready-made terms. The
-reference's series for them (`truth.tape_series`) shares no code with the methods.
+Under torques that depend on omega or attitude, the reference's series (`truth.tape_series`) shares
+no code with the methods.
 """
 
 from collections.abc import Callable, Iterator

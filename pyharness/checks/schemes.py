@@ -145,7 +145,7 @@ _QUOTIENT = Basis(
 
 @dataclass(frozen=True, eq=False)
 class _Quotients:
-    """The quotients that the program compares with its stop constant, in its order."""
+    """The quotients that the program compares with its stop constant."""
 
     values: Array  # shape (n, m) for n steps, 1/s
     rounding: Array  # shape (n, m): bound on a quotient's difference in two computations, 1/s

@@ -60,7 +60,6 @@ _SHOW_WARNING = warnings.showwarning
 
 
 def came() -> bool:
-    """Return whether the user has interrupted this command."""
     return _STATE.count > 0
 
 

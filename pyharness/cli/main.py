@@ -1,4 +1,4 @@
-"""The entry point: parse the verb, run it, report errors in one line."""
+"""The entry point: parse and run a command (verb), and report errors in one line."""
 
 import gc
 import os
@@ -9,7 +9,7 @@ from pyharness.cli import say
 from pyharness.cli.interruption import came, report
 from pyharness.model.errors import InputError, NotBuiltError, unknown
 
-# The verbs in the order of the overview. Each is a module of pyharness.cli.verbs.
+# The verbs in the order of the overview; each is a module of pyharness.cli.verbs.
 _GROUPS = {
     "for everyone": {
         "compare": "compare original and corrected programs with the true solution",
@@ -46,7 +46,7 @@ VERBS = {verb: about for group in _GROUPS.values() for verb, about in group.item
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line, by default this process's; return the exit status.
 
-    Status 1 is for unexpected results, as failed checks.
+    Status 1 is for unexpected results, such as failed checks.
     """
     # Garbage collection during imports takes 4 % of a command's time and frees nothing.
     gc.set_threshold(100_000)

@@ -1,6 +1,6 @@
 """Writing of output folders, completely or not at all.
 
-Messages name `option`, by which the user gave the path.
+Messages name `option`, by which the user specified the path.
 """
 
 import json
@@ -14,7 +14,7 @@ from pyharness.model.output_files import DeferredInterrupt, check_writable, writ
 from pyharness.model.pipes import read_input
 from pyharness.model.schema import check_schema
 
-_LARGEST_MARK = 1 << 24  # bytes of the file that lists the files written by a verb
+_LARGEST_MARK = 1 << 24  # largest size (bytes) of the file that lists a folder's files
 
 
 def check_folder(path: str, names: Iterable[str], option: str) -> None:

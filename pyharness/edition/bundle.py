@@ -14,7 +14,6 @@ _IMPORT = re.compile(
 _EXPORT = re.compile(r"^export (?=(?:function|const|class) (?P<name>\w+))", re.M)
 # An import or export that remains after replacing the supported forms.
 _UNKNOWN = re.compile(r"^\s*(?:import|export)\b.*|\bimport\s*[(.]", re.M)
-# Comments, which are omitted from the script.
 _COMMENT = re.compile(r"^ *//.*\n", re.M)
 
 

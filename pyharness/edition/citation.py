@@ -114,7 +114,7 @@ def thesis_record() -> dict[str, Any]:
 
 
 def linked_data() -> dict[str, Any]:
-    """Return records of software and data as JSON-LD, for search engines."""
+    """Return records of software and data as JSON-LD."""
     described = codemeta()
     software = {name: described[name] for name in _OF_SOURCE_CODE if name in described}
     names = {name: described[name] for name in ("version", "license", "copyrightYear")}

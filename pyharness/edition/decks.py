@@ -156,7 +156,6 @@ def card_views(program: str) -> list[CardView]:
 
 
 def kinds_of(views: Iterable[CardView]) -> dict[str, int]:
-    """Return the number of cards with notes of each kind, by precedence."""
     counts = Counter(kind for view in views for kind in view.kinds)
     return {kind: counts[kind] for kind in _ORDER if counts[kind]}
 

@@ -1,7 +1,4 @@
-"""The data of the page that runs the programs in the browser.
-
-Without JavaScript, the page shows one run.
-"""
+"""The data of the page that runs the programs in the browser."""
 
 import re
 from typing import Any

@@ -77,7 +77,6 @@ def assumption(case: int, programs: Iterable[str] = (), listing: str = "original
 
 
 def counted(judged: Sequence[Judgement]) -> str:
-    """Return a sentence with the numbers of verdicts."""
     results = counts(judged)
     others = [verdicts(each)[0][1] for each in judged if each.claim["kind"] != "result"]
     number = Counter(others)

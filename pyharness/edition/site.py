@@ -236,7 +236,6 @@ def script(name: str, value: Any) -> bytes:
 
 
 def vendor() -> list[dict[str, Any]]:
-    """Return the entries of `vendor.toml`, a list of third-party JavaScript."""
     text = (shipped("web") / "vendor" / "vendor.toml").read_text(encoding="utf-8")
     return list(tomllib.loads(text)["package"])
 

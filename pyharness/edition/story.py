@@ -1,7 +1,4 @@
-"""Charts and numbers of the home page's story, from runs of the Python ports.
-
-The page's script runs the programs with a visitor's values.
-"""
+"""Charts and numbers of the home page's story, from runs of the Python ports."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence

@@ -126,7 +126,6 @@ def converged_order(member: Member) -> int:
 
 
 def predicted_order(member: Member) -> int:
-    """Return the order of convergence after the method's corrections."""
     return min(member.corrections + 1, converged_order(member))
 
 

@@ -65,7 +65,6 @@ class FigurePlan:
 
     @property
     def stem(self) -> str:
-        """The name of the figure's files without suffix, as in `figure-10a`."""
         of_set = "-corrected" if self.set == "corrected" else ""
         return f"figure-{self.number:02d}{self.part.lower()}{of_set}"
 

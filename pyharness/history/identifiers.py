@@ -50,7 +50,7 @@ def data_identifier() -> str:
 
 
 def card_identifier(card: Card) -> str:
-    """Return a card's SWHID: that of its deck's file, with the card's line."""
+    """Return a card's SWHID: its deck's file, qualified by the card's line."""
     content = source_files()[f"{DATA}/cards/{card.program}.toml"]
     return f"{content_identifier(content)};lines={card_lines(content)[card.number]}"
 

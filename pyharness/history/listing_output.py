@@ -20,7 +20,7 @@ _LARGEST = 1 << 24  # largest size (bytes) of a page's file
 
 
 def read_page(path: str) -> list[list[str]]:
-    """Return the numbers in each line of a page, of which one line must have at least six."""
+    """Return the numbers in each line of a page; at least one line must have six or more."""
     where = f"--listing-output '{path}'"
     content = read_input(path, where, _LARGEST, "what a program printed to TAPE6")
     found = printed_numbers(content.decode("ascii", "replace"))

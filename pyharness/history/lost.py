@@ -53,12 +53,10 @@ class Ranked:
 
     @property
     def in_both(self) -> int:
-        """The number of methods that fail in both cases."""
         return sum(len(each.failed) == len(CASES) for each in self.attempts)
 
     @property
     def in_either(self) -> int:
-        """The number of methods that fail in at least one case."""
         return sum(bool(each.failed) for each in self.attempts)
 
 

@@ -45,7 +45,6 @@ def disagreements() -> list[Disagreement]:
 
 
 def origins() -> dict[str, str]:
-    """Return descriptions of the kinds of origin by name."""
     return dict(facts("disagreements")["origin"])
 
 
@@ -55,7 +54,6 @@ def unexplained_defects() -> dict[str, str]:
 
 
 def mistakes() -> list[str]:
-    """Return a sentence for each mistake in `data/disagreements.toml`."""
     found = disagreements()
     return [*_of_each(found), *_of_defects(found), *_of_steps(found)]
 

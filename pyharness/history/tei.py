@@ -160,7 +160,6 @@ def _deck(body: xml.Element, program: str) -> Iterator[tuple[xml.Element, Card]]
 
 
 def first_card(lines: Iterable[Any]) -> int:
-    """Return the lowest card number on a page of the scan."""
     return min(n for each in lines if isinstance(each, str) for n in numbers(each))
 
 

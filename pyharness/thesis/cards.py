@@ -49,7 +49,7 @@ class Card(NamedTuple):
     number: int
     text: str  # our text of columns 1 to 72
     differences: tuple[Difference, ...] = ()  # from left to right
-    printed: tuple[str, str] | None = None  # wrong number in the scan, and its apparatus entry
+    printed: tuple[str, str] | None = None  # other number in the scan, and its apparatus entry
     lost: str | None = None  # apparatus entry if the scan lacks the card
 
     @property
@@ -66,7 +66,6 @@ class Card(NamedTuple):
 
     @property
     def continues(self) -> bool:
-        """Whether column 6 marks a continuation."""
         return not self.is_comment and self.text[5:6].strip() != ""
 
     @property
@@ -289,7 +288,6 @@ def switch_at(place: Place) -> tuple[str, bool] | None:
 
 
 def twin_line(file: str, text: str) -> Place:
-    """Return the only line of a Python port that has this text."""
     where = [n for n, line in enumerate(_lines(_TWINS / file), 1) if line.strip() == text]
     if len(where) != 1:
         raise ValueError(f"{text!r} occurs {len(where)} times in {file}")

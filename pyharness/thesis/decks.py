@@ -48,7 +48,7 @@ class Run(NamedTuple):
 def deck_text(
     listing: Listing, scene: Scene | None = None, dialect: str = "1982", terms: int | None = None
 ) -> str:
-    """Return a deck as fixed-form FORTRAN, with the printed data or those of `scene`.
+    """Return a deck as fixed-form FORTRAN, with the printed data or the data of `scene`.
 
     With `terms`, 3 or 5, the deck is that of `model_cards`.
     """

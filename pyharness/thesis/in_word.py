@@ -1,7 +1,6 @@
 """Runs of the programs in a floating-point format of `word.py`, such as the CDC's.
 
-Python ports run in all formats, compiled programs only in those of IEEE 754. The Fortran extension
-takes numbers as bytes in the machine's order.
+Python ports run in all formats, compiled programs only in IEEE 754 formats.
 """
 
 import copy

@@ -103,7 +103,7 @@ def lipschitz_test(
 ) -> tuple[str, float] | None:
     """Return a variable that violates eq. 19, and its quotient (1/s), or None.
 
-    `change_k` has the changes of right-hand sides, `change_u` those of unknowns.
+    `change_k` has changes of right-hand sides, `change_u` of unknowns.
     """
     velocity_counts = listing.has("lipschitz-tests-velocity")
     last = 6 if velocity_counts else 3

@@ -262,11 +262,9 @@ class Number:
         return self.__class__(*self.rules.nearest(root << 1 | rest, (self.e - shift) // 2 - 1))
 
     def sin(self) -> "Number":
-        """Return the sine of this number (rad), rounded to nearest."""
         return self._wave("mpf_sin")
 
     def cos(self) -> "Number":
-        """Return the cosine of this number (rad), rounded to nearest."""
         return self._wave("mpf_cos")
 
     def _wave(self, name: str) -> "Number":
@@ -293,7 +291,7 @@ class Number:
 
     @property
     def _shadow(self) -> float:
-        """This number as a float if it is zero, infinite or nan, else its sign."""
+        """Return zero, infinity and nan as a float, other numbers as their sign."""
         if self.m:
             return 1.0 if self.m > 0 else -1.0
         return float(self.e)

@@ -100,7 +100,7 @@ def prepared_candidate(
     read = _turned if attitude else _answered
 
     def ready(scene: Scene, time: float) -> Ready:
-        # With attitudes, the third argument is the initial one.
+        # With attitudes, the solver's third argument is the initial attitude.
         solver = make(scene, name, tolerance)
         start, turned = np.array(scene.omega), ((0.0, 0.0, 1.0, 0.0),) if attitude else ()
         if primed:

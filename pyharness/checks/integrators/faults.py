@@ -228,7 +228,7 @@ OUTPUTS = ("quaternion-transposed", "scalar-last", "attitude-from-identity")
 
 
 def motions(scene: Scene, times: Array, step: float) -> Iterator[tuple[Fault, State]]:
-    """Yield each fault that has an effect, and its states, NaN if the motion overflows."""
+    """Yield each fault with an effect, and its states; NaN if the last time is not reached."""
     for fault in FAULTS:
         with np.errstate(all="ignore"):
             try:

@@ -25,7 +25,7 @@ _STATES = {each.name: each.state for each in FAULTS}
 _STEP_AXIS = np.array([0.6, 0.0, 0.8])  # axis of the rotation that a first-order fault adds
 
 
-# Returns a quaternion after a step from that before, omega at both ends, and the step size (s).
+# Returns the quaternion after a step, from the one before, omega at both ends, and step size (s).
 Advance = Callable[[Any, Array, Array, float], Any]
 
 

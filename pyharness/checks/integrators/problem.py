@@ -31,7 +31,7 @@ DRAWS = 2
 PARTS = ("omega", "attitude")
 """The parts of a state whose errors are measured."""
 _COARSEST, _PER_LEVEL = 1e-3, 0.1  # tolerance of level 0, and factor from level to level
-_EACH = 2  # number of the largest steps between requested times
+_EACH = 2  # number of largest steps between requested times
 _ORDER_ONE = 1.5  # a smaller measured order counts as 1
 _SEVERAL = 4  # number of step sizes that must show the order 1
 _LATE = 3  # number of earlier tolerances over which the order is measured too
@@ -175,7 +175,7 @@ def convergence(
 ) -> Convergence:
     """Return a part's errors and their order of convergence, measured above `floor`.
 
-    `overall` measures it over more than the last two settings.
+    With `overall`, the order is over more than the last two settings.
     """
     seen = [k for k in range(1, len(errors)) if not errors[k] <= floor]
     order = None

@@ -57,7 +57,7 @@ def recognised(results: Sequence[Judged]) -> list[Finding]:
 
 
 def _explained(judged: Judged) -> list[str]:
-    """Return a fault that explains all errors, or else one of omega and those of the output."""
+    """Return a fault that explains all errors, else one of omega with faults of the output."""
     true = judged.convergences
     if judged.lost or all(each.is_higher for each in true):
         return []
@@ -69,7 +69,7 @@ def _explained(judged: Judged) -> list[str]:
     both = _best(judged, known, range(len(true)))
     if both is not None:
         return [both.name]
-    # Without such a fault, seek one of omega, and those of the attitude.
+    # Without such a fault, seek one of omega, and any of the output.
     base = None if true[0].is_higher or len(true) == 1 else _best(judged, known, range(1))
     if base is None:
         return []

@@ -73,7 +73,7 @@ def _swapped(found: Array, size: float) -> Array:
 
 
 def _stale() -> Change:
-    """Return a change that replaces a trajectory by the one before of equal length."""
+    """Return a change that replaces a trajectory by the previous one of equal length."""
     before: dict[int, Trajectory] = {}
 
     def change(run: Trajectory, size: float) -> Trajectory:

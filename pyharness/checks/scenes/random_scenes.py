@@ -16,7 +16,7 @@ from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw
 
 COARSEST = 1e-3
-# Defects drawn after all others, so that a seed gives the same draws as before these were added.
+# Defects drawn last, so that a seed gives the same draws as before they were added.
 _LATER = ("three-masses",)
 _LIPSCHITZ = (500.0, 60.0, 1.0, 1e-3)
 MODERATE = ("free", "constant", "wave")

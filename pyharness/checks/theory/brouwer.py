@@ -102,7 +102,7 @@ def orbit(scene: Scene) -> Orbit:
         weight = moments**power
         total = (weight * states**2).sum(axis=1)
         part = (weight * np.abs(states)).sum(axis=1) * largest / total
-        # The energy is a quadratic form of omega, the momentum the root of one.
+        # The energy is a quadratic form of omega, the momentum the square root of one.
         gains[name] = float(part.max()) * (2.0 if name == "energy" else 1.0)
     gains["frequency"] = largest * max(_steepness(a, state) for state in states)
     along = jacobians(scene, states)

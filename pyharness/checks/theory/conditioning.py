@@ -55,7 +55,7 @@ class Conditioning:
     # Final error, divided by `largest`, if every term of the right-hand side, the initial omega and
     # the result have a few rounding errors in the worst direction.
     rounding: float
-    storing: float  # final error, divided by `largest`, from one rounding of omega
+    storing: float  # mean final error, divided by `largest`, from one rounding of omega
     # Sum of the terms' rounding errors, divided by `largest`, without amplification.
     unamplified: float
     largest: float  # largest abs(omega) until the end (rad/s)

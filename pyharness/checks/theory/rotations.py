@@ -191,9 +191,8 @@ def _flip_interval(coefficients: Sequence[float], spin: float, share: float) -> 
     # Flips are most frequent for a perturbation along the axis with the smaller coefficient.
     tilt = share / math.sqrt(min(abs(second), abs(third)))
     high, low = scale * math.hypot(tilt, 1.0 / math.sqrt(abs(first))), scale * tilt
-    # The time is 2 K / lambda, where lambda is near the growth rate, and the complete elliptic
-    # integral K is pi / 2 divided by the arithmetic-geometric mean of 1 and the complementary
-    # modulus.
+    # The time is 2 K / lambda, with lambda near the growth rate. The complete elliptic integral K
+    # is pi / 2 divided by the arithmetic-geometric mean of 1 and the complementary modulus.
     while high - low > 4.0 * ROUNDING * high:
         high, low = 0.5 * (high + low), math.sqrt(high) * math.sqrt(low)
     return math.pi / high / spin
@@ -240,7 +239,7 @@ def _axes(coefficients: Triple, spin: float) -> tuple[str, Places]:
 
 def _hyperbola(coefficients: Triple, product: float, held: int) -> tuple[str, Places]:
     """Return a text and points of a branch, for a torque about the axis `held` (from 0)."""
-    # `product` is that of the other two components of omega (rad2/s2).
+    # `product` is the product of the other two components of omega (rad2/s2).
     one, other = (held + 1) % 3, (held + 2) % 3
     told = (
         f"torque about axis {held + 1}: the hyperbola w{one + 1} w{other + 1} = {product:.6g}, "

@@ -35,7 +35,7 @@ FORECAST = Basis(
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """A scene's solution, with the sensitivity of its end to earlier perturbations."""
+    """A scene's solution, with the final omega's sensitivity to earlier perturbations."""
 
     scene: Scene  # with constant torque
     times: Array  # shape (n,), s: from 0 to the end

@@ -65,7 +65,7 @@ def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None =
 
 
 def grid(points: str | tuple[float, ...] | None, n: int) -> Array:
-    """Return n collocation points in units of the step size, by default those of the thesis."""
+    """Return n collocation points in units of the step size, by default as in the thesis."""
     if points == "gauss":
         return _gauss(n)[0]
     if points is None or points == "thesis":

@@ -150,7 +150,7 @@ def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterato
     off = abs(float(np.linalg.norm(answer.attitude)) - 1.0)
     yield name.with_quantity("length").bounded(off, 8.0 * ROUNDING, _OPERATIONS)
     if name.subject in FORMS:
-        # The angular momentum in space has the attitude's error, and that of omega (16 rounding
+        # The angular momentum in space has the attitude's error, and omega's error (16 rounding
         # errors) times the moments.
         moments = np.array(scene.moments)
         momentum = moments * scene.omega

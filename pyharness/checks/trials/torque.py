@@ -72,7 +72,7 @@ def axial(scene: Scene, time: float) -> Truth:
 
 
 def averaged(scene: Scene, time: float) -> Truth:
-    """Return the true omega at `time` (s) without its waves, with a bound on their effect."""
+    """Return the true omega at `time` (s) without waves, with a bound on the waves' effect."""
     moments = np.array(scene.moments)
     waves = scene.law.sines + scene.law.cosines
     moved = sum(float((2.0 * np.abs(a) / moments).max()) / f for a, f in waves)

@@ -14,7 +14,7 @@ EXAMPLE = "doctor"
 def run(options: argparse.Namespace) -> int:
     """Print build, machine, packages and environment.
 
-    Return 3 without the Fortran extension, 1 if a compiler option altered the arithmetic.
+    Return 3 without the Fortran extension, 1 if its arithmetic is altered.
     """
     shared.check_outputs(options)
     found, here = build(), installation() | {"leaves": about_leaves()}

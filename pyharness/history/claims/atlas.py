@@ -1,7 +1,7 @@
 """The atlas of claims: which claims hold for which initial omega (start).
 
 The starts have all directions at several magnitudes. A claim scores 1 point if reproduced, 1/2 if
-reproduced in part. Verdict codes are those of `over_starts`.
+reproduced in part. Verdict codes are as in `over_starts`.
 """
 
 import math

@@ -29,7 +29,7 @@ class Assumptions:
     start: Triple | None = None
     readings: frozenset[str] = frozenset()  # readings other than those that we adopt
     steps: int = 100
-    conjectures: frozenset[str] | None = None  # None: those of the original listing
+    conjectures: frozenset[str] | None = None  # None: as in the original listing
     word: str = BINARY64  # arithmetic of the programs
 
 
@@ -62,7 +62,6 @@ class Laboratory:
     def run_on(
         self, scene: Scene, listing: Listing, may_stop: bool = True, lipschitz: float = 500.0
     ) -> Trajectory:
-        """Return a listing's run in the assumed arithmetic, with a stop constant (1/s)."""
         return _run(listing, scene, may_stop, lipschitz, self.assumptions.word)
 
     def truth(self, case: int) -> Reference:
@@ -77,11 +76,9 @@ class Laboratory:
         return Runs(omega, np.asarray(len(reached)), complete, overflow)
 
     def solution(self, case: int) -> Array:
-        """Return a case's reference omega (rad/s), shape (steps, 3)."""
         return self.truth(case).omega
 
     def error(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> float:
-        """Return the largest error (rad/s) of omega's components, infinite after an overflow."""
         return float(largest_error(self, program, case, may_stop, parts))
 
     def models(self, case: int, terms: int) -> Array:
@@ -124,7 +121,6 @@ def distance(first: Array, second: Array) -> float:
 
 
 def largest(truth: Reference) -> float:
-    """Return the largest magnitude (rad/s) of any component of the reference omega."""
     return float(largest_of(truth.omega))
 
 

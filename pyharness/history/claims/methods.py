@@ -294,7 +294,7 @@ def all_succeed(
 
 
 def predict_correct(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Return "not testable" for the predict-correct technique, with errors by corrections."""
+    """Return "not testable" for the predict-correct technique, which the thesis only recommends."""
     best = Laboratory(False, lab.assumptions)
     numbers = {}
     for case in cases:

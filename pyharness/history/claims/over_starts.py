@@ -102,7 +102,6 @@ FUNCTIONS = {name: partial(codes, name) for name in JUDGED}
 
 
 def judged(entry: dict[str, Any], bench: Starts, n: int) -> NDArray[np.int8]:
-    """Return a claim's codes FAILS, HOLDS or IN_PART for n initial omegas, shape (n,)."""
     grade = vars(rules)[entry["test"]](bench, **entry["parameters"])
     found = np.where(grade.whole, HOLDS, np.where(grade.part, IN_PART, FAILS))
     return np.broadcast_to(found, (n,)).astype(np.int8)

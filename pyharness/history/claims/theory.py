@@ -28,7 +28,7 @@ Weights = Sequence[Callable[[Array], Any]]
 
 
 def known_in_closed_form(lab: Laboratory, cases: list[int], limit: float) -> Judged:
-    """Judge whether the solutions of `cases` are unknown; a closed form refutes it."""
+    """Judge whether the solutions of `cases` are unknown; closed forms refute the claim."""
     numbers = {}
     for case in cases:
         scene, truth = lab.scene(case), lab.truth(case)
@@ -145,7 +145,7 @@ def _stepped(scene: Scene, method: str) -> Array:
 def _power(
     scene: Scene, method: Callable[[Scene], Array], truth: Callable[[Scene], Array] | None = None
 ) -> float:
-    """Return the measured p if a method's error in a step of size h is O(h**p)."""
+    """Return p if a method's error in a step of size h is O(h**p)."""
     apart = []
     for step_size in (scene.step_size, scene.step_size / 2.0):
         short = replace(scene, step_size=step_size, steps=1)

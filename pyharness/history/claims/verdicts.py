@@ -133,7 +133,7 @@ def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
 
 
 def growing(lab: Laboratory, case: int) -> Judged:
-    """Judge whether the last omega1 of Runge-Kutta is larger than that of the true solution."""
+    """Judge whether the last omega1 of Runge-Kutta is larger than the true omega1."""
     run = lab.run("runge-kutta", case)
     value, solution = float(run.omega[-1, 0]), float(lab.truth(case).omega[run.steps - 1, 0])
     numbers = {"omega1 at the end (rad/s)": value, "solution there (rad/s)": solution}
@@ -162,9 +162,10 @@ def more_reliable(lab: Laboratory, case: int) -> Judged:
 
 
 def too_fast(lab: Laboratory, case: int, same: float, worse: float) -> Judged:
-    """Judge whether the motion is too fast for two terms, from corrected programs and all starts.
+    """Judge whether the two-term error is due to a motion too fast for two terms.
 
-    Two-term error over four-term error must exceed `worse` (in part: `same`, from any start).
+    The corrected two-term error divided by the four-term error must exceed `worse` from all starts
+    or, for a claim reproduced in part, `same` from any.
     """
     numbers = {}
     for start in starts():

@@ -13,7 +13,7 @@ Say = Callable[[str], None]  # receives the name of the current part
 
 
 class Task(Protocol):
-    """A task to measure, as a workload; messages name it by `place`."""
+    """A task to measure, such as a workload; messages name it by `place`."""
 
     @property
     def place(self) -> str: ...

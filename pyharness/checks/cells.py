@@ -96,7 +96,7 @@ _VECTORS = Basis(
 
 
 def words(chosen: Selection) -> Iterator[Attempt]:
-    """Yield checks of simulated CDC arithmetic: test vectors, and runs of the programs."""
+    """Yield checks of simulated arithmetics: CDC test vectors, and runs of the programs."""
     yield Attempt(Name("words", "vectors"), _vectors)
     for listing, case in all_cells():
         has_all_or_none = listing.label != "custom" and not listing.readings
@@ -117,7 +117,7 @@ def _vectors(name: Name) -> Check:
 
 
 def _in_word(listing: Listing, case: int, word: str | None, name: Name) -> Check:
-    """Return the check of simulated against compiled arithmetic; if None, binary64 against ours."""
+    """Return the check of Python against Fortran in `word`; if None, of our binary64 and floats."""
     scene = case_scene(case)
     ours = in_word.run(scene, listing, WORDS[word or BINARY64])
     if word is None:

@@ -66,7 +66,7 @@ class PortCheck(Check):
 
 
 def port_cells(programs: Sequence[str], cases: Sequence[int], cells: Sequence[str]) -> list[Cell]:
-    """Return runs of `programs` in `cases`; if `cells`, only those whose names begin so."""
+    """Return runs of `programs` in `cases`; `cells`, if any, are the beginnings of their names."""
     found = []
     for listing, case in all_cells():
         name, of = cell_name(listing, case), of_cell("port", listing, case)
@@ -80,7 +80,7 @@ def random_cells(
 ) -> list[Cell]:
     """Return runs in random scenes by number, named as in ``random/7/two-term``.
 
-    If `cells`, only those whose names begin so.
+    Beginnings of names in `cells`, if any, select runs.
     """
     named = {int(match[1]) for each in cells if (match := _DRAWN.match(each))}
     found = []

@@ -117,7 +117,7 @@ class PortProcess:
     def ask(self, line: bytes) -> bytes:
         """Send a request and return the answer, both without line feed.
 
-        Raise PortError if no answer comes in time.
+        Raise PortError unless one line of limited length comes in time.
         """
         end = time.monotonic() + self._patience
         rest = line + b"\n"

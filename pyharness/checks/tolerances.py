@@ -10,7 +10,7 @@ from pyharness.engine.scipy_ivp import steps_sum
 from pyharness.engine.solve import finest as finest_of
 from pyharness.model.scene import Scene
 
-# Tolerances in the cases of Table 1; at others, SciPy's methods take more than a second.
+# Tolerances in the cases of Table 1; SciPy's methods run only at two that take less than a second.
 OF_CASES = (1e-3, 1e-6, 1e-9, 1e-12)
 _SCIPY_OF_CASES = (1e-6, 1e-9)
 _OF_SELF_TEST = 1e-9

@@ -23,7 +23,7 @@ def write_text(stream: TextIO, text: str) -> None:
 
 
 def say(text: str) -> None:
-    """Write a text to stderr, ignoring errors as from a closed stream."""
+    """Write a text to stderr, ignoring errors such as a closed stream."""
     with suppress(OSError, ValueError):
         write_text(sys.stderr, text)
         sys.stderr.flush()

@@ -362,7 +362,7 @@ def check_outputs(options: argparse.Namespace) -> None:
     inputs = [getattr(options, name, None) for name in _INPUTS]
     for read in [*filter(None, inputs), *names(getattr(options, "check", None))]:
         for path, option, _ in files:
-            # Input and output may be the same device, as a terminal.
+            # Input and output may be the same device, such as a terminal.
             if os.path.isfile(read) and _is_same(path, read):
                 raise InputError(
                     f"{option} '{path}': is the input file '{read}'; give another name"

@@ -31,7 +31,7 @@ def bundle(entry: Path) -> str:
 def _add(
     path: Path, importing: tuple[Path, ...], exports: dict[Path, list[str]], parts: list[str]
 ) -> None:
-    """Append a module, imported through the chain `importing`, and its imports to `parts`."""
+    """Append a module, imported through the chain `importing`, to `parts` after its own imports."""
     text = path.read_text(encoding="utf-8")
 
     def declare(found: re.Match[str]) -> str:

@@ -1,4 +1,4 @@
-"""Entries of the apparatus (notes on the programs, as on defects), and their effects on errors."""
+"""Entries of the apparatus (notes on programs), such as defects, and their effects on errors."""
 
 import math
 import string

@@ -397,7 +397,7 @@ class Conversions:
         """Write the trajectory with its scene to a file, from which `pyharness.load` restores it.
 
         Numbers are restored bit for bit. The file has the format of `numpy.savez`, with an array
-        for each array attribute.
+        for each array attribute; the array `scene` is the text of a scene file.
 
         Parameters
         ----------

@@ -90,7 +90,7 @@ class Scene:
     """A problem to solve: a body, the torque on it, and initial conditions.
 
     Exactly one of `moments`, `coefficients`, `inertia` and `changing` is required. Three numbers
-    may be a list, a tuple or an array.
+    may be a list, a tuple or an array; the fields are tuples of floats.
 
     Parameters
     ----------

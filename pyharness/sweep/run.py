@@ -161,7 +161,7 @@ def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
     return found
 
 
-# Memory of a process over the size of a chunk: it holds several chunks, and computes.
+# Memory of a process over the size of a chunk: it holds several chunks, and needs more to solve.
 _COPIES = 12
 _MOST_CHUNKS = 1_000_000
 

@@ -128,7 +128,7 @@ class Row(NamedTuple):
     text: str  # place in the thesis
     says: str  # statement at this place
     entries: tuple[str, ...]  # apparatus entries that explain a disagreement
-    reason: str  # explanation if no entry is
+    reason: str  # explanation if there is no entry
 
     @property
     def is_explained(self) -> bool:

@@ -15,7 +15,7 @@ from pyharness.thesis.equations import Vector, accelerations, omega_rate, veloci
 def run(
     scene: Scene, listing: Listing, lipschitz: float = 500.0, may_stop: bool = True
 ) -> Trajectory:
-    """Run the program; without a stop test, `lipschitz` and `may_stop` have no effect."""
+    """Run the program; it has no stop test, so `lipschitz` and `may_stop` have no effect."""
     coefficients = scene.euler_coefficients
     acceleration = accelerations(scene, listing)
 

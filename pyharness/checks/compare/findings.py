@@ -90,7 +90,7 @@ class Comparison:
 
     @property
     def digits(self) -> float | None:
-        """Return the decimal digits that amplified binary64 rounding leaves; None if unknown."""
+        """Return the number of decimal digits that amplified binary64 rounding leaves, or None."""
         return None if self.growth is None else digits_left(ROUNDING * self.growth)
 
     @property

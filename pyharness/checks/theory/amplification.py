@@ -147,7 +147,7 @@ def _polynomial_text(coefficients: Fractions) -> str:
 
 
 def boundary(matrix: Amplification, direction: complex) -> tuple[float, float]:
-    """Return the stability boundary's distance from z = 0, and the spectral radius's slope there.
+    """Return the stability boundary's distance from z = 0, and the spectral radius's slope beyond.
 
     `direction` is -1 or 1j.
     """

@@ -93,7 +93,7 @@ def _crossing(method: str, case: int, error: Callable[[int], float], name: Name)
         # Take the geometric mean of this step size and the next smaller one.
         found /= 10.0**0.25
     predicted = forecaster.crossing(smallest)
-    # Allow for the half decade between step sizes, and for rounding ten times as predicted.
+    # Allow for the half decade between step sizes, and for ten times the predicted rounding.
     limit = 0.25 + 1.0 / (SCHEMES[method].order + 0.5)
     best = min(counts, key=error)
     note = (

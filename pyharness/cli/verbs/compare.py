@@ -27,12 +27,13 @@ OPTIONS = {
     "--attitude": "Compare the attitude (orientation) too, by an angle in rad.",
     "--ablate": "Run each program with every subset of its defects.",
     "--numerics": "Show also drifts of energy and momentum, differences between Fortran and "
-    "Python, error amplification, solve_ivp and run times.",
+    "Python, error amplification, solve_ivp and run times (always in JSON and CSV).",
     **shared.STRICT,
     **shared.EFFORT,
     **shared.outputs(),
 }
-# Formats that show methods of `solve_ivp` only with --numerics; no verdict depends on methods.
+# Formats that show methods of `solve_ivp` beside programs only with --numerics; no verdict on
+# programs depends on these.
 _WITHOUT_METHODS = {"table", "markdown"}
 USAGE = shared.ONE_SCENE
 EXAMPLE = "compare --case 3 --listing original --plot case-3.png"

@@ -35,9 +35,10 @@ OPTIONS = {
     f"computers). In Fortran only {', '.join(COMPILED_WORDS)}.",
     "--method M": "Method (list: docs/reference/methods.md; with --scene, default auto).",
     **shared.LISTING,
-    "--times T1,T2,...": "Times of the results (s), ascending or descending (default: the scene's "
-    "steps).",
-    "--attitude [FORM]": f"Attitude (orientation): {', '.join(FORMS)} (default {FORMS[0]}).",
+    "--times T1,T2,...": "Times of the results (s), also negative, ascending or descending "
+    "(default: the scene's steps).",
+    "--attitude [FORM]": f"Compute the attitude (orientation), as {', '.join(FORMS)} (default "
+    f"{FORMS[0]}).",
     "--animate FILE": "Animate the body (.gif, .html); needs an attitude.",
     "--tolerance E": "Allowed error of omega, relative to its largest component (default: the "
     "method's own).",

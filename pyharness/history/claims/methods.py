@@ -128,7 +128,7 @@ def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
 
 
 def _by_literals(lab: Laboratory, cases: Sequence[int]) -> dict[str, float]:
-    """Return the numbers of cases whose error is halved if some `LITERALS` are divided by ten."""
+    """Return how many cases at least halve the error if some `LITERALS` are divided by ten."""
     scenes = tuple(lab.scene(case) for case in cases)
     numbers = {}
     for program, terms in zip(COLLOCATION, (2, 4), strict=True):

@@ -156,6 +156,8 @@ def _rows(where: str, values: Any, count: int, allowed: str, what: str) -> list[
 def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbers]) -> StateTorque:
     """Return a torque that acts within pulses, and is 0 elsewhere.
 
+    The impulse is torque times duration, even if the end of a pulse is rounded.
+
     Parameters
     ----------
     starts : iterable of numbers, shape (n,)

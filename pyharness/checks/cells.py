@@ -117,7 +117,7 @@ def _vectors(name: Name) -> Check:
 
 
 def _in_word(listing: Listing, case: int, word: str | None, name: Name) -> Check:
-    """Return the check of Python against Fortran in `word`; if None, of our binary64 and floats."""
+    """Compare Python with Fortran in `word`, or, if it is None, our binary64 with floats."""
     scene = case_scene(case)
     ours = in_word.run(scene, listing, WORDS[word or BINARY64])
     if word is None:

@@ -40,9 +40,10 @@ SCENE = {
 LISTING = {
     "--listing L": "Version: original (default), or corrected (without the author's defects).",
     "--fix NAME,...": "Correct only these defects (`pyharness defects --all` lists all names).",
-    "--keep NAME,...": "Correct all other defects.",
+    "--keep NAME,...": "Correct all defects but these.",
     "--reading NAME,...": "Use the rejected reading of these doubtful lines.",
-    "--conjecture NAME,...": "Assumptions about missing lines, or `none` (default torque-held).",
+    "--conjecture NAME,...": "Make these assumptions about missing lines, or `none` (default "
+    "torque-held).",
     "--lipschitz L": "Lipschitz quotient (1/s) above which the Runge-Kutta program stops (default "
     "500).",
     "--no-stop": "Omit this stop test.",
@@ -52,8 +53,8 @@ EFFORT = {"--effort F": _EFFORT.format(10, " (programs: 30 s)")}
 EFFORT_WITHOUT_PROGRAMS = {"--effort F": _EFFORT.format(10, "")}
 EFFORT_OF_PROGRAMS = {"--effort F": _EFFORT.format(30, "")}
 STRICT = {
-    "--strict": "Exit with status 1 also if results are incomplete, or rounding errors may "
-    "exceed the tolerance."
+    "--strict": "Exit with status 1 not only if a comparison fails, but also if results are "
+    "incomplete, or rounding errors may exceed the tolerance."
 }
 ALSO = {"--also FILE,...": "Write the result also to these files (.md, .json; .xml: JUnit)."}
 _BY_SUFFIX = {".md": "markdown", ".xml": "junit", ".json": "json"}

@@ -29,7 +29,7 @@ def check_libraries() -> None:
 
 
 def listed(content: Mapping[str, bytes]) -> dict[str, Any]:
-    """Return a record of the build and the size (bytes) of each file."""
+    """Return the record of the build, and the size (bytes) of each file."""
     return {"build": build_record(), "files": {name: len(each) for name, each in content.items()}}
 
 

@@ -106,11 +106,12 @@ class Solution:
         return found[1], *(errors @ np.abs(found - found[1]))
 
     def changed_values(self, g: EventFunction, times: Array, part: float) -> Array:
-        """Return values at n times (s), shape (m, n): unchanged, then with one unknown changed."""
+        """Return values of `g` at n times (s), shape (m, n), in m variants of the state."""
         states = self.states(times)
         n, width = states.shape
         count = 2 * width + 1
-        # Each unknown is raised, then each lowered, by the fraction `part` of its size.
+        # The state is unchanged, then each unknown is raised, then each lowered, by `part` of its
+        # size.
         signs = np.eye(count, width, -1) - np.eye(count, width, -1 - width)
         every = states + signs[:, None] * (part * sizes_of(np.abs(states), self.sol.n_own))
         values = self.values(g, np.tile(times, count), every.reshape(-1, width))

@@ -265,7 +265,7 @@ def noises(tape: Structure, number: str, written: Callable[[str], str]) -> Itera
 
 
 def derivatives(tape: Structure, count: int) -> tuple[list[str], list[dict[int, str]]]:
-    """Return C code for results and derivatives in a step, and rates' derivatives by unknown."""
+    """Return C code of all operations' values and derivatives, and each rate's derivatives."""
     # Names of derivatives, by slot and unknown.
     by = {slot: {slot: "one"} for slot in unknowns_of(tape)}
     lines = [_summed(slot, count) for slot in (TIME, *unknowns_of(tape))]

@@ -184,14 +184,14 @@ class StateRun(Run):
         return omega if 0.0 < omega < math.inf else 1.0
 
     def rows(self, times: Sequence[float], local: float, scale: float) -> StateRows:
-        """Return states at `times` (s); the tolerance `local` is relative to `scale` (rad/s)."""
+        """Return states at `times` (s); the tolerance is `local`, for omega times `scale`."""
         self._integrations += 1
         sizes = [local * scale] * 3 + [local] * (len(self.start) - 3)
         longest = abs(self.end) / (_FEWEST_STEPS + _MORE_STEPS * self._integrations)
         rows = np.empty((0, len(self.start)))
         state, begin, self._largest = self.start, 0.0, 0.0
         self._solutions.clear()
-        # Each integration ends where a table changes, because SciPy may pass the change.
+        # Each integration ends where a table changes, because SciPy may step over the change.
         for end, most in self.spans:
             own = [time for time in times[len(rows) :] if abs(time) <= abs(end)]
             wanted = own if own and own[-1] == end else [*own, end]

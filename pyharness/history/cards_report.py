@@ -106,7 +106,7 @@ def scan_report(
 
 
 def classes_report() -> Report:
-    """Return a report of the numbers of apparatus entries, and of cards with entries, by kind."""
+    """Report for each kind of apparatus entry the number of entries, and of cards with entries."""
     entries = facts("apparatus")["entry"]
     cards = [card for program in PROGRAMS for card in deck(program).cards.values()]
     entries_of = Counter(each.entry for card in cards for each in card.differences)

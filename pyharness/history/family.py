@@ -63,7 +63,7 @@ class Member:
     # Collocation points: "thesis" (k/(n+1) of the step, k = 1 to n), "gauss" (Gauss-Legendre), or
     # fractions of the step.
     points: str | tuple[float, ...] | None = None
-    corrections: int = 1
+    corrections: int = 1  # of the trial solution, in each step
 
     def __post_init__(self) -> None:
         if self.weighting not in WEIGHTINGS:

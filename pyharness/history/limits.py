@@ -52,7 +52,7 @@ Rate = Callable[[float, Sequence[float]], list[float]]
 
 @dataclass(frozen=True)
 class Halving:
-    """A run's largest distances (rad/s) from limit and reference, infinite after an overflow."""
+    """A run's largest distances (rad/s) from limit and true solution; inf after an overflow."""
 
     step_size: float
     from_limit: float

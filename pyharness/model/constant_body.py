@@ -42,7 +42,7 @@ def _rates(tape: Tape, own: tuple[str, ...], inertia: Matrix) -> StateTorque:
 
 
 def rates_about_body_axes(inertia: Matrix, omega: Any, torque: Any) -> Any:
-    """Return omega' (rad/s2) for a full inertia matrix; vectors are arrays about the body axes."""
+    """Return omega' (rad/s2) for a full inertia matrix; all vectors are about the body axes."""
     about, axes = principal(Scene("", (0.0, 0.0, 0.0), inertia=inertia))
     x, y, z = omega @ axes
     # About the body axes, large terms would cancel.

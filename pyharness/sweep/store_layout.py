@@ -173,7 +173,7 @@ def label(sweep: Sweep) -> Label:
 
 
 def labels(folder: Path) -> list[Label]:
-    """Return the identities that can be read in a store's metadata and in their checksums."""
+    """Return the labels that are readable in a store's metadata and its file of checksums."""
     found = []
     with contextlib.suppress(
         DamageError, OSError, ValueError, LookupError, TypeError, RecursionError

@@ -73,7 +73,7 @@ def interval(
 
 
 def fit(points: Sequence[float], rates: Sequence[Vector]) -> tuple[list[list[float]], int]:
-    """Return each unknown's c1, c2, ..., and IER, from the derivatives `rates` at `points` (s)."""
+    """Return each unknown's coefficients c1, c2, ... from its `rates` at `points` (s), and IER."""
     by_unknown = [list(column) for column in zip(*rates, strict=True)]
     return leqt1f(collocation_matrix(points), by_unknown)
 

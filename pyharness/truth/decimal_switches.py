@@ -34,11 +34,11 @@ class Switches:
         self._next: dict[int, int] = {}
 
     def settle(self) -> bool:
-        """Correct the first result that contradicts its operand; return whether there was one."""
+        """Correct the first result that contradicts its switch; return whether there was one."""
         for slot, is_floor, x in self._tape.operands_of_switches():
             level = x[0].to_integral_value() if is_floor else Decimal(0)
             if abs(x[0] - level) <= _ZERO * (1 + abs(x[0])):
-                # On a level, an earlier choice (as by `turns`) is kept; the first is NumPy's.
+                # At the jump, an earlier choice (as by `turns`) stays; the first choice is NumPy's.
                 known = self._levels.get(slot)
                 value = level if is_floor else Decimal(0)
                 if slot in self.results and known is not None:

@@ -190,7 +190,7 @@ class TapeSeries:
         return new
 
     def _slope(self, operand: int, k: int) -> Row:
-        """Return coefficients 1 to k of a slot, each times its number."""
+        """Return coefficients 1 to k of a slot's series, each times its index; k grows by 1."""
         slope = self._slopes.setdefault(operand, [])
         if len(slope) < k:
             slope.append(k * self._slots[operand][k])

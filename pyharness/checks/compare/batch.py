@@ -125,7 +125,7 @@ class Batch:
         return self._rows[samples]
 
     def attitudes(self, samples: int) -> Array:
-        """Return scalar-first quaternions at the ends of parts of a run, shape (n, samples, 4).
+        """Return quaternions at the ends of `samples` equal parts of the run, (n, samples, 4).
 
         They rotate from body axes to the initial body axes.
         """

@@ -71,7 +71,7 @@ def change_result(target: str, change: Change) -> Fault:
 
 
 def change_at(path: str, change: Callable[[Any], Any]) -> Callable[[dict[str, Any]], None]:
-    """Return a function that changes a record's value at `path`, as in ``scene.run``, if any."""
+    """Return a function that changes the value at `path`, such as ``scene.run``, of a record."""
     *outer, last = path.split(".")
 
     def changed(record: dict[str, Any]) -> None:

@@ -104,7 +104,7 @@ def _crossing(method: str, case: int, error: Callable[[int], float], name: Name)
 
 
 def _error(scene: Scene, name: str, case: int, listing: Listing | None) -> tuple[float, str]:
-    """Return the final error of omega, relative or infinite for an incomplete run, and a note."""
+    """Return the final relative error of omega, infinite if the run is incomplete, and a note."""
     largest = _path(case).flow.largest
 
     def error(omega: Array) -> float:

@@ -38,8 +38,8 @@ OPTIONS = {
     "--scan FILE": "Compare our text of the cards, character by character, with this file, an OCR "
     "text of the thesis.",
     **shared.outputs(FORMATS, plot=""),
-    "--format F": f"Output format: {FORMATS[0]} (default), {', '.join(FORMATS[1:])}. tei has all "
-    "cards and notes in TEI, the XML format of text editions.",
+    "--format F": f"Output format: {FORMATS[0]} (default), {', '.join(FORMATS[1:])} (all cards and "
+    "notes in TEI, the XML format of text editions).",
 }
 GROUPS = {"instead of cards": "classes collate origins second-reading scan"}
 EXAMPLE = "cards runge-kutta:860"

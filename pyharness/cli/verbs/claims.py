@@ -23,9 +23,9 @@ OPTIONS = {
     "--word W": f"Arithmetic of the programs: {', '.join(WORD_NAMES)} (default "
     f"{WORD_NAMES[0]}). cdc48 truncates results, as CDC computers did; cdc48-rounded rounds "
     "them. Not with --assignments, --evidence or --atlas.",
-    "--evidence": "For each combination of initial angular velocity, interpretation of doubtful "
-    "program lines, assumptions about missing lines, and number of steps, count the claims that "
-    "hold.",
+    "--evidence": "Count the claims that hold for each combination of initial angular velocity, "
+    "interpretation of doubtful program lines, assumptions about missing lines, and number of "
+    "steps.",
     "--atlas STORE": "Show for which initial angular velocities the claims hold. STORE is the "
     "folder in which `pyharness sweep` stored the results; needs --sweep.",
     "--sweep FILE.toml": "Sweep file from which STORE was computed; needs --atlas.",

@@ -16,7 +16,7 @@ OPTIONS = {
     "reading (line that can be read in two ways), conjecture (assumption about a missing line), "
     "misreading (character wrongly recognized in the scan), 'missing text' (lost cards or pages), "
     "normalization (name made uniform), dialect (peculiar to the machine's FORTRAN), redundant, "
-    "unread or unreachable (code without effect). Not with NAME.",
+    "unread (value never used) or unreachable (never executed). Not with NAME.",
     **shared.outputs(FORMATS, plot=""),
 }
 EXAMPLE = "defects stage-base"

@@ -17,8 +17,8 @@ _DIGITS = 25
 _MARK = FORMAT.rpartition("-")[0].encode()  # in certificates of every version
 OPTIONS = {
     **shared.SCENE,
-    "--times T1,T2,...": "Times of the results, in s, all positive or all negative (the first may "
-    "be 0), in order of increasing distance from 0 (default: the end of the scene's last step).",
+    "--times T1,T2,...": "Times of the results (s), of one sign and increasing in size; the first "
+    "may be 0 (default: the end of the scene's last step).",
     "--digits D": f"Number of digits, 1 to {MOST_DIGITS} (default {_DIGITS}): the half-width of "
     "each interval of omega is at most 10**-D rad/s, or 10**-D of the largest component if that "
     "exceeds 1 rad/s.",

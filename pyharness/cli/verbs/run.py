@@ -29,8 +29,8 @@ PROGRAM_FORMATS = ("printer", "tape5")
 FORMATS = (*shared.FORMATS, *PROGRAM_FORMATS)
 OPTIONS = {
     **shared.SCENE,
-    "--program P": f"Program: {', '.join(PROGRAMS)}.",
-    "--implementation I": "Language: fortran (default with binary64) or python.",
+    "--program P": f"This program: {', '.join(PROGRAMS)}.",
+    "--implementation I": "Language: fortran (default for binary64) or python (default otherwise).",
     "--word W": f"Arithmetic: {', '.join(WORD_NAMES)} (default {WORD_NAMES[0]}; cdc48: CDC "
     f"computers). In Fortran only {', '.join(COMPILED_WORDS)}.",
     "--method M": "Method (list: docs/reference/methods.md; with --scene, default auto).",

@@ -140,7 +140,7 @@ def small_step(bench: Bench, cases: Sequence[int], exception: int) -> Grade:
 
 
 def small_step_runge_kutta(bench: Bench, cases: Sequence[int]) -> Grade:
-    """Test whether a tenth of the step size does not improve Runge-Kutta without the stop test."""
+    """Judge that Runge-Kutta without the stop test is no better at a tenth of the step size."""
     numbers = {}
     for case in cases:
         before, after = (

@@ -34,9 +34,10 @@ _FIRST_CHANGE = 0.01
 _MOST_GROWTH = 10.0
 # An event at a switch is 0 there, but for rounding, which hides its sign until a short step later.
 _AFTER_SWITCH = 0.01  # times the step that ended at the switch
-# After this many successive steps to switches, each of a few units in the last place of the time,
-# the switch changes back and forth without end.
-_MOST_SWITCHES, _SHORT = 100, 16
+# After this many steps to switches, among successive steps of at most _SHORT units in the last place
+# of the time, the switch changes back and forth without end. If a motion loses a share c of its
+# speed between two switches, rounded times keep its steps near 2/c units.
+_MOST_SWITCHES, _SHORT = 100, 128
 _FIRST_PARTS = 1e-12, 1e-2  # least and largest first step, in steps that the tolerances allow
 
 
@@ -125,7 +126,7 @@ class Taylor(OdeSolver):  # type: ignore[misc]
         span = abs(self.t_bound - self.t)
         self._trial = min(span, LONGEST_TRIAL)
         self._terms = np.zeros((1, self.n))
-        self._short_steps = 0  # in succession, each to a switch
+        self._switches = 0  # reached by steps of at most _SHORT units, in succession
         if first_step is None:
             self._longest = self._first_step(span)
         else:
@@ -186,9 +187,9 @@ class Taylor(OdeSolver):  # type: ignore[misc]
         self._longest = max(self._longest, _MOST_GROWTH * abs(step.h))
         if step.is_switched:
             self._longest = max(_AFTER_SWITCH * self._trial, 10.0 * math.ulp(end))
-        is_short = step.is_switched and abs(step.h) <= _SHORT * math.ulp(end)
-        self._short_steps = self._short_steps + 1 if is_short else 0
-        if self._short_steps > _MOST_SWITCHES:
+        is_short = abs(step.h) <= _SHORT * math.ulp(end)
+        self._switches = self._switches + step.is_switched if is_short else 0
+        if self._switches > _MOST_SWITCHES:
             return False, str(TimedError(SLIDING, self.t))
         self.t = self.t_bound if is_cut and longest == rest else end
         self.y = step.state

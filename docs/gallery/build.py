@@ -29,9 +29,9 @@ NOTEBOOKS = HERE.parents[1] / "build" / "notebooks"
 """The folder of the notebooks."""
 
 _HEAD = """
-Each example answers a question by a short program, a picture and numbers. In a script,
-`figure.savefig("picture.png")` saves the picture. The web pages offer Jupyter notebooks, which
-`python -m docs.gallery.build` writes to `build/notebooks`.
+Each example answers a question by a short program, a picture and numbers. Run as a script, an
+example saves its picture if you add `figure.savefig("picture.png")`. The web pages offer Jupyter
+notebooks, which `python -m docs.gallery.build` writes to `build/notebooks`.
 """
 
 

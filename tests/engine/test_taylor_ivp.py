@@ -168,6 +168,18 @@ def test_a_switch_without_end_fails(start: float) -> None:
     assert time == pytest.approx(start)
 
 
+def test_many_switches_or_short_steps_do_not_fail() -> None:
+    def switched(t: Any, y: Any) -> Any:
+        return np.sign(np.sin(1e6 * t)) - y
+
+    found = solve_ivp(switched, (1.0, 1.001), [0.0], method=Taylor)
+    assert found.success
+    assert len(found.t) > 300
+    short = 64.0 * math.ulp(1.0)
+    end = 1.0 + 200.0 * short
+    assert solve_ivp(pendulum, (1.0, end), [1.0, 0.0], method=Taylor, max_step=short).t[-1] == end
+
+
 @pytest.mark.parametrize("friction", [0.1, 0.2, 0.9])
 def test_switches_whose_intervals_shrink_to_nothing_fail(friction: float) -> None:
     def twisting(t: Any, y: Any) -> Any:

@@ -42,9 +42,8 @@ def run(options: argparse.Namespace) -> int:
         shared.progress(names.index(check.suite), len(names), check.id)
         checks.append(check)
     shared.end_progress()
-    missing = without_check(only, checks)
-    if missing or not checks:
-        raise unknown("check", ",".join(missing or only), trials or TRIALS, "--only")
+    if missing := without_check(only, checks):
+        raise unknown("check", ",".join(missing), trials or TRIALS, "--only")
     failed = [check for check in checks if not check.passed]
     if options.save is not None:
         _save(options.save, checks)

@@ -251,6 +251,7 @@ def test_run_says(options: str, words: str, printed: Printed) -> None:
     ("line", "told"),
     [
         ("plan --case 3 --times 1,2,1", "times: not strictly monotonic"),
+        ("deck --program two-term --terms 5", "terms: not for this program; allowed: with"),
         ("deck --program runge-kutta --terms 5", "terms: not for this program; allowed: with"),
         ("deck --program four-term --terms 4", "terms is 4; allowed: 3 or 5"),
     ],

@@ -34,9 +34,9 @@ _FIRST_CHANGE = 0.01
 _MOST_GROWTH = 10.0
 # An event at a switch is 0 there, but for rounding, which hides its sign until a short step later.
 _AFTER_SWITCH = 0.01  # times the step that ended at the switch
-# After this many steps to switches, among successive steps of at most _SHORT units in the last place
-# of the time, the switch changes back and forth without end. If a motion loses a share c of its
-# speed between two switches, rounded times keep its steps near 2/c units.
+# After this many steps to switches, among successive steps of at most _SHORT units in the last
+# place of the time, the switch changes back and forth without end. If a motion loses a share c of
+# its speed between two switches, rounded times keep its steps near 2/c units.
 _MOST_SWITCHES, _SHORT = 100, 128
 _FIRST_PARTS = 1e-12, 1e-2  # least and largest first step, in steps that the tolerances allow
 

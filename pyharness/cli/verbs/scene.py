@@ -17,8 +17,8 @@ FORMATS = ("table", "json")
 _ACTIONS = ("new", "check", "schema")
 _NEW = Path(__file__).with_name("brick.toml")
 OPTIONS = {
-    "action ACTION": "One of new (write a sample scene file), check (a scene FILE) or schema (print "
-    "the JSON Schema of scene files).",
+    "action ACTION": "One of new (write a sample scene file), check (a scene FILE) or schema "
+    "(print the JSON Schema of scene files).",
     "file FILE": "Scene file to check (only with check, which requires it).",
     "--case N": "With new, write the scene of this case of the thesis, 1 to 7 (default: a brick, "
     "with every section of a scene file).",

@@ -278,7 +278,9 @@ def test_the_steps_of_a_recorded_torque_are_read_and_nothing_is_solved_again(
 ) -> None:
     recorded = {
         "full": replace(SCENES["full"], torque=torques.damping([0.1, 0.2, 0.3])),
-        "turning": replace(SCENES["full"], torque=lambda t, w, q: [0.3 * q[1], q[2] * q[0], 0.0]),
+        "turning": replace(
+            SCENES["full"], torque=torques.recorded(lambda t, w, q: [0.3 * q[1], q[2] * q[0], 0.0])
+        ),
         # In another unit of time.
         "fast": Scene("fast", (1e200, 2e200, 1e199), MOMENTS, torque=torques.damping(1e199)),
     }

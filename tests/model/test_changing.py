@@ -166,7 +166,7 @@ def test_scene_has_changing_moments_in_place_of_constant_ones() -> None:
     assert pickle.loads(pickle.dumps(scene)) == scene
     assert hash(scene) == hash(Scene("booms", (0.0, 1.0, 1.0), changing=BOOMS))
     with pytest.raises(InputError, match="has inertia and changing; allowed: one of them"):
-        replace(scene, inertia=np.diag([2.0, 3.0, 4.0]))
+        replace(scene, inertia=((2.0, 0.0, 0.0), (0.0, 3.0, 0.0), (0.0, 0.0, 4.0)))
 
 
 @pytest.mark.parametrize("more", [[], [0.0], [0.0, -0.0]])

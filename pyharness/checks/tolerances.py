@@ -55,7 +55,7 @@ def finest_and_middling(name: str, scene: Scene, time: float) -> list[float]:
 
 
 def affordable(name: str, scene: Scene, time: float, flow: Conditioning) -> list[float | None]:
-    """Return the tolerances at which a method is checked until `time` (s); None is a fixed step."""
+    """Return the tolerances at which a method is fast enough to check; None is a fixed step."""
     if name in FIXED_STEP:
         return [None]
     if name == "closed-form" or (name == "auto" and closed_form(scene)):

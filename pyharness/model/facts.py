@@ -14,7 +14,7 @@ _FOLDER = _PACKAGE / "data"
 
 @cache
 def facts(name: str) -> dict[str, Any]:
-    """Return the content of ``data/<name>.toml``, a dictionary that callers must not change."""
+    """Return the content of ``data/<name>.toml``, which callers must not change."""
     with open(_FOLDER / f"{name}.toml", "rb") as file:
         return tomllib.load(file)
 

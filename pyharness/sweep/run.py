@@ -48,7 +48,7 @@ def forecast(sweep: Sweep, path: str, n_missing: int, own: Engine) -> float:
     """Return the time (s) to solve and write missing chunks, and to read all chunks."""
     write, read = seconds_of_files(sweep, path)
     solve = n_missing * seconds_per_chunk(sweep) / own.workers
-    # Other processes solve while this one writes.
+    # With other executors, other processes solve while this one writes.
     together = solve + n_missing * write if own.is_here else max(solve, n_missing * write)
     return together + sweep.n_chunks * read
 

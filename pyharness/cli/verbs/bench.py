@@ -25,8 +25,8 @@ _TERM_BODIES = 1000
 _OPTION_OF = {"method": "--method", "peer": "--peers"}
 OPTIONS = {
     "--case N": "Only this case of the thesis, 1 to 7 (default: 2 to 7; with --attitude, all).",
-    "--horizon T": "End time of each integration in s, up to 1000 (default 3; for some cases 100 "
-    "too).",
+    "--horizon T": "End time of each integration in s, up to 1000 (default 3, in Cases 3 and "
+    "4 also 100; with --attitude also 100, except in Case 6).",
     "--draws N": "Instead of the cases, measure N random scenes, 1 to 10000.",
     "--ensemble": "Measure run times and memory of calls that solve many bodies.",
     "--terms": "Measure scenes whose torques depend on angular velocity, time and attitude, with "
@@ -37,8 +37,8 @@ OPTIONS = {
     "--attitude": "Measure the attitude (orientation) too.",
     "--method M,...": "Only these of our methods and programs (names: first column of the result; "
     "`none` for no method; default: all).",
-    "--peers NAME,...": "Only these third-party solvers (names: first column of the result, or "
-    "heyoka, numba, scipy; `none` for no solver; default: all installed).",
+    "--peers NAME,...": "Only these third-party solvers (names: first column of the result; "
+    "heyoka, numba, scipy: all of this package; `none` for no solver; default: all installed).",
     "--compiled": "With --terms, compile all torques with the C compiler first.",
     "--plan": "Measure the time saved by each omitted computation (see `pyharness plan`).",
     "--growth": "Measure how the error of the Taylor method grows up to 1e5 s, in Cases 3 and 4.",

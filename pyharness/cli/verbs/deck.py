@@ -16,8 +16,8 @@ OPTIONS = {
     "--case N": "Put the data of this case of the thesis, 1 to 7, on the cards (default, as "
     "published: 5 for runge-kutta, otherwise 2).",
     **{each: shared.LISTING[each] for each in list(shared.LISTING)[:5]},
-    "--dialect D": f"Form of the deck: {', '.join(DIALECTS)} (default {DIALECTS[0]}: as printed; "
-    "gfortran: for GNU Fortran; ftn: batch job for CDC computers).",
+    "--dialect D": "Form of the deck: 1982 (default; as printed), gfortran (for GNU Fortran) or "
+    "ftn (batch job for CDC computers).",
     "--system S": f"With --dialect ftn, operating system: {' or '.join(SYSTEMS)} (default nos).",
     "--round": "With --dialect ftn, round results to nearest (default: truncate).",
     "--terms N": "With --program four-term, write our conjecture of the unprinted deck for N "

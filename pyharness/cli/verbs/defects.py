@@ -12,7 +12,7 @@ OPTIONS = {
     "NAME is a name or card (line number), as in stage-base, 1660 or two-term:1660. Default: list "
     "the defects that change results.",
     "--all": "List all entries (JSON always has all); not with NAME.",
-    "--kind K": "List only entries of this kind: defect (fault of the author of the programs), "
+    "--kind K": "List only entries of this kind: defect (the author's fault), "
     "reading (line that can be read in two ways), conjecture (assumption about a missing line), "
     "misreading (character wrongly recognized in the scan), 'missing text' (lost cards or pages), "
     "normalization (name made uniform), dialect (peculiar to the machine's FORTRAN), redundant, "

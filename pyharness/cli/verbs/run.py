@@ -17,7 +17,6 @@ from pyharness.model.scene_report import ending
 from pyharness.model.trajectory import Trajectory
 from pyharness.thesis.programs import (
     BINARY64,
-    COMPILED_WORDS,
     IMPLEMENTATIONS,
     WORD_NAMES,
     checked_word,
@@ -31,8 +30,8 @@ OPTIONS = {
     **shared.SCENE,
     "--program P": f"This program: {', '.join(PROGRAMS)}.",
     "--implementation I": "Language: fortran (default for binary64) or python (default otherwise).",
-    "--word W": f"Arithmetic: {', '.join(WORD_NAMES)} (default {WORD_NAMES[0]}; cdc48: CDC "
-    f"computers). In Fortran only {', '.join(COMPILED_WORDS)}.",
+    "--word W": f"Arithmetic: {', '.join(WORD_NAMES)} (default {WORD_NAMES[0]}). cdc48 "
+    "truncates, as CDC computers did; cdc48-rounded rounds; both only with python.",
     "--method M": "Method (list: docs/reference/methods.md; with --scene, default auto).",
     **shared.LISTING,
     "--times T1,T2,...": "Times of the results (s), also negative, ascending or descending "

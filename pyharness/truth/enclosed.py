@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from pyharness.model.scene import Scene
 
+_LARGEST = 1e308  # largest radius of an energy, J
 _LEAST = 1e-4  # least square of a unit of errors; the largest unit is 1
 
 
@@ -58,6 +59,8 @@ def with_energy(scene: Scene, found: Enclosure) -> Enclosure:
         pairs = list(zip(moments, middle, strict=True))
         energy = sum((i * w * w / 2 for i, w in pairs), Fraction(0))
         error = sum((i * (abs(w) * radius + radius * radius / 2) for i, w in pairs), Fraction(0))
+        if error > _LARGEST:  # a radius is a binary64 number
+            return found
         energies.append(Balls((energy,), error))
     return replace(found, energy=tuple(energies))
 

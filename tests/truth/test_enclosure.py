@@ -215,6 +215,11 @@ def test_energy_of_a_torque_free_body_is_constant() -> None:
     assert enclose(SCENES["coefficients"], [1.0], 5).energy is None
 
 
+def test_energy_beyond_binary64_is_left_out() -> None:
+    found = enclose(Scene(moments=(3.0, 2.0, 1.0), omega=(1e200, 1.0, 1.0)), [1.0], 25)
+    assert found.energy is None and len(found.rows()) == 1
+
+
 @pytest.mark.parametrize("digits", [1, 3, 40])
 def test_requested_digits_are_reached(digits: int) -> None:
     for scene in (case_scene(3), case_scene(5), SCENES["functions"]):

@@ -81,9 +81,17 @@ def enclose_steps(
                         raise InputError(f"prove: more than {limit:.0f} steps; {instead}")
                     proof.step(time)
                     steps += 1
+                    if proof.is_lost():
+                        break
                     at = float(proof.time)
                     progress(int(abs(at / times[-1]) * 100), 100, f"t = {at:.4g} s")
+                if proof.is_lost():
+                    break
                 found.append(proof.balls(scene.attitude is not None))
+        if proof.is_lost():  # further steps would be short, slow and useless
+            share = max(abs(float(proof.time) / times[-1]), 1e-3)
+            wanted += min((digits + proof.log10_radius()) / share, 2.0 * wanted) + 1.0
+            continue
         excess = largest_radius([each[0] for each in found], digits)
         if excess <= 1:
             omega, *others = zip(*found, strict=True)
@@ -257,6 +265,14 @@ class _Proof:
     def norm(self, errors: Sequence[Any], block: slice) -> Any:
         parts = zip(errors[block], self.scales[block], strict=True)
         return _upper(sum((_upper(abs(x) / s) ** 2 for x, s in parts), arb(0)).sqrt())
+
+    def is_lost(self) -> bool:
+        """Return whether the radius of omega exceeds both omega and 1 rad/s."""
+        sizes = zip(self.middle[:3], self.scales, strict=False)
+        return bool(all(self.radii[0] > abs(x) / s for x, s in sizes) and self.radii[0] > 1)
+
+    def log10_radius(self) -> float:
+        return _log2(self.radii[0]) * math.log10(2.0)
 
     def balls(self, attitude: bool) -> list[Balls]:
         """Return the balls of each block of unknowns; with `attitude`, block 1 is normalised."""

@@ -217,7 +217,8 @@ def test_energy_of_a_torque_free_body_is_constant() -> None:
 
 def test_energy_beyond_binary64_is_left_out() -> None:
     found = enclose(Scene(moments=(3.0, 2.0, 1.0), omega=(1e200, 1.0, 1.0)), [1.0], 25)
-    assert found.energy is None and len(found.rows()) == 1
+    assert found.energy is None
+    assert len(found.rows()) == 1
 
 
 @pytest.mark.parametrize("digits", [1, 3, 40])
@@ -237,6 +238,12 @@ def test_first_balls_contain_omega(digits: int) -> None:
     found = enclose(scene, [0.0], digits).omega[0]
     for x, exact in zip(found.middle, scene.omega, strict=True):
         assert abs(x - Fraction(exact)) <= found.radius
+
+
+def test_an_attempt_ends_when_the_radius_exceeds_omega() -> None:
+    scene = Scene(coefficients=(-1.0, 2.8, 1.8), omega=(-2.0, -2.3, 1.9))
+    found = enclose_steps(scene, [4.0], 8, effort=0.05)
+    assert found.omega[0].radius < 1e-8
 
 
 def test_solution_is_enclosed_until_shortly_before_it_is_infinite() -> None:

@@ -72,25 +72,23 @@ def enclose_steps(
             # The steps change python-flint's global length of power series.
             afterwards.callback(setattr, ctx, "cap", ctx.cap)
             proof = _Proof(Equations(scene, velocity, transition), wanted, times[-1] >= 0.0)
-            found, steps = [], 0
+            found, steps, share = [], 0, 1e-3
             for time in map(Fraction, times):
-                while proof.time != time:
+                while proof.time != time and not proof.is_lost:
                     if steps >= limit:
-                        share = max(abs(float(proof.time)) / abs(times[-1]), 1e-3)
                         instead = advice("use a shorter time", effort, effort / share)
                         raise InputError(f"prove: more than {limit:.0f} steps; {instead}")
                     proof.step(time)
                     steps += 1
-                    if proof.is_lost():
-                        break
-                    at = float(proof.time)
-                    progress(int(abs(at / times[-1]) * 100), 100, f"t = {at:.4g} s")
-                if proof.is_lost():
+                    at = abs(float(proof.time) / times[-1])
+                    share = max(at, share)
+                    progress(int(at * 100), 100, f"t = {float(proof.time):.4g} s")
+                if proof.is_lost:
                     break
                 found.append(proof.balls(scene.attitude is not None))
-        if proof.is_lost():  # further steps would be short, slow and useless
-            share = max(abs(float(proof.time) / times[-1]), 1e-3)
-            wanted += min((digits + proof.log10_radius()) / share, 2.0 * wanted) + 1.0
+        if len(found) < len(times):
+            # Further steps would be short and slow, and the next attempt needs more digits.
+            wanted += min((digits + proof.log10_radius) / share, 2.0 * wanted) + 1.0
             continue
         excess = largest_radius([each[0] for each in found], digits)
         if excess <= 1:
@@ -266,11 +264,13 @@ class _Proof:
         parts = zip(errors[block], self.scales[block], strict=True)
         return _upper(sum((_upper(abs(x) / s) ** 2 for x, s in parts), arb(0)).sqrt())
 
+    @property
     def is_lost(self) -> bool:
-        """Return whether the radius of omega exceeds both omega and 1 rad/s."""
+        """Whether the radius of omega exceeds omega and 1 rad/s."""
         sizes = zip(self.middle[:3], self.scales, strict=False)
-        return bool(all(self.radii[0] > abs(x) / s for x, s in sizes) and self.radii[0] > 1)
+        return all(bool(self.radii[0] > max(1, abs(x) / s)) for x, s in sizes)
 
+    @property
     def log10_radius(self) -> float:
         return _log2(self.radii[0]) * math.log10(2.0)
 

@@ -87,8 +87,8 @@ def enclose_steps(
                     break
                 found.append(proof.balls(scene.attitude is not None))
         if len(found) < len(times):
-            # Further steps would be short and slow, and the next attempt needs more digits.
-            wanted += min((digits + proof.log10_radius) / share, 2.0 * wanted) + 1.0
+            # Further steps would be short and slow.
+            wanted *= 2.0
             continue
         excess = largest_radius([each[0] for each in found], digits)
         if excess <= 1:
@@ -269,10 +269,6 @@ class _Proof:
         """Whether the radius of omega exceeds omega and 1 rad/s."""
         sizes = zip(self.middle[:3], self.scales, strict=False)
         return all(bool(self.radii[0] > max(1, abs(x) / s)) for x, s in sizes)
-
-    @property
-    def log10_radius(self) -> float:
-        return _log2(self.radii[0]) * math.log10(2.0)
 
     def balls(self, attitude: bool) -> list[Balls]:
         """Return the balls of each block of unknowns; with `attitude`, block 1 is normalised."""

@@ -242,8 +242,17 @@ def test_first_balls_contain_omega(digits: int) -> None:
 
 def test_an_attempt_ends_when_the_radius_exceeds_omega() -> None:
     scene = Scene(coefficients=(-1.0, 2.8, 1.8), omega=(-2.0, -2.3, 1.9))
-    found = enclose_steps(scene, [4.0], 8, effort=0.05)
-    assert found.omega[0].radius < 1e-8
+    found = enclose_steps(scene, [7.0], 1, effort=0.08)
+    assert found.omega[0].radius < 0.1
+
+
+def test_an_omega_that_is_large_or_0_needs_one_attempt() -> None:
+    fast = Scene("", (1e20, 2e20, 1e20), moments=(1.0, 2.0, 3.0))
+    assert 1.0 < enclose_steps(fast, [1e-20], 8).omega[0].radius < 1e12
+    torque = TorqueLaw((-1.0, 0.0, 0.0))
+    braked = Scene("", (1.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=torque)
+    first, second = enclose_steps(braked, [1.0, 2.0], 8).omega
+    assert (first.middle[0], second.middle[0]) == (0, -1)
 
 
 def test_solution_is_enclosed_until_shortly_before_it_is_infinite() -> None:

@@ -6,8 +6,9 @@ module tape_live
   use operations, only: ARCSINE => ASIN, ARCTANGENT => ATAN, LINEAR, LOGARITHM => LOG, PRODUCT, &
                         QUOTIENT, SELECT_OF => SELECT, TABLE
   use tape, only: arrays_of, tape_t
-  use tape_series, only: begin_work, chosen, derivatives_at, series_t, value_of
+  use tape_series, only: begin_work, derivatives_at, series_t
   use tape_switches, only: switches_t, update
+  use tape_values, only: chosen, value_of
   implicit none(type, external)
   private
 

@@ -7,6 +7,7 @@ module tape_march
   use statuses, only: COMPLETE, OVERFLOW, SLIDING
   use step_limit, only: check_steps, limit_of, step_limit_t
   use tape, only: next_break, tape_t
+  use tape_crossings, only: CROSSES, IS_CHANGED, next_crossing, resolve_switches, SLIDES, STAYS
   use tape_error, only: add_noise, begin_block, begin_error, cross_error, error_t, &
                         estimate_truncation, fitting_lanes, matrix_of, perturb, set_lanes, &
                         take_error
@@ -20,8 +21,7 @@ module tape_march
   use tape_state, only: begin_state, keep_guesses, LEAST_OWN, LEAST_SCALE, reach, &
                         set_first_terms, state_t, weigh
   use tape_steady, only: find_varying, near_zero, resolving
-  use tape_switches, only: CROSSES, follow, IS_CHANGED, jump_at, next_crossing, &
-                           operand_error, resolve_switches, SLIDES, STAYS, switches_t
+  use tape_switches, only: follow, jump_at, operand_error, switches_t
   use two_words, only: two_sum
   implicit none(type, external)
   private

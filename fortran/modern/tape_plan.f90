@@ -4,7 +4,8 @@ module tape_plan
   use operations, only: EXPONENTIAL => EXP, QUOTIENT, SQUARE_ROOT => SQRT, TANGENT => TANH
   use tape, only: FIRST_UNKNOWN, tape_t
   use tape_powers, only: INVISIBLE, powers_t, resolve
-  use tape_series, only: LARGE_ARGUMENT, LAST_TERM, MOST_ORDER
+  use tape_series, only: MOST_ORDER
+  use tape_values, only: LARGE_ARGUMENT, LAST_TERM
   implicit none(type, external)
   private
 

@@ -1,7 +1,7 @@
 module tape_roots
   !! The first root of a Taylor polynomial in a step.
   use kinds, only: dp
-  use tape_series, only: LAST_TERM
+  use tape_values, only: LAST_TERM
   implicit none(type, external)
   private
 

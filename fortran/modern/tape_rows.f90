@@ -7,8 +7,9 @@ module tape_rows
   use step_nodes, only: AT_ONCE, powers_of, sum_at_nodes
   use tape, only: FIRST_UNKNOWN
   use tape_error, only: error_t
-  use tape_series, only: LAST_TERM, MOST_ORDER, series_t, SIDE_BY_SIDE
+  use tape_series, only: MOST_ORDER, series_t, SIDE_BY_SIDE
   use tape_state, only: rotate, state_t
+  use tape_values, only: LAST_TERM
   implicit none(type, external)
   private
 

@@ -5,12 +5,12 @@ module tape_step
   use problem, only: step_request_t, step_t
   use statuses, only: COMPLETE, OVERFLOW, SLIDING
   use tape, only: FIRST_UNKNOWN, tape_t, TIME_SLOT
+  use tape_crossings, only: CROSSES, IS_CHANGED, next_crossing, resolve_switches, SLIDES, STAYS
   use tape_live, only: keep_live, settle
   use tape_plan, only: converge, fitting, LONGER, MOST_TRIES, order_for
   use tape_roots, only: size_of
   use tape_series, only: allocate_series, derivatives_at, expand, noise_of, series_t
-  use tape_switches, only: change, CROSSES, find_switches, IS_CHANGED, next_crossing, &
-                           operand_error, resolve_switches, SLIDES, STAYS, switches_t, update
+  use tape_switches, only: change, find_switches, operand_error, switches_t, update
   implicit none(type, external)
   private
 

@@ -265,7 +265,7 @@ FLOATS: Functions[float] = Functions(
     float, _sqrt, exponential, math.tanh, sine, cosine, _value, logarithm, math.atan, arcsine, step,
     whole, selected,
 )  # fmt: skip
-# Exponentials of larger arguments are replaced by powers of 2, as in tape_series.f90.
+# Exponentials of larger arguments are replaced by powers of 2, as in tape_values.f90.
 _LARGE_ARGUMENT = 210.0
 # Replacements of exponentials of very negative arguments, by kind.
 _SMALL = {"large": 2.0**-303, "moderate": 2.0**-140}

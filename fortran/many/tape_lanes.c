@@ -451,7 +451,7 @@ static lanes power_of(lanes x, int exponent)
   return power;
 }
 
-/* Return the truncation error of each unknown, as estimate_truncation in tape_march.f90. */
+/* Return the truncation error of each unknown, as estimate_truncation in tape_error.f90. */
 static void set_truncation(const struct group *g, lanes factor, lanes *left)
 {
   const int order = g->order;

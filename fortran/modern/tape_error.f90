@@ -116,7 +116,7 @@ contains
   end subroutine perturb
 
   type(tape_arrays_t) function arrays_of_block(s, block)
-    !! Return what tape_terms.c reads of the tape, with a block of perturbations.
+    !! Return what tape_perturbations.c reads of the tape, with a block of perturbations.
     type(series_t), intent(in) :: s
     integer, intent(in) :: block
 

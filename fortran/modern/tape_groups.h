@@ -9,7 +9,7 @@
 #include "tape.h"
 
 enum { SIDE_BY_SIDE = 8, TERMS = SERIES_LENGTH, TERMS_OF_PERTURBATION = PERTURBATION_LENGTH };
-typedef double row[SIDE_BY_SIDE];
+typedef double row[SIDE_BY_SIDE], series[TERMS];
 
 /* The Jacobian is computed at two or four nodes of a step, from as many terms as the least order has. */
 enum { FEW_NODES = 2, NODES = 4, TERMS_AMID = 16 };
@@ -58,6 +58,14 @@ struct work {
   int *ordered;           /* operations in the order of their levels */
   int *begins;            /* of the operations of a kind and level among them */
 };
+
+/* Return the slot that SELECT chooses: the only one of its combination, or of the next one. */
+static inline int chosen(const struct tape *tape, const int *operation)
+{
+  const series *const a = tape->a;
+  const int combination = operation[2] - 1 + (a[operation[1] - 1][0] == 0.0);
+  return tape->slots[tape->starts[combination] - 1] - 1;
+}
 
 /* Kinds of operations that are ordered. */
 enum { OF_PRODUCTS, OF_COMBINATIONS, OF_OTHERS, N_KINDS };

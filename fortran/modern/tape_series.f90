@@ -36,14 +36,14 @@ module tape_series
     real(dp), pointer, contiguous :: blocks(:, :, :, :) => null()
     real(dp), allocatable :: noise(:)       !! (slots): rounding errors of terms 0, in units
     type(powers_t) :: powers
-    type(tape_arrays_t) :: arrays           !! what tape_terms.c reads of the tape
+    type(tape_arrays_t) :: arrays           !! what the files in C read of the tape
     !! Combinations that matter beside the rates; 0 for none.
     integer, pointer, contiguous :: forcings(:, :) => null()
   end type series_t
 
   ! Derivatives of the unknowns with respect to eight parameters, side by side.
   type, bind(c), public :: block_t
-    type(tape_arrays_t) :: arrays  !! what tape_terms.c reads of the tape
+    type(tape_arrays_t) :: arrays  !! what tape_variations.c reads of the tape
     !! The combination that is the partial derivative of a rate; 0 for none.
     integer(c_int) :: forcings(SIDE_BY_SIDE, MOST_UNKNOWNS)
     integer(c_int) :: last_term    !! of the series in this step
@@ -215,7 +215,7 @@ contains
         memory(at:at + n_perturbations - 1)
       perturbations = c_loc(s%blocks)
     end if
-    ! Of three unknowns, tape_terms.c leaves half of the lanes out; tiny numbers there cost time.
+    ! Of three unknowns, tape_perturbations.c leaves half of the lanes out; tiny numbers there cost time.
     if (tape%n_unknowns == 3) memory(at:at + n_perturbations - 1) = 0.0_dp
     at = at + n_perturbations + SIDE_BY_SIDE - 1
     n_given = (LAST_TERM + 1)*min(N_INPUTS, tape%n_slots)

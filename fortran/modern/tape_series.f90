@@ -215,7 +215,8 @@ contains
         memory(at:at + n_perturbations - 1)
       perturbations = c_loc(s%blocks)
     end if
-    ! Of three unknowns, tape_perturbations.c leaves half of the lanes out; tiny numbers there cost time.
+    ! Of three unknowns, tape_perturbations.c leaves out half of the lanes, where tiny numbers would
+    ! cost time.
     if (tape%n_unknowns == 3) memory(at:at + n_perturbations - 1) = 0.0_dp
     at = at + n_perturbations + SIDE_BY_SIDE - 1
     n_given = (LAST_TERM + 1)*min(N_INPUTS, tape%n_slots)

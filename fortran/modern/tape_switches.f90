@@ -14,7 +14,7 @@ module tape_switches
   integer, parameter, public :: LOWER = 1, UPPER = 2 ! levels on which an operand may be
   real(dp), parameter, public :: ZERO_TERM = 1e-13_dp   ! part of the terms that is a rounding error
   real(dp), parameter :: ROUNDED = 1e-14_dp     ! rounding error of an operand, over its terms
-  real(dp), parameter, public :: FAR = 1e-8_dp          ! part of the terms that is no rounding error
+  real(dp), parameter, public :: FAR = 1e-8_dp  ! part of the terms that is no rounding error
 
   type, public :: switches_t
     integer :: n = 0

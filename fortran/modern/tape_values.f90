@@ -1,6 +1,6 @@
 module tape_values
-  !! The values (terms 0) of all slots of a tape. Where the exponential of a large argument overflows
-  !! but does not matter, a smaller number replaces it.
+  !! The values (terms 0) of all slots of a tape. Where the exponential of a large argument
+  !! overflows but does not matter, a smaller number replaces it.
   use kinds, only: dp
   use operations, only: ARCSINE => ASIN, ARCTANGENT => ATAN, EXPONENTIAL => EXP, &
                         FLOOR_OF => FLOOR, LINEAR, LOGARITHM => LOG, PRODUCT, QUOTIENT, &

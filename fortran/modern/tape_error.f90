@@ -26,8 +26,8 @@ module tape_error
     logical :: is_short                ! whether the terms of perturbations do not suffice
     real(dp) :: varied                 ! largest term of a perturbation that is left out
     real(dp), pointer, contiguous :: left(:) ! truncation error of the step
-    ! Squares of rounding errors: of all steps, and since a block of steps was closed.
-    real(dp), pointer, contiguous, dimension(:) :: noise, noise_of_block
+    real(dp), pointer, contiguous :: noise(:) ! squares of the rounding errors of all steps
+    real(dp), pointer, contiguous :: noise_of_block(:) ! of those since a block of steps was closed
   end type error_t
 
   public :: add_noise, begin_block, begin_error, cross_error, estimate_truncation, fitting_lanes, &

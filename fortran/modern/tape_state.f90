@@ -20,7 +20,8 @@ module tape_state
     integer :: first_own           ! number of the first state of the user's own
     logical :: has_attitude
     real(dp) :: t(2)               ! time and its rounding error, s
-    real(dp), pointer, contiguous, dimension(:) :: y, y_low ! unknowns and their rounding errors
+    real(dp), pointer, contiguous :: y(:)         ! unknowns
+    real(dp), pointer, contiguous :: y_low(:)     ! their rounding errors
     real(dp) :: scale              ! largest omega, rad/s
     real(dp), pointer, contiguous :: own_sizes(:) ! of own states: the largest so far
     real(dp), pointer, contiguous :: weights(:)   ! which make the unknowns comparable

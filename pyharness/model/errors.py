@@ -102,6 +102,11 @@ def kind_of(value: object) -> str:
     return f"a {type(value).__name__}"
 
 
+def kind_or_empty(value: object) -> str:
+    """Return "empty" for an empty list, else the type in words."""
+    return "empty" if isinstance(value, list) and not value else kind_of(value)
+
+
 def known(what: str, name: object, allowed: Iterable[str]) -> str:
     names = list(allowed)
     found = name.lower() if isinstance(name, str) else ""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.engine.parameters import INERTIA_ELEMENTS
-from pyharness.model.errors import InputError, kind_of, unknown
+from pyharness.model.errors import InputError, kind_of, kind_or_empty, unknown
 from pyharness.model.scene import most_steps
 from pyharness.model.scene_file import check_keys
 from pyharness.model.values import finite, integer
@@ -242,8 +242,7 @@ def _listed(where: str, table: dict[str, Any], field: str, dimension: str) -> Ax
     _refuse(where, table, "values", _SPREAD_KEYS)
     values = table["values"]
     if not isinstance(values, list) or not values:
-        what = "empty" if values == [] else kind_of(values)
-        raise InputError(f"{where}: values is {what}; allowed: a list, not empty")
+        raise InputError(f"{where}: values is {kind_or_empty(values)}; allowed: a list, not empty")
     if field in CHOICES:
         for each in values:
             if not isinstance(each, str):

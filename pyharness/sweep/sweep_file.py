@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pyharness.checks.compare.batch import Batch, Solver
 from pyharness.engine.registry import METHODS, PREPARED_WITH_ATTITUDE, REGISTRY, requested_tolerance
 from pyharness.engine.scene_reader import scene_of, scene_of_file
-from pyharness.model.errors import InputError, kind_of, unknown
+from pyharness.model.errors import InputError, kind_of, kind_or_empty, unknown
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.scene_file import (
@@ -72,8 +72,7 @@ def _sweep(data: dict[str, Any], path: Path, text: str, claims: Mapping[str, Cla
     _check_axes(axes, scene)
     entries = data.get("reductions", ["end", "status"])
     if not isinstance(entries, list) or not entries:
-        what = "empty" if entries == [] else kind_of(entries)
-        raise InputError(f"reductions is {what}; allowed: a list, not empty")
+        raise InputError(f"reductions is {kind_or_empty(entries)}; allowed: a list, not empty")
     reductions = tuple(_reduction(each, claims) for each in entries)
     chunk = integer("chunk", data.get("chunk", CHUNK))
     if not 1 <= chunk <= _MOST_IN_CHUNK:

@@ -15,7 +15,7 @@ import re
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from pyharness.model.errors import InputError, kind_of, unknown
+from pyharness.model.errors import InputError, kind_of, kind_or_empty, unknown
 from pyharness.model.pipes import read_input
 from pyharness.model.schema import check_schema
 from pyharness.thesis.word import WORDS, Pair, framed
@@ -66,7 +66,7 @@ def answers(path: str | Path = OURS) -> list[Answer]:
     check_schema(f"vectors '{path}'", "vector file", data.get("schema"), allowed)
     entries = data.get("vectors")
     if not isinstance(entries, list) or not entries:
-        raise InputError(f"vectors '{path}': vectors is {kind_of(entries)}; {allowed}")
+        raise InputError(f"vectors '{path}': vectors is {kind_or_empty(entries)}; {allowed}")
     return [_answer(f"vectors '{path}', entry {n}", each) for n, each in enumerate(entries, 1)]
 
 

@@ -54,6 +54,9 @@ def test_vectors_agree(tmp_path: Path) -> None:
         path.write_text(content)
         with pytest.raises(InputError, match="vectors"):
             answers(path)
+    path.write_text('{"schema": 1, "vectors": []}')
+    with pytest.raises(InputError, match="vectors is empty; allowed: "):
+        answers(path)
 
 
 def test_octal_words_are_numbers_and_back() -> None:

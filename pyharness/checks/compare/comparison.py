@@ -267,7 +267,8 @@ def _with_methods(
             failure = str(error)
         seconds = math.nan if run is None else time.perf_counter() - start
         good = None if run is None else accuracy(scene, run, truth)
-        methods.append(MethodFinding(name, tolerance, run, good, seconds, failure))
+        given = None if METHODS[name].is_fixed_step else tolerance
+        methods.append(MethodFinding(name, given, run, good, seconds, failure))
     growth = motion_growth(scene, scene.times()[-1])
     bound = bound_of(scene, truth, effort=effort)
     found = tuple(programs), tuple(methods)

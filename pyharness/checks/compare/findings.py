@@ -7,7 +7,6 @@ import numpy as np
 from pyharness.checks.compare.agreement import Accuracy
 from pyharness.checks.compare.orders import Order
 from pyharness.checks.theory.conditioning import LIVELY
-from pyharness.engine.registry import METHODS
 from pyharness.engine.sensitivity import is_sensitive
 from pyharness.model.listing import Listing
 from pyharness.model.report import short
@@ -43,7 +42,7 @@ class ProgramFinding:
 @dataclass(frozen=True, eq=False)
 class MethodFinding:
     method: str
-    tolerance: float
+    tolerance: float | None  # None for a fixed step
     trajectory: Trajectory | None
     accuracy: Accuracy | None
     seconds: float
@@ -95,8 +94,9 @@ class Comparison:
 
     @property
     def tolerance(self) -> float:
-        """Return the smallest relative tolerance of the methods."""
-        return min(each.tolerance for each in self.methods)
+        """Return the smallest relative tolerance of the methods, or 1 if none has one."""
+        found = (each.tolerance for each in self.methods)
+        return min((each for each in found if each is not None), default=1.0)
 
     @property
     def is_sensitive(self) -> bool:
@@ -134,7 +134,7 @@ class Comparison:
         rows, due = len(one.trajectory.time), len(self.reference.time)
         if rows < due:
             return f"{one.method}: ends after {rows} of {due} times, {one.trajectory.ended}"
-        if METHODS[one.method].is_fixed_step or self.growth is None:
+        if one.tolerance is None or self.growth is None:
             return ""
         largest = float(np.abs(np.vstack([self.scene.omega, self.reference.omega])).max())
         made = one.tolerance * (self.growth if self.growth > LIVELY else 1.0)

@@ -123,6 +123,16 @@ def test_verb_compares_methods(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     assert [each["method"] for each in methods] == ["auto", "dop853"]
 
 
+def test_fixed_step_has_no_tolerance() -> None:
+    found = compare_methods(case_scene(3), ["rk4", "auto"], tolerance=1e-9)
+    assert [each.tolerance for each in found.methods] == [None, 1e-9]
+    assert found.tolerance == 1e-9
+    assert compare_methods(case_scene(3), ["rk4"]).tolerance == 1.0
+    report = comparison_report(found)
+    assert re.search(r"(?m)^rk4 +- ", render(report, "table"))
+    assert json.loads(render(report, "json"))["methods"][0]["tolerance"] is None
+
+
 @pytest.mark.campaign
 def test_methods_without_rows_are_not_as_expected(
     capsys: pytest.CaptureFixture[str], tmp_path: Path

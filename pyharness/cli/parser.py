@@ -107,7 +107,11 @@ class Parser(argparse.ArgumentParser):
             # For `--name=--`, argparse returns a list.
             if isinstance(value, list):
                 raise InputError(f"--{name.replace('_', '-')}: '--' is not a value; give a value")
-        check_known("format", options.format, getattr(self.module, "FORMATS", FORMATS))
+        formats = getattr(self.module, "FORMATS", FORMATS)
+        for name, fewer in getattr(self.module, "FORMATS_WITH", {}).items():
+            if getattr(options, name) not in (None, False):
+                formats = fewer
+        check_known("format", options.format, formats)
         return options
 
     def _joined(self, arguments: Sequence[str]) -> list[str]:

@@ -492,6 +492,13 @@ def test_shell_completes_verbs_and_options(line: str, wanted: str, tmp_path: Pat
     assert found.read_text().replace("\v", " ").split() == [wanted]
 
 
+@pytest.mark.parametrize("command", ["verify --listing-output x", "claims --assignments"])
+def test_only_formats_of_the_output_are_allowed(command: str, capsys: Capture) -> None:
+    for form in ("csv", "junit"):
+        assert main([*command.split(), "--format", form]) == 2
+        assert capsys.readouterr().err.endswith(f"format '{form}'; allowed: table, json\n")
+
+
 def test_old_names_of_options_stay_with_a_line(capsys: Capture) -> None:
     for old, new in (("--omega0 1,2,3", "--omega=1,2,3"), ("--omega0=-1,2,3", "--omega -1,2,3")):
         found = []

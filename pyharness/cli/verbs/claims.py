@@ -31,6 +31,7 @@ OPTIONS = {
     "--sweep FILE.toml": "Sweep file from which STORE was computed; needs --atlas.",
     **shared.outputs(plot="the counts of --evidence or the map of --atlas"),
 }
+FORMATS_WITH = {"assignments": ("table", "json")}
 GROUPS = {"instead of all verdicts": "explain assignments evidence atlas sweep"}
 EXAMPLE = "claims --explain abstract-superior"
 
@@ -38,7 +39,6 @@ EXAMPLE = "claims --explain abstract-superior"
 def run(options: argparse.Namespace) -> int:
     if options.assignments:
         shared.refuse(options, "--assignments", ("explain", "evidence", "word"))
-        shared.check_known("format", options.format, ("table", "json"))
     if options.atlas is not None:
         return _atlas(options)
     shared.refuse(options, "the verdicts; give --atlas", ("sweep",))

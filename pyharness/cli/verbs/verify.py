@@ -21,6 +21,7 @@ from pyharness.model.errors import InputError
 from pyharness.thesis.decks import compiler
 
 FORMATS = ("table", "json", "junit", "markdown")
+FORMATS_WITH = {"listing_output": ("table", "json")}
 # Options that apply to only one kind of checks, by kind.
 _OF_ONE_KIND = {"random": ("seed", "draws"), "golden": ("record",)}
 _OF_THE_CHECKS = ("only", "seed", "draws", "external", "self_test", "update", "record", "also")
@@ -131,7 +132,6 @@ def _listing_output(options: argparse.Namespace) -> int:
     from pyharness.history.listing_output import fits, listing_output_report, read_page
 
     shared.refuse(options, "--listing-output", (*_OF_THE_CHECKS, "port", "integrator", "cell"))
-    shared.check_known("format", options.format, ("table", "json"))
     programs, cases = _programs_and_cases(options)
     shared.check_outputs(options)
     lines = read_page(options.listing_output)

@@ -160,11 +160,9 @@ class Axis:
 
 @lru_cache(maxsize=32)
 def _coordinates(axis: Axis) -> NDArray[Any]:
-    if axis.is_choice:
-        return np.array(axis.values, dtype=object)
-    found: Floats
+    found: NDArray[Any]
     if axis.how == "listed":
-        found = np.array(axis.values, dtype=np.float64)
+        found = np.array(axis.values, dtype=object if axis.is_choice else np.float64)
     elif axis.how == "linear":
         first, last = axis.values
         found = _between(first, last, lambda a, b: np.linspace(a, b, axis.count))
@@ -172,7 +170,7 @@ def _coordinates(axis: Axis) -> NDArray[Any]:
         found = np.geomspace(axis.values[0], axis.values[1], axis.count)
     else:
         found = _draw(axis)
-    if number_field(axis.field).whole:
+    if not axis.is_choice and number_field(axis.field).whole:
         found = np.rint(found)
     found.setflags(write=False)
     return found

@@ -172,6 +172,12 @@ def test_drawn_value_never_leaves_the_ends_of_its_axis() -> None:
     assert set(axis_of(tomllib.loads(table), 1).coordinates().tolist()) == {1.7976931348623157e308}
 
 
+@pytest.mark.parametrize(("field", "value"), [("method", "auto"), ("tilt", 1.0)])
+def test_cached_values_can_not_be_changed(field: str, value: object) -> None:
+    with pytest.raises(ValueError, match="read-only"):
+        axis_of({"field": field, "values": [value]}, 1).coordinates()[0] = value
+
+
 def test_two_axes_of_one_seed_have_numbers_of_their_own() -> None:
     table = {"draw": "uniform", "from": 0.0, "to": 1.0, "count": 2000, "seed": 3}
     first, second = (

@@ -115,7 +115,7 @@ def stored_fits(lines: Sequence[Sequence[str]], folder: Path) -> list[Fit]:
 
 
 def verdict(path: str, found: Sequence[Fit]) -> list[str]:
-    """Return lines that name our pages equal to the page in `path` or, if none is, the nearest."""
+    """Return lines that name our pages equal to the page in `path`, or else the nearest one."""
     whole = [each for each in found if each.is_whole]
     said = "printed so by" if whole else "by none; the nearest is"
     return [f"{path}: {said} {each.name}" for each in whole or found[:1]]

@@ -217,7 +217,7 @@ def _same(one: Array, other: Array) -> Any:
 
 
 def _returned(ask: Ask, judged: Judged) -> list[Check]:
-    """Return a check whether a free body returns to its initial state after omega is reversed."""
+    """Return the check that a free body returns to its initial state after omega is reversed."""
     problem, level = judged.problem, LEVELS // 2
     forth = judged.answers[level]
     if not problem.scene.torque.is_zero or forth.attitude is None:

@@ -23,7 +23,7 @@ from pyharness.truth.reference import Reference
 
 PROVED, ESTIMATED = "proved", "estimated"
 # Factors on the work limits of the two provers that take steps, for about half a second each.
-_INTEGER_WORK, _BALL_WORK = 0.01, 0.0075
+_INTEGER_WORK, _BALL_WORK = 0.05, 0.05
 _MOST_TIMES = 30  # for the prover in ball arithmetic, which needs a step for each time
 _SPARE_DIGITS = 2  # decimal digits by which a ball is smaller than the estimated error
 _DIGITS, _MOST_DIGITS = 20, 60  # digits of a proof without an estimate; most digits of any proof

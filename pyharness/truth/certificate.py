@@ -33,10 +33,10 @@ _GUARD_BITS = 16
 _LENGTH_BITS = 20
 _SHARE_BITS = 20  # the last terms are at most 2**-20 of the radius, or as large as the digits allow
 _TOLERATED = 3  # bits by which the last terms may exceed this limit
-# Limit of work, some five to thirty seconds; a step needs 1, or more if its bits times the square
-# of the order exceed _BITS_OF_STEP. The time of a product grows faster than the number
-# of its bits, if this exceeds _BITS_OF_PRODUCT.
-_MOST_WORK, _BITS_OF_STEP, _BITS_OF_PRODUCT = 20_000, 1e6, 1200
+# Limit of the work (about ms) of all attempts. An expansion needs _EXPANSION and, for each product,
+# _PRODUCT, or more if its mean number of bits is not much smaller than _BITS_OF_PRODUCT.
+_MOST_WORK, _EXPANSION, _PRODUCT, _BITS_OF_PRODUCT = 10_000, 0.25, 3e-4, 250
+_PRODUCTS_OF_WAVE = 6  # for each term of the series
 _MOST_ATTEMPTS = 6
 # After the fraction _EARLY of the time, the growth of the radius is extrapolated to the end. If
 # digits will be missing, the proof begins again with these and _MORE further digits.
@@ -82,9 +82,9 @@ def prove(
     check_order(times, "prove")
     record = _scene_record(scene)
     limit = _MOST_WORK * checked_effort(effort)
-    wanted = float(digits)
+    wanted, work = float(digits), 0.0
     for attempt in range(_MOST_ATTEMPTS):
-        run = _Run(record, times, wanted, digits)
+        run = _Run(record, times, wanted, digits, work)
         try:
             # The last attempt is not stopped early, and reports how far a proof reaches.
             last = attempt == _MOST_ATTEMPTS - 1
@@ -92,6 +92,8 @@ def prove(
         except _AmplifiedError as error:
             wanted += error.args[0]
             continue
+        finally:
+            work = run.work
         excess = largest_radius(run.omega, digits)
         if excess <= 1:
             found = Enclosure(tuple(times), tuple(run.omega), _WORDS, len(run.steps))
@@ -126,10 +128,15 @@ def _scene_record(scene: Scene) -> dict[str, Any]:
 
 class _Run:
     def __init__(
-        self, record: dict[str, Any], times: Sequence[float], digits: float, goal: int
+        self,
+        record: dict[str, Any],
+        times: Sequence[float],
+        digits: float,
+        goal: int,
+        work: float,  # of earlier attempts
     ) -> None:
         self._record, self._times = record, [Fraction(t) for t in times]
-        self._goal = goal
+        self._goal, self.work = goal, work
         # More terms give fewer steps and a smaller certificate, but cost time.
         self._order = max(16, round(min(1.6 * digits, digits + 40.0)))
         self._clock = max(_LENGTH_BITS + 12, self._times[-1].denominator.bit_length())
@@ -155,17 +162,19 @@ class _Run:
         radius, wave_radius, time = system.norm([1, 1, 1]), 0, 0
         self._add_balls([[x] for x in middle], radius, 0, 0)
         end = int(self._times[-1] * (1 << clock))
-        length, side, work = 1 << clock, -1 if end < 0 else 1, 0.0
+        length, side, earlier = 1 << clock, -1 if end < 0 else 1, self.work
         while time != end:
-            if work >= limit:
+            if self.work >= limit:
                 share = max(abs(time / end), 1e-3)
-                instead = advice("use a shorter time", effort, effort / share)
+                needed = earlier + (self.work - earlier) / share
+                instead = advice("use a shorter time", effort, effort * needed / limit)
                 raise InputError(f"prove: more than {len(self.steps)} steps; {instead}")
             h = side * min(length, abs(end - time))
             # Residuals much smaller than the present radius would only cost time.
             most, longer = max(self._most, radius.bit_length() - _SHARE_BITS), 1.0
             while True:
                 expansion = system.expand([*middle, *waves], time, h, self._order)
+                self.work += self._work_of(expansion)
                 last = max(abs(x) for each in expansion[0] for x in each[-2:])
                 excess = (last.bit_length() - most) / self._order
                 if excess <= _TOLERATED / self._order:
@@ -186,14 +195,17 @@ class _Run:
             more = self._expected_excess(radii[0], source, middle, time / end)
             if early < time / end < 1.0 and more > 0.0:
                 raise _AmplifiedError(more + _MORE)
-            bits = max(self._bits, *(x.bit_length() for x in middle))
-            slower = max(1.0, bits / _BITS_OF_PRODUCT)
-            work += max(1.0, self._order**2 * bits * slower / _BITS_OF_STEP)
             # The checker adds the distance from the stated middle: 0, rounded up.
             radius, wave_radius = radii[0] + system.norm([0, 0, 0]), radii[1]
             self.steps.append([h, tube, radius, middle])
             length = max(1, int(abs(h) * 2.0 ** min(longer, -excess)))
             progress(abs(time * 100 // end), 100, f"t = {time / (1 << clock):.4g} s")
+
+    def _work_of(self, expansion: Expansion) -> float:
+        order, n_waves = self._order, len(self._system.frequencies)
+        bits = sum(x.bit_length() for each in expansion[0][:3] for x in each) / (3 * order)
+        products = order * (order + _PRODUCTS_OF_WAVE * n_waves)
+        return _EXPANSION + products * _PRODUCT * (1.0 + (bits / _BITS_OF_PRODUCT) ** 2)
 
     def _expected_excess(
         self, radius: int, source: int, middle: Sequence[int], share: float

@@ -46,7 +46,9 @@ _SHORTEST = Fraction(1, 2**400)
 _TUBE = 2.0**-30
 _LEAST_TUBE = 2.0**-200
 _LENGTH_BITS = 24
-_MOST_STEPS = 4_000  # some twenty seconds
+# Limit of the work (about ms) of all attempts. A step needs _OPERATION times the order's square for
+# each operation of the right-hand side.
+_MOST_WORK, _OPERATION = 10_000, 7.5e-4
 _MOST_ATTEMPTS = 6
 _GUARD_DIGITS = 12
 
@@ -64,7 +66,7 @@ def enclose_steps(
 
     The arguments, and the errors raised, are as in `enclosure.enclose`.
     """
-    limit = _MOST_STEPS * checked_effort(effort)
+    limit, work = _MOST_WORK * checked_effort(effort), 0.0
     wanted = float(digits + 2)
     for _ in range(_MOST_ATTEMPTS):
         bits = math.ceil((wanted + _GUARD_DIGITS) * math.log2(10.0))
@@ -72,14 +74,16 @@ def enclose_steps(
             # The steps change python-flint's global length of power series.
             afterwards.callback(setattr, ctx, "cap", ctx.cap)
             proof = _Proof(Equations(scene, velocity, transition), wanted, times[-1] >= 0.0)
-            found, steps, share = [], 0, 1e-3
+            cost = _OPERATION * proof.order**2 * proof.equations.n_operations
+            found, steps, share, earlier = [], 0, 1e-3, work
             for time in map(Fraction, times):
                 while proof.time != time and not proof.is_lost:
-                    if steps >= limit:
-                        instead = advice("use a shorter time", effort, effort / share)
-                        raise InputError(f"prove: more than {limit:.0f} steps; {instead}")
+                    if work >= limit:
+                        needed = effort * (earlier + (work - earlier) / share) / limit
+                        instead = advice("use a shorter time", effort, needed)
+                        raise InputError(f"prove: more than {steps} steps; {instead}")
                     proof.step(time)
-                    steps += 1
+                    steps, work = steps + 1, work + cost
                     at = abs(float(proof.time) / times[-1])
                     share = max(at, share)
                     progress(int(at * 100), 100, f"t = {float(proof.time):.4g} s")
@@ -140,6 +144,10 @@ class Equations:
             self.scales[:3] = scales_of(coefficients)
         elif scene.inertia is not None:
             self._inertia = [[arb(x) for x in row] for row in scene.inertia]
+        # About as many operations as take the time of a right-hand side.
+        count = (9 if self._principal else 25) + 16 * (scene.attitude is not None)
+        count += sum(len(each.operations) for each in tapes)
+        self.n_operations = count * (8 if transition else 1)
         self._push = [arb(force) / arb(scene.masses[0]) for force in scene.forces]
 
     def at(self, begin: Fraction, forward: bool) -> Rates:

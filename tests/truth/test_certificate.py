@@ -81,11 +81,17 @@ def test_work_limit_is_on_bits_too(monkeypatch: pytest.MonkeyPatch) -> None:
     law = TorqueLaw((1e300, 1e300, 1e300))
     scene = Scene("h", (1.0, 2.0, 3.0), moments=(3.0, 2.0, 1.5), torque=law)
     with pytest.raises(InputError, match=r"more than 6\d steps; .*effort"):
-        prove(scene, [3e-150], 25, effort=100 / 20_000)
-    # A product of ten times the bits takes more than ten times as long.
-    monkeypatch.setattr(f"{prove.__module__}._BITS_OF_PRODUCT", 100)
+        prove(scene, [3e-150], 25, effort=335 / 10_000)
+    # Products of 3.4 times the bits take some ten times as long.
+    monkeypatch.setattr(f"{prove.__module__}._BITS_OF_PRODUCT", 250 / 3.4)
     with pytest.raises(InputError, match=r"more than [67] steps"):
-        prove(scene, [3e-150], 25, effort=100 / 20_000)
+        prove(scene, [3e-150], 25, effort=335 / 10_000)
+
+
+def test_work_limit_is_on_all_attempts() -> None:
+    """Regression test: after a first attempt, case 6 took a minute up to the limit."""
+    with pytest.raises(InputError, match=r"more than \d steps; .*effort"):
+        prove(case_scene(6), [100.0], 25, effort=0.035)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -10,7 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import ChangingInertia, ChangingMoments, Scene, TorqueLaw, case_scene, principal
+from pyharness import (
+    ChangingInertia,
+    ChangingMoments,
+    Scene,
+    TorqueLaw,
+    case_scene,
+    principal,
+    torques,
+)
 from pyharness.checks.scenes import state_scenes
 from pyharness.checks.scenes.random_scenes import random_scene
 from pyharness.checks.scenes.state_scenes import READY, STEADY, TURNING
@@ -242,7 +250,7 @@ def test_first_balls_contain_omega(digits: int) -> None:
 
 def test_an_attempt_ends_when_the_radius_exceeds_omega() -> None:
     scene = Scene(coefficients=(-1.0, 2.8, 1.8), omega=(-2.0, -2.3, 1.9))
-    found = enclose_steps(scene, [7.0], 1, effort=0.08)
+    found = enclose_steps(scene, [7.0], 1, effort=0.12)
     assert found.omega[0].radius < 0.1
 
 
@@ -324,3 +332,14 @@ def test_the_settings_of_the_library_are_kept() -> None:
     with pytest.raises(InputError):
         enclose_steps(scene, [1.0], 10, effort=1e-6)
     assert (flint.ctx.prec, flint.ctx.cap) == before
+
+
+def test_work_limit_holds_for_all_attempts_and_orders() -> None:
+    """Regression test: later attempts, with a higher order, had the steps of the first."""
+    scene = Scene(omega=(1.0, 2.0, 3.0), moments=(4.0, 3.0, 2.0), torque=torques.drag([-0.1]))
+    counts = []
+    for digits in (25, 100):
+        with pytest.raises(InputError, match=r"steps; .*effort") as caught:
+            enclose_steps(scene, [100.0], digits, effort=0.01)
+        counts.append(int(str(caught.value).split()[3]))
+    assert counts[0] > 10 * counts[1] > 0

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from pyharness.model.errors import InputError, printable
-from pyharness.model.symbols import Recorder, Symbol, negated, select
+from pyharness.model.symbols import Condition, Recorder, Symbol, negated, select
 from pyharness.model.tape import Table
 
 _MOST_PIECES = 200  # most points of an interpolation in the state
@@ -131,6 +131,12 @@ class SymbolArray(np.ndarray[Any, Any]):
         _refuse_out(self, named)
         return _clip(self, *given, **named)
 
+    def sum(self, *given: Any, **named: Any) -> Any:
+        return _viewed(_counted(self).sum(*given, **named))
+
+    def mean(self, *given: Any, **named: Any) -> Any:
+        return _viewed(_counted(self).mean(*given, **named))
+
 
 def symbol_array(values: Any) -> Any:
     return np.array(values, dtype=object).view(SymbolArray)
@@ -143,6 +149,15 @@ def _wrapped(original: Callable[..., Any]) -> _Replaced:
 def _viewed(found: Any) -> Any:
     is_array = isinstance(found, np.ndarray) and found.dtype == object
     return found.view(SymbolArray) if is_array else found
+
+
+def _counted(values: Any) -> Any:
+    """Return an array with conditions as numbers, because the sum of two conditions is refused."""
+    array = np.array(values, dtype=object).view(np.ndarray)
+    for place, each in np.ndenumerate(array):
+        if isinstance(each, Condition):
+            array[place] = 1.0 * each
+    return array
 
 
 def _by_element(function: Callable[..., Any], count: int) -> Callable[..., Any]:
@@ -206,6 +221,12 @@ def _arctan2(y: Any, x: Any) -> Any:
 
 def _interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None) -> Any:
     places, values = np.asarray(xp, dtype=float), np.asarray(fp, dtype=float)
+    np.interp(0.0, places, values)  # raises NumPy's errors
+    widths = np.diff(places)
+    if not (np.isfinite(places).all() and (widths >= 0.0).all()):
+        what = "interp of points that are not finite, or not in ascending order,"
+        raise _symbol_in([x]).recorder.refusal(what)
+    slopes = np.divide(np.diff(values), widths, out=np.zeros(len(widths)), where=widths > 0.0)
 
     def piecewise(at: Any) -> Any:
         if not isinstance(at, Symbol):
@@ -213,7 +234,7 @@ def _interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None) -> An
         if at.is_time() and left is right is None:
             pieces = np.zeros((len(places) + 1, 4))
             pieces[:, 0] = values[0], *values
-            pieces[1:-1, 1] = np.diff(values) / np.diff(places)
+            pieces[1:-1, 1] = slopes
             return at.of_table(Table([places[0] - 1.0, *places], pieces))
         if len(places) > _MOST_PIECES:
             raise at.recorder.refusal(
@@ -221,12 +242,11 @@ def _interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None) -> An
                 f"at most {_MOST_PIECES} points, torques.table for a function of time",
             )
         # A sum over all pieces would have the rounding errors of the largest piece.
-        found, before = values[0], 0.0
-        slopes = [*(np.diff(values) / np.diff(places)), 0.0]
-        for place, value, slope in zip(places, values, slopes, strict=True):
-            if slope != before:
+        found, before, place_before = values[0], 0.0, None
+        for place, value, slope in zip(places, values, [*slopes, 0.0], strict=True):
+            if slope != before or place == place_before:
                 found = select(at > place, value + slope * (at - place), found)
-            before = slope
+            before, place_before = slope, place
         if left is not None:
             found = select(at < places[0], float(left), found)
         if right is not None:
@@ -363,7 +383,7 @@ _CHOICES: dict[str, Callable[..., Any]] = {
     "sign": _of_symbol("sign", np.sign), "fabs": _by_element(abs, 1),
     "copysign": _by_element(_with_sign, 2), "fmod": _by_element(_remainder, 2),
     "logical_and": _by_element(operator.and_, 2), "logical_or": _by_element(operator.or_, 2),
-    "logical_not": _by_element(negated, 1),
+    "logical_not": _by_element(negated, 1), "sum": SymbolArray.sum, "mean": SymbolArray.mean,
 }  # fmt: skip
 _OF_NUMPY = (
     {name: _of_symbol(name, each) for name, each in _ELEMENTARY.items()}

@@ -415,6 +415,8 @@ CASES: list[Torque] = [
     lambda t, w: np.select(condlist=[w > 0.4], choicelist=[w]) + np.fmod([w[0], 1.0, -2.0], 0.3),
     lambda t, w: np.copysign(w, [-0.0, 2.0, w[0]]) + np.linalg.det(a=np.diag(w)),
     lambda t, w: np.linalg.det(np.array([[w[0], t], [w[1], w[2]]])) * np.rad2deg(w),
+    lambda t, w: [np.sum([w[0] > 0.1, w[1] > 0.1]), (w > 0.25).mean(), np.sum(w * w) * sum(w > 1)],
+    lambda t, w: np.interp([w[0], t, w[2]], [0, 0.1, 0.1, 1.75, 1.75, 3], [1, 2, 4, 4, 5, 9]),
 ]  # fmt: skip
 
 
@@ -424,6 +426,20 @@ def test_recorded_function_has_the_values_of_numpy(number: int) -> None:
     omega = np.array([0.3, 0.2, 0.9]) + 0.3 * np.random.default_rng(number).random(3)
     found = recorded(torque).at(1.75, omega.tolist(), (1.0, 0.0, 0.0, 0.0))
     assert found == pytest.approx([float(x) for x in torque(1.75, omega)], rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("torque", "message"),
+    [
+        (lambda t, w: -0.1 * ((w > 0.5) + (w > 0.2)), "the sum of two conditions"),
+        (lambda t, w: -w * np.interp(w, [-np.inf, 1, np.inf], [1, 3, 4]), "not finite"),
+        (lambda t, w: -w * np.interp(t, [0, 2, 1], [1, 3, 4]), "not in ascending order"),
+        (lambda t, w: -w * np.interp(t, [0, 1], [1, 3, 4]), "not of the same length"),
+    ],
+)
+def test_what_numpy_would_compute_otherwise_is_refused(torque: Torque, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        recorded(torque)
 
 
 def test_new_arrays_take_symbols() -> None:

@@ -99,6 +99,25 @@ class Recorder:
             self._slots[operation] = self._n_inputs + len(self._slots)
         return self._slots[operation]
 
+    def least_powers(self, slot: int) -> list[int] | None:
+        """Return the factors of a product with its sign, odd powers once and even ones twice.
+
+        Return None if no power is above 2.
+        """
+        operations = [*self._slots]
+        powers = {slot: 1}
+
+        def is_product(slot: int) -> bool:
+            return slot >= self._n_inputs and operations[slot - self._n_inputs].kind == "product"
+
+        while products := [*filter(is_product, powers)]:
+            power = powers.pop(max(products))
+            for each in operations[max(products) - self._n_inputs].operands:
+                powers[each] = powers.get(each, 0) + power
+        if max(powers.values()) <= 2:
+            return None
+        return [each for each, power in powers.items() for _ in range(2 - power % 2)]
+
     def result(self, *operation: Any, factor: float = 1.0) -> "Symbol":
         return Symbol(self, 0.0, {self.slot(Operation(*operation)): factor})
 
@@ -341,6 +360,13 @@ class Symbol:
         if not self._terms:
             return self._constant > 0.0
         slot, factor = self._slot()
+        factors = self.recorder.least_powers(slot)
+        if factors is not None:
+            # x**3 is positive where x is. Steps end more precisely at the simple root of x.
+            product = Symbol(self.recorder, math.copysign(1.0, factor), {})
+            for each in factors:
+                product = product * Symbol(self.recorder, 0.0, {each: 1.0})
+            return product.switch()
         if factor < 0.0:
             slot = self._own_slot()
         return _condition(self.recorder.result("switch", (slot,)))

@@ -523,6 +523,23 @@ def test_a_stepper_passes_the_switches_of_a_square_wave(sign: float) -> None:
     assert stepper.steps <= 3 * (pushes + 1)
 
 
+@pytest.mark.parametrize("tolerance", [1e-9, 1e-12])
+def test_the_sign_of_a_power_changes_with_its_base(tolerance: float) -> None:
+    def torque(t: Any, w: Any) -> Any:
+        return [0.2 - 0.1 * np.abs(w[0] ** 3), -0.2 - 0.1 * np.abs(w[1] ** 3), 0.0]
+
+    scene = Scene("", (0.5, -0.4, 0.3), moments=(1.0, 1.5, 2.0), torque=torque)
+    wanted = solve(scene, 5.0, "dop853", 1e-10).omega[0]
+    found = solve(scene, 5.0, tolerance=tolerance, effort=0.01)
+    assert found.ended == "complete"
+    assert found.omega[0] == pytest.approx(wanted, abs=1e-8)
+    stepper = Stepper(scene, tolerance)
+    stepper.until(5.0)
+    assert stepper.omega == pytest.approx(wanted, abs=1e-8)
+    still = recorded(lambda t, w: np.where(-(w[0] ** 4) * w[1] ** 3 > 0.0, 1.0, 2.0) * np.ones(3))
+    assert [still.at(0.0, (x, -1.0, 0.0), (1.0, 0.0, 0.0, 0.0))[0] for x in (0.0, 0.5)] == [2, 1]
+
+
 BRANCHES: dict[str, Torque] = {
     "1/t": lambda t, w: [np.where(t > 5, 1 / t, 0.0), 0.0, 0.0],
     "log and pole": lambda t, w: [

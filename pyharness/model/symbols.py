@@ -63,7 +63,7 @@ class Recorder:
 
         With `has_lines`, messages name the line of the function.
         """
-        self.has_lines = has_lines
+        self._has_lines = has_lines
         self.place = place
         self.most, self._n_inputs, self._instead = most, n_inputs, instead
         self._slots: dict[Operation, int] = {}
@@ -76,7 +76,7 @@ class Recorder:
 
     def refusal(self, what: str, write: str = _ALLOWED) -> InputError:
         allowed = f"allowed: {write}, or {self._instead}"
-        where = _line() if self.has_lines else ""
+        where = _line() if self._has_lines else ""
         return InputError(f"{self.place}: {what} can't be recorded{where}; {allowed}")
 
     def refusal_of_numbers(self, reason: str) -> InputError:
@@ -451,8 +451,8 @@ class Condition(Symbol):
     __slots__ = ()
 
     def __add__(self, other: Any) -> Any:
-        """Refuse the sum of two conditions in a function: 2 in Python, but true in NumPy."""
-        if self.recorder.has_lines and isinstance(other, (Condition, bool, np.bool_)):
+        """Refuse the sum of two conditions, which is 2 in Python, but true in NumPy."""
+        if isinstance(other, (Condition, bool, np.bool_)):
             raise self.recorder.refusal(
                 "the sum of two conditions", "c | d, or 1.0 * c + 1.0 * d to count them"
             )

@@ -23,7 +23,6 @@ VALUES = (
     "atan2(w1 - 1, w2 - 1)", "cbrt(w2)", "abs(w1 - w2)", "sign(w1 - w2)", "floor(3*t)", "t % 0.4",
     "heaviside(t - 1)", "min(w1, t)", "max(w1, 1)", "clip(w1, 0.8, q0)", "(w1 > w2)*t",
     "where(w1 < w2 and not t >= 1, w1, -w2)", "where(w1 <= w2 or t > 1, 2, q1)",
-    "(w1 > 1) + (w2 > 0.9)",
 )  # fmt: skip
 CONSTANTS = {"k": 0.25, "wheel": 3, "_unused": -1.5}
 

@@ -1,5 +1,6 @@
 /* Operations of a tape in groups that are computed side by side, and the working storage of
-   tape_terms.c: products, or linear combinations, none of which needs the result of another one. */
+   tape_terms.c and tape_perturbations.c: products, or linear combinations, none of which needs the
+   result of another one. */
 #ifndef TAPE_GROUPS_H
 #define TAPE_GROUPS_H
 

@@ -1,6 +1,5 @@
 /* Taylor series of eight perturbations of the unknowns side by side, from the Jacobian at nodes of a
-   step. This is C because no Fortran compiler keeps eight sums in registers. Registers of fewer than
-   eight numbers work too: the compiler divides them. */
+   step. This is C because no Fortran compiler keeps eight sums in registers. */
 #include <math.h>
 #include <string.h>
 

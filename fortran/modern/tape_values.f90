@@ -4,7 +4,7 @@ module tape_values
   use kinds, only: dp
   use operations, only: ARCSINE => ASIN, ARCTANGENT => ATAN, EXPONENTIAL => EXP, &
                         FLOOR_OF => FLOOR, LINEAR, LOGARITHM => LOG, PRODUCT, QUOTIENT, &
-                        SELECT_OF => SELECT, SINE_COSINE, SQUARE_ROOT => SQRT, SWITCH, TABLE, &
+                        SELECT_OF => SELECT, SQUARE_ROOT => SQRT, SWITCH, TABLE, &
                         TANGENT => TANH
   use storage, only: SERIES_LENGTH
   use tape, only: FIRST_UNKNOWN, piece_at, tape_t, TIME_SLOT

@@ -1,5 +1,6 @@
 /* Taylor series of the derivatives of all slots with respect to eight parameters side by side, by the
-   recurrences of the operations. */
+   recurrences of the operations. Registers of fewer than eight numbers work too: the compiler
+   divides them. */
 #include <string.h>
 
 #include "tape_perturbations.h"
@@ -130,15 +131,15 @@ static inline int all_below(lanes x, lanes limit)
   return all != 0;
 }
 
-/* Return the largest term k of each perturbation of the unknowns, with weights that make the unknowns
-   comparable. `units` makes the perturbations comparable. */
-static inline lanes largest_terms(const struct tape *tape, int k, const double *weights, lanes units)
+/* Return the largest term k of each derivative of the unknowns, with weights that make the unknowns
+   comparable. */
+static inline lanes largest_terms(const struct tape *tape, int k, const double *weights)
 {
   const bits magnitude = ~(bits)(-(lanes){0.0});
   lanes most = {0.0};
   for (int i = 0; i < tape->n_unknowns; i++) {
     const lanes x = (lanes)((bits)loaded(perturbations_of(tape)[FIRST_UNKNOWN + i][k]) & magnitude);
-    most = larger_lanes(most, weights[i] * units * x);
+    most = larger_lanes(most, weights[i] * x);
   }
   return most;
 }
@@ -199,7 +200,7 @@ double OF_LEVEL(vary_tape, LEVEL)(struct block *block, double h, int order, doub
                                   const double *weights, double tolerance)
 {
   const struct tape *tape = &block->tape;
-  const lanes zero = {0.0}, one = zero + 1.0;
+  const lanes zero = {0.0};
   lanes size = loaded(block->sizes), sizes[TERMS_OF_PERTURBATION];
   lanes beyond[TERMS_OF_PERTURBATION + 1];
   double powers[TERMS_OF_PERTURBATION];
@@ -217,10 +218,10 @@ double OF_LEVEL(vary_tape, LEVEL)(struct block *block, double h, int order, doub
   /* The largest part of any later term that does not depend on the derivatives. */
   beyond[order + 1] = zero;
   for (int j = order; j > 0; j--)
-    beyond[j] = larger_lanes(beyond[j + 1], powers[j] * largest_terms(tape, j, weights, one));
+    beyond[j] = larger_lanes(beyond[j + 1], powers[j] * largest_terms(tape, j, weights));
   for (;; k++) {
     if (k > 0) perturb(tape, h, k - 1);
-    sizes[k] = largest_terms(tape, k, weights, one);
+    sizes[k] = largest_terms(tape, k, weights);
     const lanes term = powers[k] * sizes[k];
     size = begun(size, term);
     /* One or two terms may be zero between others. */

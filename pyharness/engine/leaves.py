@@ -1,7 +1,7 @@
 """C code (leaves) for values, Taylor series, Jacobian and rounding errors of recorded operations.
 
-It replaces the interpreter, fortran/modern/tape_terms.c. Tapes (lists of operations) that differ
-only in coefficients share the code, which reads these from memory.
+It replaces the interpreter, tape_terms.c and tape_perturbations.c in fortran/modern. Tapes (lists
+of operations) that differ only in coefficients share the code, which reads these from memory.
 """
 
 import re

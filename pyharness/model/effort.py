@@ -49,6 +49,29 @@ def suggested(effort: float, needed: float | None = None) -> str:
     return f"{rounded:.0f}" if 10.0 <= rounded < 1e15 else f"{rounded:.2g}"
 
 
+class ProofWork:
+    """The work of all attempts at a proof, and its limit."""
+
+    def __init__(self, most: float, effort: float) -> None:
+        self._effort, self._limit = effort, most * checked_effort(effort)
+        self.done, self.steps, self._earlier = 0.0, 0, 0.0
+
+    def begin(self) -> None:
+        """Begin another attempt."""
+        self._earlier = self.done
+
+    def check(self, share: float) -> None:
+        """Raise InputError beyond the limit; this attempt has reached `share` of the time."""
+        if self.done < self._limit:
+            return
+        needed = None
+        if share > 0.0:
+            total = self._earlier + (self.done - self._earlier) / max(share, 1e-3)
+            needed = self._effort * total / self._limit
+        instead = advice("use a shorter time", self._effort, needed)
+        raise InputError(f"prove: more than {self.steps} steps; {instead}")
+
+
 def waves(scene: Scene) -> int:
     if isinstance(scene.torque, StateTorque):
         return 0

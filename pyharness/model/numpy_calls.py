@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from pyharness.model.errors import InputError, printable
-from pyharness.model.symbols import Condition, Recorder, Symbol, negated, select
+from pyharness.model.symbols import Recorder, Symbol, negated, select
 from pyharness.model.tape import Table
 
 _MOST_PIECES = 200  # most points of an interpolation in the state
@@ -131,12 +131,6 @@ class SymbolArray(np.ndarray[Any, Any]):
         _refuse_out(self, named)
         return _clip(self, *given, **named)
 
-    def sum(self, *given: Any, **named: Any) -> Any:
-        return _viewed(_counted(self).sum(*given, **named))
-
-    def mean(self, *given: Any, **named: Any) -> Any:
-        return _viewed(_counted(self).mean(*given, **named))
-
 
 def symbol_array(values: Any) -> Any:
     return np.array(values, dtype=object).view(SymbolArray)
@@ -149,15 +143,6 @@ def _wrapped(original: Callable[..., Any]) -> _Replaced:
 def _viewed(found: Any) -> Any:
     is_array = isinstance(found, np.ndarray) and found.dtype == object
     return found.view(SymbolArray) if is_array else found
-
-
-def _counted(values: Any) -> Any:
-    """Return an array with conditions as numbers, because the sum of two conditions is refused."""
-    array = np.array(values, dtype=object).view(np.ndarray)
-    for place, each in np.ndenumerate(array):
-        if isinstance(each, Condition):
-            array[place] = 1.0 * each
-    return array
 
 
 def _by_element(function: Callable[..., Any], count: int) -> Callable[..., Any]:
@@ -225,7 +210,7 @@ def _interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None) -> An
     widths = np.diff(places)
     if not (np.isfinite(places).all() and (widths >= 0.0).all()):
         what = "interp of points that are not finite, or not in ascending order,"
-        raise _symbol_in([x]).recorder.refusal(what)
+        raise _symbol_in([x, left, right]).recorder.refusal(what)
     slopes = np.divide(np.diff(values), widths, out=np.zeros(len(widths)), where=widths > 0.0)
 
     def piecewise(at: Any) -> Any:
@@ -244,8 +229,10 @@ def _interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None) -> An
         # A sum over all pieces would have the rounding errors of the largest piece.
         found, before, place_before = values[0], 0.0, None
         for place, value, slope in zip(places, values, [*slopes, 0.0], strict=True):
+            # At a jump NumPy takes the later value.
+            is_later = at >= place if place == place_before else at > place
             if slope != before or place == place_before:
-                found = select(at > place, value + slope * (at - place), found)
+                found = select(is_later, value + slope * (at - place), found)
             before, place_before = slope, place
         if left is not None:
             found = select(at < places[0], float(left), found)
@@ -383,7 +370,7 @@ _CHOICES: dict[str, Callable[..., Any]] = {
     "sign": _of_symbol("sign", np.sign), "fabs": _by_element(abs, 1),
     "copysign": _by_element(_with_sign, 2), "fmod": _by_element(_remainder, 2),
     "logical_and": _by_element(operator.and_, 2), "logical_or": _by_element(operator.or_, 2),
-    "logical_not": _by_element(negated, 1), "sum": SymbolArray.sum, "mean": SymbolArray.mean,
+    "logical_not": _by_element(negated, 1),
 }  # fmt: skip
 _OF_NUMPY = (
     {name: _of_symbol(name, each) for name, each in _ELEMENTARY.items()}

@@ -450,16 +450,6 @@ class Condition(Symbol):
 
     __slots__ = ()
 
-    def __add__(self, other: Any) -> Any:
-        """Refuse the sum of two conditions, which is 2 in Python, but true in NumPy."""
-        if isinstance(other, (Condition, bool, np.bool_)):
-            raise self.recorder.refusal(
-                "the sum of two conditions", "c | d, or 1.0 * c + 1.0 * d to count them"
-            )
-        return super().__add__(other)
-
-    __radd__ = __add__
-
     def __and__(self, other: Any) -> Any:
         return _condition(select(self, other, False))
 

@@ -11,12 +11,11 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
-from pyharness.model.effort import advice
+from pyharness.model.effort import ProofWork
 from pyharness.model.errors import InputError
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw
-from pyharness.model.values import checked_effort
 from pyharness.truth.certificate_checker import (
     FORMAT,
     MOST_BITS,
@@ -81,19 +80,16 @@ def prove(
         )
     check_order(times, "prove")
     record = _scene_record(scene)
-    limit = _MOST_WORK * checked_effort(effort)
-    wanted, work = float(digits), 0.0
+    wanted, work = float(digits), ProofWork(_MOST_WORK, effort)
     for attempt in range(_MOST_ATTEMPTS):
         run = _Run(record, times, wanted, digits, work)
         try:
             # The last attempt is not stopped early, and reports how far a proof reaches.
             last = attempt == _MOST_ATTEMPTS - 1
-            run.prove(limit, effort, progress, 1.0 if last else _EARLY)
+            run.prove(progress, 1.0 if last else _EARLY)
         except _AmplifiedError as error:
             wanted += error.args[0]
             continue
-        finally:
-            work = run.work
         excess = largest_radius(run.omega, digits)
         if excess <= 1:
             found = Enclosure(tuple(times), tuple(run.omega), _WORDS, len(run.steps))
@@ -133,10 +129,10 @@ class _Run:
         times: Sequence[float],
         digits: float,
         goal: int,
-        work: float,  # of earlier attempts
+        work: ProofWork,
     ) -> None:
         self._record, self._times = record, [Fraction(t) for t in times]
-        self._goal, self.work = goal, work
+        self._goal, self._work = goal, work
         # More terms give fewer steps and a smaller certificate, but cost time.
         self._order = max(16, round(min(1.6 * digits, digits + 40.0)))
         self._clock = max(_LENGTH_BITS + 12, self._times[-1].denominator.bit_length())
@@ -154,7 +150,7 @@ class _Run:
         self.steps: list[list[Any]] = []  # length, tube, radius and middle of each
         self.omega: list[Balls] = []
 
-    def prove(self, limit: float, effort: float, progress: Progress, early: float) -> None:
+    def prove(self, progress: Progress, early: float) -> None:
         """Compute all steps; raise _AmplifiedError if errors grow too fast after part `early`."""
         system, clock = self._system, self._clock
         middle = [int(Fraction(x) * (1 << self._bits)) for x in self._record["omega"]]
@@ -162,19 +158,16 @@ class _Run:
         radius, wave_radius, time = system.norm([1, 1, 1]), 0, 0
         self._add_balls([[x] for x in middle], radius, 0, 0)
         end = int(self._times[-1] * (1 << clock))
-        length, side, earlier = 1 << clock, -1 if end < 0 else 1, self.work
+        length, side = 1 << clock, -1 if end < 0 else 1
+        self._work.begin()
         while time != end:
-            if self.work >= limit:
-                share = max(abs(time / end), 1e-3)
-                needed = earlier + (self.work - earlier) / share
-                instead = advice("use a shorter time", effort, effort * needed / limit)
-                raise InputError(f"prove: more than {len(self.steps)} steps; {instead}")
+            self._work.check(abs(time / end))
             h = side * min(length, abs(end - time))
             # Residuals much smaller than the present radius would only cost time.
             most, longer = max(self._most, radius.bit_length() - _SHARE_BITS), 1.0
             while True:
                 expansion = system.expand([*middle, *waves], time, h, self._order)
-                self.work += self._work_of(expansion)
+                self._work.done += self._work_of(expansion)
                 last = max(abs(x) for each in expansion[0] for x in each[-2:])
                 excess = (last.bit_length() - most) / self._order
                 if excess <= _TOLERATED / self._order:
@@ -198,6 +191,7 @@ class _Run:
             # The checker adds the distance from the stated middle: 0, rounded up.
             radius, wave_radius = radii[0] + system.norm([0, 0, 0]), radii[1]
             self.steps.append([h, tube, radius, middle])
+            self._work.steps += 1
             length = max(1, int(abs(h) * 2.0 ** min(longer, -excess)))
             progress(abs(time * 100 // end), 100, f"t = {time / (1 << clock):.4g} s")
 

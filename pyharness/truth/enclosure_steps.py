@@ -22,14 +22,13 @@ from flint import acb, arb, arb_mat, arb_series, ctx
 from pyharness.model.attitude import IDENTITY, quaternion_rates
 from pyharness.model.changing import rates_of_inertia
 from pyharness.model.dual import Dual
-from pyharness.model.effort import advice
+from pyharness.model.effort import ProofWork
 from pyharness.model.errors import InputError
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import of_law
 from pyharness.model.tape import Tape, evaluate
 from pyharness.model.torque_law import TorqueLaw
-from pyharness.model.values import checked_effort
 from pyharness.truth.balls import ball, balls, functions_at
 from pyharness.truth.decimal_functions import value_at
 from pyharness.truth.enclosed import Balls, Enclosure, largest_radius, scales_of
@@ -66,8 +65,7 @@ def enclose_steps(
 
     The arguments, and the errors raised, are as in `enclosure.enclose`.
     """
-    limit, work = _MOST_WORK * checked_effort(effort), 0.0
-    wanted = float(digits + 2)
+    wanted, work = float(digits + 2), ProofWork(_MOST_WORK, effort)
     for _ in range(_MOST_ATTEMPTS):
         bits = math.ceil((wanted + _GUARD_DIGITS) * math.log2(10.0))
         with ctx.workprec(bits), ExitStack() as afterwards:
@@ -75,15 +73,15 @@ def enclose_steps(
             afterwards.callback(setattr, ctx, "cap", ctx.cap)
             proof = _Proof(Equations(scene, velocity, transition), wanted, times[-1] >= 0.0)
             cost = _OPERATION * proof.order**2 * proof.equations.n_operations
-            found, steps, share, earlier = [], 0, 1e-3, work
+            found, steps, share = [], 0, 0.0
+            work.begin()
             for time in map(Fraction, times):
                 while proof.time != time and not proof.is_lost:
-                    if work >= limit:
-                        needed = effort * (earlier + (work - earlier) / share) / limit
-                        instead = advice("use a shorter time", effort, needed)
-                        raise InputError(f"prove: more than {steps} steps; {instead}")
+                    work.check(share)
                     proof.step(time)
-                    steps, work = steps + 1, work + cost
+                    steps += 1
+                    work.steps += 1
+                    work.done += cost
                     at = abs(float(proof.time) / times[-1])
                     share = max(at, share)
                     progress(int(at * 100), 100, f"t = {float(proof.time):.4g} s")

@@ -14,7 +14,7 @@ from pyharness.cli.main import main
 from pyharness.engine.registry import FIXED_STEP
 from pyharness.engine.solve import solve
 from pyharness.engine.solver import PREPARED, prepare
-from pyharness.model.effort import suggested
+from pyharness.model.effort import ProofWork, suggested
 from pyharness.model.errors import InputError, TimedError
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
@@ -155,6 +155,16 @@ def test_forecast_of_the_reference_is_not_taken_in_by_a_blow_up() -> None:
 )
 def test_advice_is_rounded_up(needed: float | None, effort: float, text: str) -> None:
     assert suggested(effort, needed) == text
+
+
+def test_advice_where_an_attempt_has_not_advanced() -> None:
+    """Regression test: the work of earlier attempts alone gave an effort that was too small."""
+    work = ProofWork(10.0, 0.5)
+    work.done = 6.0
+    for share, effort in ((0.5, "2.4"), (0.0, "5")):
+        with pytest.raises(InputError, match=rf"--effort {effort} "):
+            work.check(share)
+        work.begin()
 
 
 def test_huge_advice_is_a_number() -> None:

@@ -90,8 +90,13 @@ def test_work_limit_is_on_bits_too(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_work_limit_is_on_all_attempts() -> None:
     """Regression test: after a first attempt, case 6 took a minute up to the limit."""
-    with pytest.raises(InputError, match=r"more than \d steps; .*effort"):
-        prove(case_scene(6), [100.0], 25, effort=0.035)
+    counts = []
+    for effort in (0.03, 0.06):
+        with pytest.raises(InputError, match=r"steps; .*effort") as caught:
+            prove(case_scene(6), [100.0], 25, effort=effort)
+        counts.append(int(str(caught.value).split()[3]))
+    assert counts[0] > 250
+    assert counts[1] < counts[0] + 30
 
 
 @pytest.mark.parametrize("kind", KINDS)

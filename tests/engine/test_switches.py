@@ -416,6 +416,7 @@ CASES: list[Torque] = [
     lambda t, w: np.copysign(w, [-0.0, 2.0, w[0]]) + np.linalg.det(a=np.diag(w)),
     lambda t, w: np.linalg.det(np.array([[w[0], t], [w[1], w[2]]])) * np.rad2deg(w),
     lambda t, w: np.interp([w[0], t, 0 * w[2]], [0, 0, 0.1, 1.75, 1.75, 3], [1, 2, 4, 4, 5, 9]),
+    lambda t, w: np.interp(w, [0, 0.25, 0.25, 3], [1, 1, 4, 4]),
 ]  # fmt: skip
 
 
@@ -432,6 +433,7 @@ def test_recorded_function_has_the_values_of_numpy(number: int) -> None:
     [
         (lambda t, w: -w * np.interp(w, [-np.inf, 1, np.inf], [1, 3, 4]), "not finite"),
         (lambda t, w: -w * np.interp(t, [0, 2, 1], [1, 3, 4]), "not in ascending order"),
+        (lambda t, w: w * np.interp(1, [0, 2, 1], [1, 3, 4], w[0]), "not in ascending order"),
         (lambda t, w: -w * np.interp(t, [0, 1], [1, 3, 4]), "not of the same length"),
     ],
 )
@@ -535,7 +537,8 @@ def test_the_sign_of_a_power_changes_with_its_base(tolerance: float) -> None:
     stepper.until(5.0)
     assert stepper.omega == pytest.approx(wanted, abs=1e-8)
     still = recorded(lambda t, w: np.where(-(w[0] ** 4) * w[1] ** 3 > 0.0, 1.0, 2.0) * np.ones(3))
-    assert [still.at(0.0, (x, -1.0, 0.0), (1.0, 0.0, 0.0, 0.0))[0] for x in (0.0, 0.5)] == [2, 1]
+    signs = [still.at(0.0, (x, -1.0, 0.0), (1.0, 0.0, 0.0, 0.0))[0] for x in (-0.5, 0.0, 0.5)]
+    assert signs == [1, 2, 1]
 
 
 BRANCHES: dict[str, Torque] = {

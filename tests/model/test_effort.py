@@ -160,11 +160,12 @@ def test_advice_is_rounded_up(needed: float | None, effort: float, text: str) ->
 def test_advice_where_an_attempt_has_not_advanced() -> None:
     """Regression test: the work of earlier attempts alone gave an effort that was too small."""
     work = ProofWork(10.0, 0.5)
-    work.done = 6.0
-    for share, effort in ((0.5, "2.4"), (0.0, "5")):
+    for done, share, effort in ((6.0, 0.5, "2.4"), (6.0, 0.0, "5"), (12.0, 0.5, "3.6")):
+        work.done = done
         with pytest.raises(InputError, match=rf"--effort {effort} "):
             work.check(share)
-        work.begin()
+        if done == 6.0:
+            work.begin()
 
 
 def test_huge_advice_is_a_number() -> None:

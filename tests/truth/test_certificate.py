@@ -97,6 +97,20 @@ def test_work_limit_is_on_all_attempts() -> None:
         counts.append(int(str(caught.value).split()[3]))
     assert counts[0] > 250
     assert counts[1] < counts[0] + 30
+    # Twice what is needed, of which the first attempt is a small part.
+    assert 6.0 < float(str(caught.value).split("--effort ")[1].split()[0]) < 12.0
+
+
+def test_waves_count_as_work() -> None:
+    counts = []
+    for n in (0, 6):
+        waves = [((0.1, 0.0, 0.0), 1.0 + k) for k in range(n)]
+        law = TorqueLaw((0.1, 0.0, 0.0), sines=waves)
+        scene = Scene(omega=(1.0, 2.0, 3.0), moments=(3.0, 2.0, 1.5), torque=law)
+        with pytest.raises(InputError, match=r"steps; .*effort") as caught:
+            prove(scene, [1e3], 25, effort=0.01)
+        counts.append(int(str(caught.value).split()[3]))
+    assert counts[1] < 0.8 * counts[0]
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -343,3 +343,15 @@ def test_work_limit_holds_for_all_attempts_and_orders() -> None:
             enclose_steps(scene, [100.0], digits, effort=0.01)
         counts.append(int(str(caught.value).split()[3]))
     assert counts[0] > 10 * counts[1] > 0
+
+
+def test_operations_and_derivatives_count_as_work() -> None:
+    scene = Scene(omega=(1.0, 2.0, 3.0), moments=(4.0, 3.0, 2.0))
+    dragged = replace(scene, torque=torques.drag([0.1, 0.1]))
+    counts = []
+    for body, transition in ((scene, False), (dragged, False), (scene, True)):
+        with pytest.raises(InputError, match=r"steps; .*effort") as caught:
+            enclose_steps(body, [1e3], 20, transition=transition, effort=0.02)
+        counts.append(int(str(caught.value).split()[3]))
+    assert counts[1] < 0.8 * counts[0]
+    assert counts[2] < 0.2 * counts[0]

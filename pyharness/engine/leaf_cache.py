@@ -18,6 +18,15 @@ from pathlib import Path
 from pyharness.engine.lane_leaves import whole_source
 from pyharness.engine.leaf_text import Structure, structure
 from pyharness.engine.recorded import has_ready_leaves, listing, number_of_leaves, system_of
+from pyharness.model.arithmetic import (
+    PROBE,
+    SHARED,
+    UncheckedError,
+    check_compiler,
+    check_library,
+    check_options,
+    run,
+)
 from pyharness.model.array_type import Array
 from pyharness.model.constant_body import with_constant_body
 from pyharness.model.extension import extension
@@ -25,9 +34,8 @@ from pyharness.model.scene import Scene
 from pyharness.model.tape import Tape
 
 MOST_BYTES = 20_000_000  # of all files; the oldest ones are deleted
-_MOST_SECONDS = 60.0  # of a compilation
 _FORGOTTEN = 3600.0  # age (s) from which files of a killed compilation are deleted
-_FLAGS = ("-O2", "-ffp-contract=fast", "-fPIC", "-shared")
+_FLAGS = ("-O2", "-ffp-contract=fast", *SHARED)
 _NATIVE = "-march=native"
 
 
@@ -36,7 +44,7 @@ class LeavesError(Exception):
 
 
 # RuntimeError: no home folder is known.
-_FAILURES = (LeavesError, RuntimeError)
+_FAILURES = (LeavesError, UncheckedError, RuntimeError)
 
 
 def folder() -> Path:
@@ -50,7 +58,9 @@ def size() -> int:
 
 def about_leaves() -> dict[str, str | int]:
     try:
-        return {"folder": str(folder()), "bytes": size(), "compiler": " ".join(compiler())}
+        found = compiler()
+        text = check_compiler((*found, *_FLAGS)) or " ".join(found)
+        return {"folder": str(folder()), "bytes": size(), "compiler": text}
     except _FAILURES as error:
         return {"folder": "none", "bytes": 0, "compiler": str(error)}
 
@@ -87,7 +97,7 @@ def leaves_of_many(packed: Array, leaves: str) -> str:
 def loaded(tape: Structure, place: str) -> int:
     """Return the address of the compiled functions (see tape.h)."""
     try:
-        text = whole_source(tape)
+        text = whole_source(tape) + PROBE
         library = CDLL(str(_found(Path(place), _key(text)) or compiled_file(Path(place), text)))
         return ctypes.addressof(ctypes.c_void_p.in_dll(library, "leaves"))
     except (OSError, AttributeError, ValueError) as error:
@@ -106,6 +116,8 @@ def compiler() -> tuple[str, ...]:
         except ValueError as error:
             raise LeavesError(f"CC is {command!r}: {error}") from None
         if found := which(program):
+            if fault := check_options((found, *arguments)):
+                raise LeavesError(fault)
             return (found, *arguments)
     raise LeavesError("no C compiler is found: install one, or name it with CC=...")
 
@@ -169,6 +181,9 @@ def compiled_file(place: Path, text: str) -> Path:
         command = [*compiler(), *_FLAGS, str(code), "-o", str(result)]
         if _run([*command, _NATIVE]) and (reason := _run(command)):
             raise LeavesError(f"{compiler()[0]} failed: {reason}")
+        # Before this process loads it: code that a linker adds can change all its arithmetic.
+        if fault := check_library((*compiler(), *_FLAGS), result):
+            raise LeavesError(fault)
         result.chmod(0o700)
         target = place / f"{_key(text)}-{sha256(result.read_bytes()).hexdigest()}.so"
         result.replace(target)
@@ -176,17 +191,10 @@ def compiled_file(place: Path, text: str) -> Path:
 
 
 def _run(command: list[str]) -> str:
-    import subprocess
-
-    try:
-        run = subprocess.run(
-            command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=_MOST_SECONDS
-        )
-    except (OSError, subprocess.TimeoutExpired) as error:
-        return str(error)
-    if run.returncode == 0:
+    status, error = run(command)
+    if status == 0:
         return ""
-    lines = run.stderr.strip().splitlines() or [f"exit status {run.returncode}"]
+    lines = error.strip().splitlines() or [f"exit status {status}"]
     return next((line for line in lines if "error" in line), lines[0])
 
 

@@ -22,6 +22,7 @@ from pyharness.engine import leaf_cache
 from pyharness.engine.lane_leaves import whole_source
 from pyharness.engine.leaf_text import structure
 from pyharness.engine.recorded import kernel_tape, listing, system_of, taylor_step
+from pyharness.model.arithmetic import REFUSED
 from pyharness.model.codes import Statuses
 from pyharness.model.constant_body import with_constant_body
 from pyharness.model.extension import extension
@@ -452,6 +453,47 @@ def test_without_a_working_compiler_the_interpreter_solves(
     assert "\n" not in str(solver.leaves)
     assert solver((0.3, 0.2, 0.9), 1.0) == pytest.approx(solve(solver.scene, 1.0).omega[0])
     assert not [each for each in folder.glob("*") if not each.name.endswith(".so")]
+
+
+# A sphere whose omega (rad/s) is subnormal.
+TINY = Scene("tiny", (1e-310, 0.0, 0.0), (1.0, 1.0, 1.0))
+
+
+@pytest.mark.external
+@pytest.mark.usefixtures("fresh")
+@pytest.mark.parametrize(
+    ("flag", "is_wrapped"),
+    [("-ffast-math", False), ("-ffast-math", True), ("-funsafe-math-optimizations", True),
+     ("-fno-signed-zeros", True), ("-mrecip", False)],
+)  # fmt: skip
+def test_a_compiler_that_changes_the_arithmetic_is_refused(
+    flag: str, is_wrapped: bool, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also if its options are not seen; code linked with some would change the whole process."""
+    command = script(folder, f'exec cc {flag} "$@"') if is_wrapped else f"cc {flag}"
+    monkeypatch.setenv("CC", command)
+    options = f"options such as {', '.join(REFUSED[:7])}" if is_wrapped else flag
+    reason = f" changes the arithmetic: leave out {options}"
+    assert str(leaf_cache.about_leaves()["compiler"]).endswith(reason)
+    solver = prepare(scene_of(simple), compiled=True)
+    assert str(solver.leaves).startswith("interpreter: ")
+    assert str(solver.leaves).endswith(reason)
+    assert solve(TINY, 1.0).omega[0, 0] == 1e-310
+    assert 0.5 * sys.float_info.min > 0.0
+
+
+@pytest.mark.external
+@pytest.mark.usefixtures("fresh")
+def test_leaves_of_another_compiler_are_not_loaded(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CC", "cc -g")
+    assert prepare(scene_of(simple), compiled=True).leaves == "compiled"
+    leaf_cache.compiler.cache_clear()
+    leaf_cache.machine.cache_clear()
+    leaf_cache.loaded.cache_clear()
+    monkeypatch.setenv("CC", "cc -g -ffinite-math-only")
+    assert "leave out -ffinite-math-only" in str(prepare(scene_of(simple), compiled=True).leaves)
 
 
 def no_room(*_: Any, **__: Any) -> None:

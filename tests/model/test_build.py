@@ -3,17 +3,18 @@
 import importlib.util
 import os
 import platform
-import runpy
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from pyharness import _build  # noqa: PLC2701
-from pyharness.model import extension
+from pyharness.model import arithmetic, extension
+from pyharness.model.arithmetic import check_compiler, check_options
 from pyharness.model.build import build
 from tests.as_written import COMPILER
 from tests.instruction_sets import LEVELS
@@ -93,48 +94,107 @@ def test_an_editable_install_in_build_isolation_is_refused(tmp_path: Path) -> No
     assert "pip install --no-build-isolation --editable ." in line
 
 
+CHANGING = (
+    "-Ofast", "-ffast-math", "-funsafe-math-optimizations", "-ffinite-math-only",
+    "-freciprocal-math", "-fno-signed-zeros", "-fcx-limited-range",
+    "-fassociative-math -fno-signed-zeros -fno-trapping-math",
+)  # fmt: skip
+CHANGING_X86 = ("-mfpmath=387",)
+CHANGING_C = ("-fsingle-precision-constant",)
+CHANGING_FORTRAN = (
+    "-fdefault-real-8", "-fdefault-real-8 -fdefault-double-8", "-fdefault-integer-8",
+    "-freal-4-real-8", "-freal-8-real-4", "-freal-8-real-16", "-finteger-4-integer-8",
+)  # fmt: skip
+HARMLESS = ("", "-O3 -ffp-contract=fast -fno-trapping-math", "-frounding-math -fno-math-errno")
+
+
+def _check(language: str, flags: str) -> str | None:
+    of_fortran = language == "fortran"
+    source = ROOT / "fortran/arithmetic.f90" if of_fortran else None
+    return check_compiler([COMPILER if of_fortran else "cc", "-O2", *flags.split()], source)
+
+
+def _changing() -> Iterator[tuple[str, str]]:
+    x86 = CHANGING_X86 if platform.machine().lower() in ("x86_64", "amd64") else ()
+    for language, own in (("c", CHANGING_C), ("fortran", CHANGING_FORTRAN)):
+        yield from ((language, flags) for flags in (*CHANGING, *x86, *own))
+
+
 @pytest.mark.external
 @pytest.mark.skipif(_build.COMPILER != "gcc", reason="the options are those of gcc")
-@pytest.mark.parametrize("source", ["arithmetic.c", "arithmetic.f90"])
-@pytest.mark.parametrize(
-    "flags",
-    ["-O3 -ffp-contract=fast -fno-trapping-math", "-Ofast", "-ffinite-math-only",
-     "-freciprocal-math", "-fno-signed-zeros"],
-)  # fmt: skip
-def test_flags_that_change_the_arithmetic_are_found(source: str, flags: str) -> None:
-    fault = runpy.run_path(str(ROOT / "fortran/check_arithmetic.py"))["fault"]
-    compiler = "cc" if source.endswith("c") else COMPILER
-    found = fault(str(ROOT / "fortran" / source), [compiler, "-O2", *flags.split()])
-    assert (found is None) == ("-ffp-contract" in flags), found
-    assert found is None or f"{flags}' removes or reorders operations" in found
+@pytest.mark.parametrize(("language", "flags"), [*_changing()])
+def test_flags_that_change_the_arithmetic_are_refused(
+    language: str, flags: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By name, and by what they do if a compiler's wrapper adds them."""
+    named = flags.split()[-1] if "default-double" in flags else flags.split()[0]
+    fault = _check(language, flags)
+    assert fault is not None
+    assert named in fault.partition(" changes the arithmetic: leave out ")[2]
+    monkeypatch.setattr(arithmetic, "REFUSED", ("unnamed",) * 7)
+    fault = _check(language, flags)
+    assert fault is not None
+    assert fault.endswith(f"{flags}' changes the arithmetic: leave out options such as "
+                          + ", ".join(arithmetic.REFUSED))  # fmt: skip
 
 
 @pytest.mark.external
-def test_arithmetic_that_can_not_be_tested_is_no_fault(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """The test program may lack a library of the compiler that the kernels do not need."""
-    fault = runpy.run_path(str(ROOT / "fortran/check_arithmetic.py"))["fault"]
-    source = tmp_path / "fails.c"
-    source.write_text("int main(void) { return 127; }\n")
-    assert fault(str(source), ["cc"]) is None
-    assert "its arithmetic is not tested" in capsys.readouterr().out
-    source.write_text("int main(\n")
-    assert "'cc' does not compile" in fault(str(source), ["cc"])
+@pytest.mark.skipif(_build.COMPILER != "gcc", reason="the options are those of gcc")
+@pytest.mark.parametrize("language", ["c", "fortran"])
+@pytest.mark.parametrize("flags", HARMLESS)
+def test_flags_that_keep_the_arithmetic_are_accepted(language: str, flags: str) -> None:
+    assert _check(language, flags) is None
+
+
+@pytest.mark.parametrize(
+    "flag", ["-mrecip", "-mrecip=all", "-fdefault-real-16", "-mfpmath=sse+387", "-mdaz-ftz",
+             "-fp-model=fast=2", "-fdenormal-fp-math=preserve-sign,preserve-sign"],
+)  # fmt: skip
+def test_flags_that_change_it_elsewhere_are_refused_by_name(flag: str) -> None:
+    """With other options, on other processors, or by other compilers."""
+    fault = check_options(["cc", "-g", flag, "-mfpmath=sse", "-fp-model=strict"])
+    assert fault is not None
+    assert fault.endswith(f" changes the arithmetic: leave out {flag}")
+
+
+@pytest.mark.external
+def test_arithmetic_that_can_not_be_tested_is_no_fault(tmp_path: Path) -> None:
+    """The check may lack a library of the compiler that the kernels do not need."""
+    check = ROOT / "fortran/check_arithmetic.py"
+    made = ROOT / "pyharness/model/arithmetic.py"
+    source = tmp_path / "other.c"
+    for text, status, words in (
+        ("int absent(void); int arithmetic_faults(void) { return absent(); }", 0,
+         "the arithmetic is not checked: what 'cc' compiles can't be loaded: "),
+        ("int main(", 1, "'cc' does not compile other.c: "),
+    ):  # fmt: skip
+        source.write_text(text)
+        done = _run(
+            sys.executable, check, made, source, "cc", env=os.environ | {"LD_BIND_NOW": "1"}
+        )
+        assert (done.returncode, done.stderr) == (status, "")
+        (line,) = done.stdout.splitlines()
+        assert line.startswith(words)
 
 
 @pytest.mark.campaign
 @pytest.mark.external
 @pytest.mark.skipif(_build.COMPILER != "gcc", reason="the options are those of gcc")
-@pytest.mark.parametrize("variable", ["CFLAGS", "FFLAGS"])
-def test_a_build_with_such_flags_is_refused_in_one_line(variable: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("variable", "flag"),
+    [("CFLAGS", "-Ofast"), ("FFLAGS", "-Ofast"), ("LDFLAGS", "-ffast-math"), ("CC", "-mrecip"),
+     ("FFLAGS", "-fdefault-real-8"), ("FC", "-freal-4-real-8")],
+)  # fmt: skip
+def test_a_build_with_such_flags_is_refused_in_one_line(
+    variable: str, flag: str, tmp_path: Path
+) -> None:
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    environment = os.environ | {"PATH": path, variable: "-Ofast"}
+    compiler = {"CC": "cc ", "FC": f"{COMPILER} "}.get(variable, "")
+    environment = os.environ | {"PATH": path, variable: compiler + flag}
     done = _run("meson", "setup", tmp_path / "build", ROOT, cwd=tmp_path, env=environment)
     assert done.returncode == 1
     (line,) = (each for each in done.stdout.splitlines() if "ERROR" in each)
-    assert "-Ofast" in line.partition("' removes or reorders operations")[0]
-    assert "leave out options such as -Ofast, -ffast-math" in line
+    assert line.endswith(f" changes the arithmetic: leave out {flag}")
 
 
 @pytest.mark.campaign

@@ -47,11 +47,9 @@ mutate: .venv/ready-to-test
 cross-check: .venv/ready-to-test
 	@FC=$(FC) $(BIN)/python -m tests.cross $(ARGS)
 
-# The editable build has the same options, so that nothing is compiled again.
+# For all processors, as `pip wheel .`; the editable build is for this one.
 wheel: .venv/ready
-	@PATH="$(CURDIR)/$(BIN):$$PATH" FC=$(FC) $(BIN)/python -m pip wheel --quiet \
-	  --disable-pip-version-check --no-build-isolation --no-deps \
-	  -Cbuild-dir="$$(echo build/cp*)" --wheel-dir dist .
+	@FC=$(FC) $(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
 	@ls dist/*.whl
 
 edition: .venv/ready-to-test

@@ -95,6 +95,21 @@ def release(session: nox.Session) -> None:
             session.error("the wheel needs libraries that no system has by itself")
 
 
+@nox.session
+def levels(session: nox.Session) -> None:
+    """Test each instruction set of the wheel, without the sources; or run the tests named."""
+    tests = FACTS["tool"]["cibuildwheel"]
+    session.install(f"{the('whl')}[plots]", *tests["test-requires"])
+    session.chdir(copied_tree(session))
+    shutil.rmtree("pyharness")
+    chosen = session.posargs or [
+        "-k",
+        "plain or avx2 or avx512 or levels or registers",
+        "tests/engine",
+    ]
+    session.run("python", "-m", "pytest", "-q", "-m", "not campaign", *chosen)
+
+
 @nox.session(venv_backend="venv")
 def installs(session: nox.Session) -> None:
     """Build and install the sources with pip, and run tests in a tree without the sources."""

@@ -65,8 +65,9 @@ subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosin
 end subroutine taylor_rows
 
 subroutine choose_instructions(highest, taken)
-  ! Select the kernels of one instruction set, for tests: 0 plain, 1 AVX2, 2 AVX-512. If the
-  ! processor lacks this set, `taken` is the best set below it. -1 changes nothing.
+  ! Select the kernels of one instruction set, for tests: 0 plain, 1 AVX2, 2 AVX-512. If it is not
+  ! compiled or the processor lacks it, `taken` is the best set below, or else the lowest compiled,
+  ! or -1 if the processor lacks that too. -1 changes nothing.
   use levels, only: choose_level
   implicit none
   integer(4), intent(in) :: highest

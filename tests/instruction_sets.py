@@ -15,15 +15,19 @@ CHOSEN = LEVELS.index(os.environ.get("PYHARNESS_INSTRUCTIONS", LEVELS[BEST]))
 _NAMES = ({"X86_V3", "AVX2"}, {"X86_V4", "AVX512_SKX"})
 
 
-def level_here() -> int:
-    """Return the highest level that is due here, according to NumPy and not to levels.c."""
-    if len(_build.INSTRUCTION_SETS) == 1:
-        return 0
+def level_of_processor() -> int:
+    """Return the highest level of this processor, according to NumPy and not to levels.c."""
     simd = np.show_config(mode="dicts")["SIMD Extensions"]
     found = {*simd["baseline"], *simd["found"]}
     return sum(not names.isdisjoint(found) for names in _NAMES)
 
 
+def levels_here() -> list[int]:
+    """Return the levels that are compiled, and that this processor has."""
+    compiled = [LEVELS.index(name) for name in _build.INSTRUCTION_SETS]
+    return [level for level in compiled if level <= level_of_processor()]
+
+
 def fuses_here() -> bool:
     """Whether this processor has a fused multiply-add."""
-    return level_here() > 0 or platform.machine().lower() in ("arm64", "aarch64")
+    return level_of_processor() > 0 or platform.machine().lower() in ("arm64", "aarch64")

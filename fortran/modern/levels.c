@@ -17,7 +17,7 @@ typedef void runner(void *ensemble);
 typedef void reader(int pieces, const double *edges, const double *points, int m, const double *values,
                     int n, const double *times, double *states);
 
-#define DECLARED(level)                                                                        \
+#define DECLARED(level, number, width)                                                         \
   solver taylor_solve_##level;                                                                 \
   quick_solver quick_solve_##level;                                                            \
   free_solver solve_many_free_##level;                                                         \
@@ -28,22 +28,38 @@ typedef void reader(int pieces, const double *edges, const double *points, int m
   solver solve_tape_##level;                                                                   \
   solver step_tape_##level;                                                                    \
   solver vary_solution_##level;                                                                \
-  reader read_pieces_##level;
-#define TAKEN(level, width)                                                                    \
+  reader read_pieces_##level;                                                                  \
+  extern const struct leaves ready_leaves_##level[];
+#define TAKEN(level, number, width)                                                            \
   {taylor_solve_##level,       quick_solve_##level,      solve_many_free_##level,              \
    solve_many_taylor_##level,  solve_many_fixed_##level, run_lanes_##level,                    \
    solve_tape_##level,         step_tape_##level,        vary_solution_##level,                \
-   solve_tape_bodies_##level,  read_pieces_##level,      ready_leaves_##level,  width}
+   solve_tape_bodies_##level,  read_pieces_##level,      ready_leaves_##level,                 \
+   number, width},
 
-DECLARED(plain)
-#ifdef WITH_LEVELS
-DECLARED(avx2)
-DECLARED(avx512)
-extern const struct leaves ready_leaves_avx2[], ready_leaves_avx512[];
+/* The levels that are compiled, and the width of their registers. The build for one processor has
+   one of them. */
+#ifdef WITH_plain
+#define PLAIN(DO) DO(plain, 0, IN_REGISTER)
+#else
+#define PLAIN(DO)
+#endif
+#ifdef WITH_avx2
+#define AVX2(DO) DO(avx2, 1, 4)
+#else
+#define AVX2(DO)
+#endif
+#ifdef WITH_avx512
+#define AVX512(DO) DO(avx512, 2, 8)
+#else
+#define AVX512(DO)
+#endif
+#define EACH_LEVEL(DO) PLAIN(DO) AVX2(DO) AVX512(DO)
+
+EACH_LEVEL(DECLARED)
+#if defined(WITH_plain) && (defined(WITH_avx2) || defined(WITH_avx512))
 /* They would take 90 kB of a wheel, for x86-64 processors before 2013. */
 #define ready_leaves_plain NULL
-#else
-extern const struct leaves ready_leaves_plain[];
 #endif
 
 static struct {
@@ -59,16 +75,11 @@ static struct {
   runner *bodies;
   reader *pieces;
   const struct leaves *leaves; /* of ready torques, in the order of ready_keys */
+  int level;                   /* 0 plain, 1 AVX2 with FMA, 2 AVX-512 */
   int width;                   /* numbers in a register */
-} chosen, known[] = {
-  TAKEN(plain, IN_REGISTER),
-#ifdef WITH_LEVELS
-  TAKEN(avx2, 4),
-  TAKEN(avx512, 8),
-#endif
-};
-static int level = 0; /* 0 plain, 1 AVX2 with FMA, 2 AVX-512 */
+} chosen, known[] = {EACH_LEVEL(TAKEN)};
 
+#if defined(WITH_avx2) || defined(WITH_avx512)
 /* All features of x86-64-v3 that a processor with AVX2 may lack, or a virtual machine may hide. */
 #define HAS_AVX2                                                                               \
   (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&                          \
@@ -77,20 +88,24 @@ static int level = 0; /* 0 plain, 1 AVX2 with FMA, 2 AVX-512 */
   (HAS_AVX2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512cd") &&      \
    __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&                 \
    __builtin_cpu_supports("avx512vl"))
+static int level_here(void)
+{
+  __builtin_cpu_init();
+  return HAS_AVX512 ? 2 : HAS_AVX2 ? 1 : 0;
+}
+#else
+static int level_here(void) { return 0; }
+#endif
 
-/* Choose a level, or the best below it that the processor has. Return the level that was chosen.
-   -1 changes nothing. */
+/* Choose a level, or the best below it that is compiled and the processor has, or else the lowest.
+   Return the level that was chosen, or -1 if the processor lacks it. -1 changes nothing. */
 int choose_level(int highest)
 {
-  if (highest < 0) return level;
-  level = 0;
-#ifdef WITH_LEVELS
-  __builtin_cpu_init();
-  if (highest >= 2 && HAS_AVX512) level = 2;
-  else if (highest >= 1 && HAS_AVX2) level = 1;
-#endif
-  chosen = known[level];
-  return level;
+  const int here = level_here();
+  if (highest >= 0) chosen = known[0];
+  for (size_t i = 0; highest >= 0 && i < sizeof known / sizeof *known; i++)
+    if (known[i].level <= highest && known[i].level <= here) chosen = known[i];
+  return chosen.level <= here ? chosen.level : -1;
 }
 
 __attribute__((constructor)) static void choose_best(void) { choose_level(2); }

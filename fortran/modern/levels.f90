@@ -13,8 +13,8 @@ module levels
 
   interface
     integer(c_int) function choose_level(highest) bind(c, name="choose_level")
-      !! Choose a level (0 plain, 1 AVX2, 2 AVX-512) or the best below it, and return it; -1 changes
-      !! nothing.
+      !! Choose a level (0 plain, 1 AVX2, 2 AVX-512) or the best below it, and return it, or -1 if
+      !! the processor lacks it; -1 changes nothing.
       import :: c_int
       implicit none(type, external)
       integer(c_int), intent(in), value :: highest

@@ -102,7 +102,8 @@ def _ask_kernels() -> dict[str, str | None]:
         from pyharness._kernels import arithmetic_faults, choose_instructions
     except ImportError:
         return {"instructions": None, "arithmetic": None}
-    instructions = _LEVELS[int(choose_instructions(-1))]
+    level = int(choose_instructions(-1))
+    instructions = _LEVELS[level] if level >= 0 else "none that this processor has"
     is_changed, is_flushed = arithmetic_faults((5.0, 0.0, float("nan"), sys.float_info.min))
     faults = []
     if is_changed:

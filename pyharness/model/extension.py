@@ -1,5 +1,6 @@
 """Access to the compiled Fortran extension."""
 
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -25,7 +26,19 @@ def extension() -> ModuleType:
     except ImportError as error:
         raise NotBuiltError(_why_missing()) from error
     module: ModuleType = _kernels
+    _check_processor()
     return module
+
+
+@cache
+def _check_processor() -> None:
+    from pyharness import _build, _kernels
+
+    if _kernels.choose_instructions(-1) < 0:
+        raise NotBuiltError(
+            f"the kernels are built for {_build.INSTRUCTION_SETS[0]}, which this processor lacks; "
+            "run 'make clean compare', or 'pip install .', which builds for all processors"
+        )
 
 
 def _why_missing() -> str:

@@ -135,10 +135,10 @@ def _builds() -> tuple[list[Build], list[str]]:
     gfortran = os.environ.get("FC", "gfortran")
     faults = tuple((ORIGINAL + file, old, new) for _, (file, old, new), _ in FAULTS.values())
     debug = Build(
-        "debug", gfortran, "gcc", "1", CHECKED, checked=True, tests=CALLING, instruction_sets=True
+        "debug", gfortran, "gcc", "1", CHECKED, checked=True, tests=CALLING, instruction_sets="all"
     )
     faulty = replace(
-        debug, name="faulty", plants=faults, faulty=True, tests=(), instruction_sets=False
+        debug, name="faulty", plants=faults, faulty=True, tests=(), instruction_sets="plain"
     )
     builds = [debug, faulty]
     skipped = []

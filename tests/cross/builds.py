@@ -29,7 +29,7 @@ class Build:
     plants: tuple[tuple[str, str, str], ...] = ()  # file, passage, faulty passage
     faulty: bool = False  # made only to check that its faults are caught
     # Kernels for each instruction set have flags of their own, which override those of the build.
-    instruction_sets: bool = False
+    instruction_sets: str = "plain"
     tests: tuple[str, ...] = ()
 
 
@@ -56,7 +56,7 @@ def make(build: Build, folder: Path) -> Path:
     options = [
         f"-Doptimization={build.optimization}",
         f"-Ddebug={str(build.checked).lower()}",
-        f"-Dinstruction_sets={str(build.instruction_sets).lower()}",
+        f"-Dinstruction_sets={build.instruction_sets}",
     ]
     for command in (["meson", "setup", "build", *options], ["meson", "compile", "-C", "build"]):
         done = subprocess.run(

@@ -22,7 +22,7 @@ from pyharness.truth.elliptic import torque_free
 from pyharness.truth.reference import reference
 from tests.as_written import as_written, compiler_here
 from tests.checks.scenes.timed_kinds import NASTY, timed_scenes
-from tests.instruction_sets import CHOSEN, level_here
+from tests.instruction_sets import CHOSEN, levels_here
 
 RUNS = [(case, 3.0) for case in range(1, 8)] + [(3, 100.0), (4, 100.0)]
 REST = Scene("", (0.0, 0.0, 0.0), moments=(40.0, 30.0, 20.0))
@@ -127,7 +127,7 @@ def test_steps_are_few(name: str, time: float, counts: tuple[int, ...]) -> None:
 def test_levels_agree_to_rounding() -> None:
     """The bits differ: with fused multiply-adds they would agree only if one kernel ran twice."""
     found = []
-    for number in range(level_here() + 1):
+    for number in levels_here():
         assert extension().choose_instructions(number) == number
         found.append(_end(case_scene(5), 4.0, 1e-15)[0])
     extension().choose_instructions(CHOSEN)

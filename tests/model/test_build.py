@@ -12,12 +12,18 @@ from typing import Any
 
 import pytest
 
-from pyharness import _build  # noqa: PLC2701
+from pyharness import (
+    NotBuiltError,
+    _build,  # noqa: PLC2701
+    case_scene,
+    solve,
+)
+from pyharness.cli.main import main
 from pyharness.model import arithmetic, extension
 from pyharness.model.arithmetic import check_compiler, check_options
 from pyharness.model.build import build
 from tests.as_written import COMPILER
-from tests.instruction_sets import LEVELS
+from tests.instruction_sets import LEVELS, level_of_processor
 
 ROOT = Path(__file__).parent.parent.parent
 LIBRARIES = ("gfortran", "quadmath", "flang", "FortranRuntime", "ifcore", "imf")
@@ -41,10 +47,26 @@ def test_extension_needs_no_fortran_library_at_run_time() -> None:
         assert library not in needed
 
 
-def test_hot_kernels_are_built_for_every_instruction_set() -> None:
+def test_hot_kernels_are_built_for_this_processor_or_for_all() -> None:
     on_x86 = platform.machine().lower() in ("x86_64", "amd64")
-    wanted = LEVELS if on_x86 and _build.COMPILER == "gcc" else LEVELS[:1]
-    assert sorted(_build.INSTRUCTION_SETS) == sorted(wanted)
+    has_levels = on_x86 and _build.COMPILER == "gcc"
+    native = LEVELS[level_of_processor() if has_levels else 0]
+    assert _build.INSTRUCTION_SETS in ((native,), LEVELS if has_levels else LEVELS[:1])
+
+
+def test_a_build_for_another_processor_is_refused(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("pyharness._kernels.choose_instructions", lambda highest: -1)
+    monkeypatch.setattr(_build, "INSTRUCTION_SETS", ("avx512",))
+    extension._check_processor.cache_clear()
+    try:
+        with pytest.raises(NotBuiltError, match="built for avx512, which this processor lacks"):
+            solve(case_scene(3), 1.0)
+        assert main(["doctor"]) == 0
+        assert "instructions      none that this processor has" in capsys.readouterr().out
+    finally:
+        extension._check_processor.cache_clear()
 
 
 def test_flags_are_the_ones_that_keep_the_bits() -> None:

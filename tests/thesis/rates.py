@@ -13,7 +13,7 @@ from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene_file import case_scene
 from pyharness.thesis.compiled import program_arguments
 from pyharness.thesis.many import run_many
-from tests.instruction_sets import LEVELS, level_here
+from tests.instruction_sets import LEVELS, levels_here
 
 BODY_STEPS = 2_000_000  # of one measurement of a batch
 AT_REST = 1e9  # 1/s: the stop test is made, and stops no run
@@ -44,7 +44,7 @@ def side_by_side(listing: Listing, steps: int, threads: int = 1, work: int = BOD
 
 def main(arguments: Sequence[str]) -> int:
     """Print the table, for the instruction sets that this machine has, or those named."""
-    for level in range(level_here(), -1, -1):
+    for level in reversed(levels_here()):
         if arguments and LEVELS[level] not in arguments:
             continue
         extension().choose_instructions(level)

@@ -1,13 +1,14 @@
-"""Write the cases of the interpreter of recorded operations: make_cases.py ROOT HEADER.
+"""Write the cases of the interpreter of recorded operations.
 
 The cases are macros, from the table in pyharness/model/recurrences.py. The letters o, p and q stand
 for results, x and y for operands: pointers to terms in TERM_CASES, numbers of slots elsewhere.
 """
 
 import re
-import sys
-from pathlib import Path
 from typing import Any
+
+from pyharness.model.codes import Operations
+from pyharness.model.recurrences import OPERATIONS, WAVE
 
 
 def terms(operation: Any) -> list[str]:
@@ -47,15 +48,8 @@ def roundings(operation: Any, is_exact: bool) -> list[str]:
     return found
 
 
-def main(root: str, header: str) -> None:
-    """Write the header."""
-    sys.dont_write_bytecode = True
-    sys.path.insert(0, root)
-    # The finder of an editable installation, an instance, would start a build.
-    sys.meta_path[:] = [each for each in sys.meta_path if isinstance(each, type)]
-    from pyharness.model.codes import Operations
-    from pyharness.model.recurrences import OPERATIONS, WAVE
-
+def texts() -> dict[str, str]:
+    """Return the text of the header by its file."""
     names = {value: name for name, value in vars(Operations).items() if name.isupper()}
     table = {(names | {WAVE: "WAVE"})[kind]: each for kind, each in OPERATIONS.items()}
     # Products are computed together, and tables before.
@@ -87,8 +81,4 @@ def main(root: str, header: str) -> None:
             labels.setdefault("; ".join(found), []).append(f"case {kind}:")
         each = [f"{' '.join(of)} {text}; break;" for text, of in labels.items() if text]
         lines.append(" \\\n  ".join([f"#define {name}", *each]))
-    Path(header).write_text("\n".join(lines) + "\n")
-
-
-if __name__ == "__main__":
-    main(*sys.argv[1:])
+    return {"cases.h": "\n".join(lines) + "\n"}

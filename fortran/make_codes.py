@@ -1,32 +1,32 @@
-"""Write the constants that Python and the kernels share: make_codes.py SOURCE FOLDER.
+"""Write the constants that Python and the kernels share, from pyharness/model/codes.py.
 
 Each class becomes a Fortran module in a file of its own, because Meson records one module per file.
-C code gets a header, codes.h. A file is written only if it changes, so that only its users are
-compiled again.
+C code gets a header, codes.h.
 """
 
 import runpy
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+SOURCE = Path(__file__).resolve().parents[1] / "pyharness/model/codes.py"
 
-def written(source: str) -> dict[str, str]:
-    """Return the texts of the files by name, for the classes in pyharness/model/codes.py."""
+
+def texts(source: Path = SOURCE) -> dict[str, str]:
+    """Return the texts of the files by name."""
     classes = {
         name: {each: value for each, value in vars(codes).items() if each.isupper()}
-        for name, codes in runpy.run_path(source).items()
+        for name, codes in runpy.run_path(str(source)).items()
         if isinstance(codes, type)
     }
-    texts = {
-        f"{name.lower()}.f90": "\n".join(_module(name.lower(), numbers))
+    found = {
+        f"{name.lower()}.f90": "\n".join([*_module(name.lower(), numbers), ""])
         for name, numbers in classes.items()
     }
     # The other statuses include OVERFLOW, a macro of some math.h.
     for_c = classes["Operations"] | classes["Storage"]
     for_c["COMPLETE"] = classes["Statuses"]["COMPLETE"]
     listed = ", ".join(f"{name} = {value}" for name, value in for_c.items())
-    return texts | {"codes.h": f"enum {{ {listed} }};"}
+    return found | {"codes.h": f"enum {{ {listed} }};\n"}
 
 
 def _module(name: str, numbers: dict[str, int | float]) -> Iterator[str]:
@@ -42,15 +42,3 @@ def _module(name: str, numbers: dict[str, int | float]) -> Iterator[str]:
         else:
             yield f"  integer, parameter, public :: {each} = {value}"
     yield f"end module {name}"
-
-
-def main(source: str, folder: str) -> None:
-    """Write the files that have changed, or are missing, to `folder`."""
-    for name, text in written(source).items():
-        target = Path(folder, name)
-        if not target.exists() or target.read_text() != f"{text}\n":
-            target.write_text(f"{text}\n")
-
-
-if __name__ == "__main__":
-    main(*sys.argv[1:])

@@ -6,10 +6,8 @@ that their rounding errors do not accumulate.
 """
 
 import itertools
-import sys
 from collections.abc import Callable, Sequence
 from decimal import Decimal, localcontext
-from pathlib import Path
 
 MOST = 8
 DIGITS = 60
@@ -94,6 +92,11 @@ def _table(name: str, shape: str, values: Sequence[Decimal]) -> str:
     )
 
 
+def texts() -> dict[str, str]:
+    """Return the text of the Fortran module by its file."""
+    return {"gauss_tables.f90": module()}
+
+
 def module() -> str:
     """Return the text of the Fortran module."""
     zero = Decimal(0)
@@ -129,7 +132,3 @@ def module() -> str:
             + _table("ONWARD", cube, onward)
             + "\nend module gauss_tables\n"
         )
-
-
-if __name__ == "__main__":
-    Path(sys.argv[1]).write_text(module())

@@ -1,26 +1,20 @@
-"""Write leaves (C code of the Taylor series) of ready torques: make_leaves.py ROOT SOURCE HEADER.
+"""Write leaves (C code of the Taylor series) of ready torques, and a header with their keys.
 
 The leaves are for a body with three different moments, and for torques whose arguments have no
 zeros, except some wheels and drag.
 """
 
-import sys
-from pathlib import Path
 from typing import Any
 
+from pyharness import Scene, TorqueLaw, torques
+from pyharness.engine.leaf_text import key, structure
+from pyharness.engine.leaves import names, source
+from pyharness.engine.recorded import listing, system_of
+from pyharness.model.constant_body import with_constant_body
 
-def main(root: str, target: str, header: str) -> None:
-    """Write the C source of all leaves with a table of them, and the header with their keys."""
-    sys.dont_write_bytecode = True
-    sys.path.insert(0, root)
-    # The finder of an editable installation, an instance, would start a build.
-    sys.meta_path[:] = [each for each in sys.meta_path if isinstance(each, type)]
-    from pyharness import Scene, TorqueLaw, torques
-    from pyharness.engine.leaf_text import key, structure
-    from pyharness.engine.leaves import names, source
-    from pyharness.engine.recorded import listing, system_of
-    from pyharness.model.constant_body import with_constant_body
 
+def texts() -> dict[str, str]:
+    """Return the C source of all leaves with a table of them, and the header, by file."""
     three = (0.1, 0.2, 0.3)
     waves = [(three, 0.4), (three, 0.5), (three, 0.6)]
     turning = TorqueLaw(three, sines=waves[:1], frame="space")
@@ -49,20 +43,18 @@ def main(root: str, target: str, header: str) -> None:
                 shape = structure(listing(system_of(with_constant_body(scene))))
                 assert shape is not None
                 structures[key(shape)] = shape
-    texts = ['#include "tape.h"']
+    parts = ['#include "tape.h"']
     for number, shape in enumerate(structures.values()):
         text = source(shape, f"_{number}")
         # Common definitions are written once.
-        texts.append(text if number == 0 else text[text.index("static void expand") :])
+        parts.append(text if number == 0 else text[text.index("static void expand") :])
     each = [
         f"{{{', '.join(names(shape, f'_{number}'))}}}"
         for number, shape in enumerate(structures.values())
     ]
-    texts.append(f"const struct leaves OF_LEVEL(ready_leaves, LEVEL)[] = {{{', '.join(each)}}};")
-    Path(target).write_text("\n".join(texts) + "\n")
+    parts.append(f"const struct leaves OF_LEVEL(ready_leaves, LEVEL)[] = {{{', '.join(each)}}};")
     keys = ", ".join(f"INT64_C({each})" for each in structures)
-    Path(header).write_text(f"static const int64_t ready_keys[] = {{{keys}}};\n")
-
-
-if __name__ == "__main__":
-    main(*sys.argv[1:])
+    return {
+        "ready_leaves.c": "\n".join(parts) + "\n",
+        "ready_keys.h": f"static const int64_t ready_keys[] = {{{keys}}};\n",
+    }

@@ -2,9 +2,9 @@
 
 import ctypes
 import os
+import runpy
 import shutil
 import subprocess
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from pyharness import Scene
 from pyharness.engine.problem import normalized
-from pyharness.model import codes
 from pyharness.model.trajectory import Array
 
 COMPILER = os.environ.get("FC", "gfortran")
@@ -102,8 +101,8 @@ def many_as_written(folder: Path) -> Callable[..., tuple[Array, Array, NDArray[n
 def _compiled(
     folder: Path, kernels: Sequence[str], changes: Mapping[str, tuple[str, str]]
 ) -> ctypes.CDLL:
-    maker = [sys.executable, str(_FORTRAN / "make_codes.py"), codes.__file__, str(folder)]
-    subprocess.run(maker, check=True)
+    for name, text in runpy.run_path(str(_FORTRAN / "make_codes.py"))["texts"]().items():
+        (folder / name).write_text(text)
     command = [COMPILER, "-shared", "-fPIC", "-O1", "-o", "loops.so"]
     command += sorted(path.name for path in folder.glob("*.f90"))
     sources = ["kinds.f90", "interruption.f90", "../tests/never_interrupted.f90", *kernels]

@@ -8,7 +8,6 @@ generates the permutations of their lanes that it needs. Other processors get Fo
 """
 
 import re
-import sys
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -85,18 +84,28 @@ OTHERS = {1: (2, 3), 2: (1, 3), 3: (1, 2)}  # the other two axes
 SIGNS = ("-1.0, 1.0, 1.0, -1.0", "-1.0, -1.0, 1.0, 1.0", "-1.0, 1.0, -1.0, 1.0")
 
 
-def main(level: str, target: str, *sources: str) -> None:
-    """Write `target`, Fortran from `sources` or C, for the instruction set `level`."""
-    if target.endswith(".c"):
-        written = "\n".join(c_source(level)) + "\n"
-    else:
-        # The name of the file makes those of modules unique: a module may be in several files.
-        file = Path(target).stem
-        texts = (Path(source).read_text() for source in sources)
-        written = "".join(fortran_source(text, level, file) for text in texts)
-    # What did not change is not compiled again.
-    if not Path(target).exists() or Path(target).read_text() != written:
-        Path(target).write_text(written)
+def texts(levels: str, *groups: str) -> dict[str, str]:
+    """Return files by name: for each of the levels, one with each group, and C for registers.
+
+    A group is its name after a plus sign, then its sources.
+    """
+    sources_of: dict[str, list[str]] = {}
+    for each in groups:
+        if each.startswith("+"):
+            sources_of[each[1:]] = sources = []
+        else:
+            sources.append(each)
+    found = {}
+    for level in levels.split():
+        for name, sources in sources_of.items():
+            # The name of the file makes those of modules unique: a module may be in several files.
+            file = f"{name}_{level}"
+            parts = (fortran_source(Path(each).read_text(), level, file) for each in sources)
+            found[f"{file}.f90"] = "".join(parts)
+        # A register's lanes are turned in C.
+        if level != "plain":
+            found[f"taylor_terms_{level}.c"] = "\n".join(c_source(level)) + "\n"
+    return found
 
 
 # ---- The recurrence -----------------------------------------------------------------------------
@@ -560,7 +569,3 @@ def c(line: str, known: set[str]) -> str:
 def load(place: int) -> str:
     """Return the C expression that loads four numbers at an offset of series_t."""
     return f"_mm256_load_pd(s + {place})"
-
-
-if __name__ == "__main__":
-    main(*sys.argv[1:])

@@ -2,8 +2,10 @@
 
 import json
 import os
+import platform
 import re
 import runpy
+import shlex
 import shutil
 import subprocess
 import sys
@@ -11,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from pyharness import _build  # noqa: PLC2701
 from pyharness.model import codes
 
 ROOT = Path(__file__).parent.parent.parent
@@ -68,18 +71,105 @@ def test_every_object_that_uses_a_constant_is_compiled_again(tmp_path: Path) -> 
 
 def test_a_changed_constant_changes_one_module(tmp_path: Path) -> None:
     """A file that is not written anew keeps its users."""
-    write = runpy.run_path(str(ROOT / "fortran/make_codes.py"))["main"]
+    write = runpy.run_path(str(ROOT / "fortran/generate.py"))["write"]
+    texts = runpy.run_path(str(ROOT / "fortran/make_codes.py"))["texts"]
     text = (ROOT / CODES).read_text()
     source = tmp_path / "codes.py"
     for each in (text, text.replace("SLACK = 16.0", "SLACK = 17.0")):
         source.write_text(each)
-        write(str(source), str(tmp_path))
+        write(tmp_path, texts(source))
         written = {path.name for path in tmp_path.iterdir()}
         changed = {name for name in written if (tmp_path / name).stat().st_mtime > 1}
         for name in written:
             os.utime(tmp_path / name, (1, 1))
     assert written == {*(f"{name}.f90" for name in CLASSES), "codes.h", "codes.py"}
     assert changed == {"series.f90", "codes.py"}
+
+
+def _generators() -> dict[str, list[str]]:
+    """Return the command of each generator in the checkout's build, by kind."""
+    text = (BUILDS[0] / "build.ninja").read_text()
+    commands = re.findall(r"^ COMMAND = (.*generate\.py .*)$", text, re.MULTILINE)
+    return {words[2]: words for words in map(shlex.split, commands)}
+
+
+@pytest.mark.campaign
+@pytest.mark.skipif(not BUILDS, reason="needs a build in the checkout")
+def test_generators_depend_on_all_that_they_load(tmp_path: Path) -> None:
+    """According to Python's own list of imports."""
+    generators = _generators()
+    assert sorted(generators) == ["hot", "tables", "words"]
+    for kind, (python, script, _, _, _, target, *rest) in generators.items():
+        command = [python, "-X", "importtime", script, kind, str(tmp_path / "d"), str(tmp_path)]
+        done = subprocess.run(
+            [*command, target, *rest], cwd=BUILDS[0], capture_output=True, text=True, check=True
+        )
+        names = {line.rpartition("|")[2].strip() for line in done.stderr.splitlines()}
+        folders = (ROOT, ROOT / "fortran", ROOT / "fortran/modern")
+        places = [folder / name.replace(".", "/") for name in names for folder in folders]
+        loaded = {path.with_suffix(".py") for path in places if path.with_suffix(".py").is_file()}
+        loaded |= {path / "__init__.py" for path in places if (path / "__init__.py").is_file()}
+        given = (BUILDS[0] / each for each in rest if each.endswith((".f90", ".fypp")))
+        first, *needed = (tmp_path / "d").read_text().split()
+        assert first == f"{target}:"
+        found = {(BUILDS[0] / each).resolve() for each in needed}
+        assert found >= loaded | {path.resolve() for path in given}, kind
+        assert (len(loaded) > 30) == (kind == "tables")
+        assert ROOT / CODES in found or kind == "words"
+
+
+@pytest.mark.campaign
+@pytest.mark.external
+@pytest.mark.skipif(not BUILDS, reason="needs the build tools")
+def test_a_changed_module_is_generated_from_once(tmp_path: Path) -> None:
+    """Each change of a module that generators load is seen, and a second run finds nothing."""
+    tree, build = tmp_path / "tree", tmp_path / "tree/build/new"
+    ignored = shutil.ignore_patterns(".*", "build", "dist", "docs", "tests", "__pycache__")
+    shutil.copytree(ROOT, tree, ignore=ignored)
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+
+    def run(*command: str) -> str:
+        environment = os.environ | {"PATH": path}
+        done = subprocess.run(
+            command, cwd=tree, env=environment, capture_output=True, text=True, check=True
+        )
+        return done.stdout
+
+    run("meson", "setup", str(build), "-Dinstruction_sets=plain")
+    ninja = ("ninja", "-C", str(build), "codes.h", "hot_plain.f90", "words.f90")
+    assert "[3/3]" in run(*ninja)
+    assert "no work to do" in run(*ninja)
+    written = {each: each.stat().st_mtime_ns for each in build.glob("*.[cfh]*")}
+    for kind, names in {
+        "codes.h": ("pyharness/__init__.py", "pyharness/torques.py", "pyharness/data/cases.toml",
+                    "pyharness/model/attitude.py", "pyharness/model/tape.py",
+                    "pyharness/model/recurrences.py", "pyharness/engine/leaves.py",
+                    "pyharness/engine/leaf_text.py", "pyharness/engine/terms.py",
+                    "fortran/make_leaves.py", "fortran/make_gauss.py"),
+        "hot_plain.f90": ("fortran/modern/unroll.py", "fortran/modern/unroll_many.py",
+                          "fortran/modern/layout.py"),
+        "words.f90": ("fortran/make_words.py",),
+    }.items():  # fmt: skip
+        for name in names:
+            with (tree / name).open("a") as file:
+                file.write("\n# changed\n")
+            for _ in range(2):
+                said = run(*ninja)
+                assert f"Generating {kind}" in said, name
+                (tree / name).touch()
+            run(*ninja)
+            assert "no work to do" in run(*ninja), name
+    assert written == {each: each.stat().st_mtime_ns for each in written}
+    for name in ("fortran/generate.py", "pyharness/model/codes.py"):
+        (tree / name).touch()
+        said = run(*ninja)
+        assert "Generating codes.h" in said
+        assert "Generating hot_plain.f90" in said
+    code = tree / CODES
+    code.write_text(code.read_text().replace("SLACK = 16.0", "SLACK = 17.0"))
+    run(*ninja)
+    changed = {each.name for each in written if each.stat().st_mtime_ns > written[each]}
+    assert changed == {"series.f90"}
 
 
 def test_c_code_follows_the_type_of_the_series(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -99,17 +189,25 @@ def test_c_code_follows_the_type_of_the_series(monkeypatch: pytest.MonkeyPatch) 
 
 @pytest.mark.campaign
 @pytest.mark.skipif(not BUILDS, reason="needs a build in the checkout")
-def test_loops_over_bodies_are_vector_code() -> None:
+def test_loops_over_bodies_are_vector_code(tmp_path: Path) -> None:
     """One comparison too many in a loop doubled the run time of all bodies without torque."""
     build, name = BUILDS[0], "bodies_avx512.f90"
     entries = json.loads((build / "compile_commands.json").read_text())
-    commands = [each["command"].split() for each in entries if each["file"] == name]
-    if not commands or not commands[0][0].endswith("gfortran"):
-        pytest.skip("needs gfortran and AVX-512 kernels")
-    (command,) = commands
+    commands = [each for each in entries if re.fullmatch(r"bodies_\w+\.f90", each["file"])]
+    if _build.COMPILER != "gcc" or platform.machine().lower() not in ("x86_64", "amd64"):
+        pytest.skip("needs gfortran for x86-64")
+    python, script, kind, _, _, target, _, *sources = _generators()["hot"]
+    generate = [python, script, kind, str(tmp_path / "d"), str(tmp_path), target, "avx512"]
+    subprocess.run([*generate, *sources], cwd=build, check=True)
+    command = [
+        each for each in commands[0]["command"].split()
+        if not each.startswith(("-march=", "-mprefer", "-J", "-M"))
+    ]  # fmt: skip
     command[command.index("-o") + 1] = os.devnull
+    command[command.index("-c") + 1] = str(tmp_path / name)
+    wide = ["-march=x86-64-v4", "-mprefer-vector-width=512", f"-J{tmp_path}"]
     done = subprocess.run(
-        [*command, "-fopt-info-vec-optimized"],
+        [*command, *wide, "-fopt-info-vec-optimized"],
         cwd=build,
         capture_output=True,
         text=True,
@@ -117,7 +215,7 @@ def test_loops_over_bodies_are_vector_code() -> None:
     )
     there = {int(n) for n in re.findall(rf"{name}:(\d+):\d+: optimized: loop vec", done.stderr)}
     scalar, loops, place = set(), 0, ""
-    for number, line in enumerate((build / name).read_text().splitlines(), 1):
+    for number, line in enumerate((tmp_path / name).read_text().splitlines(), 1):
         if found := re.match(r" *(?:pure )?(?:subroutine|function) (\w+)", line):
             place = found[1]
         elif line.strip() in {"do i = 1, m", "do i = 1, n"}:

@@ -51,6 +51,7 @@ _LEVELS, _RATIO = 13, 2.0
 _ENOUGH = 1e-11  # relative estimated error at which no smaller differences are tried
 # Largest estimated error, relative to the largest derivative by a parameter.
 _ALLOWED = 1e-7
+_CERTAIN = 10.0  # least ratio of a difference of one-sided derivatives to its estimated error
 _SMALL = 1e-10  # allowed in addition, times the largest state over the size of the parameter
 
 # A function that returns the states at the times, shape (n, m), of a scene.
@@ -105,13 +106,17 @@ def sensitivities_at(
         return {}
     times, attitude = found.time, found.attitude is not None
     if scene.states or has_switches(scene.torque):
-        slopes = {
-            name: [
-                _extrapolate(name, *move, states) if times.size else found.y.T
-                for move in _moves(scene, name)
-            ]
-            for name in names
-        }
+        try:
+            middle = states(scene) if times.size else found.y.T
+            slopes = {
+                name: [
+                    _extrapolate(name, *move, states, middle, times) if times.size else middle
+                    for move in _moves(scene, name)
+                ]
+                for name in names
+            }
+        except WorkLimitError as error:
+            raise InputError(f"sensitivities: {error}") from None
         return {name: np.stack(each, 2) for name, each in slopes.items()}
     # Near the separatrix, a large error of omega would lead to the derivatives of another motion.
     tolerance = max(_FINEST, (found.tolerance or 1.0) / max(1.0, found.growth or 1.0))
@@ -210,10 +215,18 @@ def _by_periods(
     return {name: columns[name] for name in names}, found
 
 
-def _extrapolate(name: str, moved: Callable[[float], Scene], size: float, states: States) -> Array:
-    """Return d(states)/d(number), (n, m), by Ridders' method; `moved` changes the number."""
-    best, least, largest = np.zeros((0, 0)), np.inf, 0.0
-    row: list[Array] = []
+def _extrapolate(
+    name: str, moved: Callable[[float], Scene], size: float, states: States, middle: Array,
+    times: Array,
+) -> Array:  # fmt: skip
+    """Return d(states)/d(number), (n, m), by Ridders' method; `moved` changes the number.
+
+    `middle` has the states of the unchanged scene.
+    """
+    best, least = np.zeros_like(middle), np.inf
+    gap, least_sided = best, np.inf  # half the difference of the one-sided derivatives
+    largest = np.abs(middle).max()
+    rows: dict[int, list[Array]] = {1: [], 2: []}
     failure: InputError | None = None
     for level in range(_LEVELS):
         h = _FIRST * size / _RATIO**level
@@ -221,22 +234,39 @@ def _extrapolate(name: str, moved: Callable[[float], Scene], size: float, states
             with warnings.catch_warnings(action="ignore", category=ImpossibleBodyWarning):
                 after, before = states(moved(h)), states(moved(-h))
         except InputError as error:  # as when the motion slides; a smaller change may succeed
-            row, failure = [], error
+            rows, failure = {1: [], 2: []}, error
             continue
         largest = max(largest, np.abs(after).max())
-        found, factor = [(after - before) / (2.0 * h)], 1.0
-        for other in row:
-            factor *= _RATIO**2
-            found.append(found[-1] + (found[-1] - other) / (factor - 1.0))
-            doubt = max(np.abs(found[-1] - found[-2]).max(), np.abs(found[-1] - other).max())
-            if doubt <= least:
-                best, least = found[-1], doubt
+        # The mean of the one-sided differences, and half of their difference, which tends to 0
+        # where the derivative exists.
+        first = np.array([after - before, (after - middle) - (middle - before)]) / (2.0 * h)
+        for power, row in rows.items():
+            # The mean has even powers of h and the other odd ones; both have all powers beside a
+            # jump of a higher derivative.
+            factor = np.array([1.0, _RATIO ** (1 - power)])[:, None, None]
+            found = [first]
+            for other in row:
+                factor = factor * _RATIO**power
+                found.append(found[-1] + (found[-1] - other) / (factor - 1.0))
+                steps = np.abs([found[-1] - found[-2], found[-1] - other]).max(axis=(0, 2, 3))
+                doubt = max(steps[0], np.abs(found[-1][1]).max())
+                if doubt <= least:
+                    best, least = found[-1][0], doubt
+                if power == 1 and steps.max() <= least_sided:
+                    gap, least_sided = found[-1][1], steps.max()
+            rows[power] = found
         if least <= _ENOUGH * np.abs(best).max(initial=0.0):
             break
-        row = found
-    if not least <= _ALLOWED * np.abs(best).max(initial=0.0) + _SMALL * largest / size:
+    allowed = _ALLOWED * np.abs(best).max(initial=0.0) + _SMALL * largest / size
+    if not least <= allowed:
         if isinstance(failure, WorkLimitError):
-            raise InputError(f"sensitivities: {failure}")
+            raise failure
+        kinks = np.abs(gap).max(axis=1) > allowed + _CERTAIN * least_sided
+        if kinks.any():
+            raise InputError(
+                f"sensitivities: at t = {times[kinks][0]:.6g} s the state has two derivatives by "
+                f"{name}, one on each side, as at a switch; allowed: other times, or another {name}"
+            )
         raise InputError(
             f"sensitivities: the state does not depend smoothly on {name}; allowed: a torque whose "
             "switches are crossed, and not only touched, or times before"

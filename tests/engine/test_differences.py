@@ -167,3 +167,105 @@ def test_bodies_have_them_too() -> None:
     found = solve_many(scene, 20.0, omega=[(0, 0, 0.8), (0, 0, 0.7)], sensitivities=["omega"])
     assert found.sensitivities is not None
     assert found.sensitivities["omega"][:, 2, 2] == pytest.approx([0.1, 0.1], rel=1e-9)
+
+
+def pushed(t: Any, omega: Any, *, ts: float = 0.7) -> Any:
+    return [0.0, 0.0, np.where(t > ts, 4.0, 0.0)]
+
+
+def angular(t: Any, omega: Any, states: Any) -> Any:
+    return [0.0, 0.0, np.where(states["angle"] > 0.56, 2.0, 0.0)], {"angle": omega[2]}
+
+
+def steered(t: Any, omega: Any, q: Any) -> Any:
+    return [0.0, 0.0, np.where(q[3] > np.sin(0.28), 2.0, 0.0)]
+
+
+def reversed_push(t: Any, omega: Any, *, ts: float = 0.7) -> Any:
+    return pushed(-t, omega, ts=ts)
+
+
+# The torque, other arguments of the scene and of `solve`, the parameter, and the row at the switch.
+AT_SWITCHES: dict[str, Any] = {
+    "time": (pushed, {}, {"times": [0.7, 2.0]}, "torque.ts", 0.7),
+    "before time 0": (reversed_push, {}, {"times": [-2.0, -0.7, 0.0, 1.0]}, "torque.ts", -0.7),
+    "omega": (brake, {}, {"times": [9.0, 10.0, 11.0]}, "omega", 10.0),
+    "moments": (brake, {}, {"times": 10.0}, "moments", 10.0),
+    "own states": (angular, {"states": {"angle": 0.0}}, {"times": [0.7, 2.0]}, "omega", 0.7),
+    "attitude": (steered, {}, {"times": 0.7, "attitude": True}, "attitude", 0.7),
+    "start": (brake, {"omega": (0.0, 0.0, 0.3)}, {"times": [0.0, 5.0]}, "omega", 5.0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", AT_SWITCHES)
+def test_a_row_with_two_derivatives_is_refused(kind: str) -> None:
+    torque, more, how, name, at = AT_SWITCHES[kind]
+    scene = Scene(kind, **{"omega": (0.0, 0.0, 0.8), "moments": MOMENTS, "torque": torque} | more)
+    with pytest.raises(InputError, match=rf"^sensitivities: at t = {at:g} s .* by {name}, .*other"):
+        solve(scene, sensitivities=[name], **how)
+
+
+def test_near_a_switch_a_derivative_is_right_or_refused() -> None:
+    """At a switch the derivative by its time jumps from 0 to -1."""
+    scene, refused = Scene("near", (0.0, 0.0, 0.8), MOMENTS, torque=pushed), []
+    for exponent in range(-16, 0):
+        for side in -1.0, 1.0:
+            t = 0.7 + side * 10.0**exponent
+            try:
+                found = solve(scene, t, sensitivities=["torque.ts"]).sensitivities
+            except InputError:
+                refused.append(exponent)
+            else:
+                assert found is not None
+                assert found["torque.ts"][0, 2] == pytest.approx(-(t > 0.7), abs=1e-7), t
+    assert -16 in refused
+    assert max(refused) < -4
+
+
+def test_a_switch_without_influence_on_the_row_keeps_the_derivatives() -> None:
+    scene = Scene("brake", (0.0, 0.0, 0.8), MOMENTS, torque=brake)
+    slopes = solve(scene, [10.0, 12.0], sensitivities=["torque.weak"]).sensitivities
+    assert slopes is not None
+    assert slopes["torque.weak"][:, 2, 0] == pytest.approx([0.0, -0.5], rel=1e-9)
+    fixed = Scene("fixed", (0.0, 0.0, 0.8), MOMENTS, torque=pushed)
+    slopes = solve(fixed, [-0.7, 0.0, 0.7], sensitivities=["omega"]).sensitivities
+    assert slopes is not None
+    assert slopes["omega"][:, 2, 2] == pytest.approx([1.0, 1.0, 1.0], rel=1e-9)
+
+
+XS, YS = [0.0, 0.5, 1.0, 1.5], [0.0, 1.0, 0.0, 2.0]
+# Torques that are continuous, but have a kink where the first row or the motion's start is.
+CONTINUOUS: dict[str, Any] = {
+    "clip": (
+        lambda t, w, *, k=4.0: -np.clip(k * w, -2.0, 2.0), [1.0, 3.0], "torque.k",
+        [0.0, -0.25 * np.exp(-2.0)],
+    ),
+    "table of time": (
+        lambda t, w, *, ts=0.5: [0.0, 0.0, 4.0 * np.interp(t - ts, XS, YS)], [1.0, 1.5],
+        "torque.ts", [-1.0, 0.0],
+    ),
+    "table of omega": (
+        lambda t, w: [0.0, 0.0, -2.0 * np.interp(w[2], XS, YS) - 0.4], [1.0, 1.5], "omega",
+        np.exp([1.0, 1.5]),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", CONTINUOUS)
+def test_a_kink_of_the_torque_leaves_one_derivative(kind: str) -> None:
+    torque, times, name, expected = CONTINUOUS[kind]
+    scene = Scene(kind, (0.0, 0.0, 1.0), MOMENTS, torque=torque)
+    slopes = solve(scene, times, sensitivities=[name]).sensitivities
+    assert slopes is not None
+    assert slopes[name][:, 2, -1] == pytest.approx(expected, rel=1e-8, abs=1e-8)
+
+
+def test_bodies_with_a_row_at_a_switch_are_refused_alone() -> None:
+    scene = Scene("brake", (0.0, 0.0, 0.8), MOMENTS, torque=brake)
+    asked: dict[str, Any] = {"sensitivities": ["omega"], "parameters": {"strong": [0.1, 0.2, 0.3]}}
+    found = solve_many(scene, 10.0, **asked)
+    assert found.refusals is not None
+    assert list(found.refusals) == [1]
+    assert "at t = 10 s" in found.refusals[1]
+    assert found.sensitivities is not None
+    assert found.sensitivities["omega"][[0, 2], 2, 2] == pytest.approx([1.0, 0.02 / 0.3])

@@ -10,7 +10,12 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from pyharness.model.errors import InputError
-from pyharness.model.output_files import DeferredInterrupt, check_writable, write_files
+from pyharness.model.output_files import (
+    DeferredInterrupt,
+    check_inside,
+    check_writable,
+    write_files,
+)
 from pyharness.model.pipes import read_input
 from pyharness.model.schema import check_schema
 
@@ -23,6 +28,8 @@ def check_folder(path: str, names: Iterable[str], option: str) -> None:
     if not path or "\0" in path or os.path.lexists(folder):
         if not path or "\0" in path or not folder.is_dir():
             raise InputError(f"{option} '{path}': is not a folder; give one, or a new name")
+        names = list(names)
+        check_inside(folder, names, option)
         for name in names:
             check_writable(str(folder / name), option)
     elif reason := _why_not_made(folder):
@@ -54,6 +61,7 @@ def write_folder(path: str, contents: dict[str, bytes], option: str) -> None:
         try:
             if made:
                 folder.mkdir()
+            check_inside(folder, contents, option)
             write_files(files, option)
         except BaseException as error:
             if made and folder.is_dir():
@@ -119,8 +127,9 @@ def _listed(mark: Path, kind: str) -> Iterable[str]:
 
 
 def _beside(folder: Path) -> tuple[Path, Path]:
-    new, old = (folder.parent / f".{folder.name}.{os.getpid()}.{what}" for what in ("new", "old"))
-    return new, old
+    # An earlier process with the same number may have left its folders.
+    beside = folder.parent / f".pyharness-{os.urandom(8).hex()}"
+    return Path(f"{beside}-new"), Path(f"{beside}-old")
 
 
 def write_tree(path: str, contents: dict[str, bytes], option: str) -> None:

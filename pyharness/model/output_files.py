@@ -2,6 +2,7 @@
 
 import os
 import signal
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from threading import current_thread, main_thread
@@ -43,6 +44,21 @@ def check_writable(path: str, option: str) -> None:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
     raise InputError(f"{option} '{path}': {reason}; give a file in a folder that can be written")
+
+
+def check_inside(folder: str | Path, names: Iterable[str], option: str) -> None:
+    """Raise InputError if a path of `names` in `folder` leads out of it, through links or ``..``.
+
+    The folder may come from someone else.
+    """
+    root = os.path.realpath(folder)
+    for name in names:
+        path = os.path.realpath(os.path.join(root, name))
+        if os.path.commonpath([root, path]) != root:
+            raise InputError(
+                f"{option} '{folder}': '{name}' leads out of it, to '{path}'; remove this link, or "
+                "give another folder"
+            )
 
 
 def write_files(contents: dict[str, bytes], option: str) -> None:

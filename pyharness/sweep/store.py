@@ -8,12 +8,13 @@ import contextlib
 import errno
 import fcntl
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 from pyharness.model.distribution import check_package, install_command
 from pyharness.model.errors import InputError
+from pyharness.model.output_files import check_inside
 from pyharness.model.schema import check_schema
 from pyharness.sweep.reductions import REDUCTIONS
 from pyharness.sweep.store_layout import (
@@ -65,8 +66,10 @@ class Store:
 
         Raise InputError for a damaged chunk, or with `repair` remove its files.
         """
+        chunks = range(self.sweep.n_chunks)
+        _check_folders(self.folder, (name for chunk in chunks for name in self._written(chunk)))
         damages = {}
-        for chunk in range(self.sweep.n_chunks):
+        for chunk in chunks:
             try:
                 self._done[chunk] = self._is_done(chunk)
             except DamageError as damage:
@@ -82,7 +85,7 @@ class Store:
                 f"--out '{self.folder}': {which}: {reason}; {_REPAIR} computes {them} again"
             )
         for chunk in damages:
-            for name in (self._checksums(chunk), *self._files(chunk)):
+            for name in self._written(chunk):
                 clear(self.folder, name)
         self.repaired = len(damages)
 
@@ -123,6 +126,9 @@ class Store:
     def _checksums(self, chunk: int) -> str:
         return "/".join([CHECKSUMS, "c", *map(str, self.sweep.position_of(chunk))])
 
+    def _written(self, chunk: int) -> list[str]:
+        return [self._checksums(chunk), *self._files(chunk)]
+
     def _files(self, chunk: int) -> list[str]:
         position = "/".join(map(str, self.sweep.position_of(chunk)))
         return [
@@ -140,7 +146,7 @@ def opened(sweep: Sweep, path: str, repair: bool = False) -> Iterator[Store]:
     check_zarr()
     folder = Path(path)
     if not check_store(sweep, path):
-        _make(sweep, folder)
+        _make(sweep, Path(os.path.realpath(folder)))
     handle = os.open(folder, os.O_RDONLY)
     try:
         try:
@@ -207,8 +213,15 @@ def check_store(sweep: Sweep, path: str) -> bool:
     )
 
 
+def _check_folders(folder: Path, names: Iterable[str]) -> None:
+    # A link in place of a file is replaced, but files in a linked folder would be written or
+    # removed elsewhere.
+    check_inside(folder, sorted({os.path.dirname(name) for name in names}), "--out")
+
+
 def _check_metadata(sweep: Sweep, folder: Path, repair: bool) -> None:
     files = metadata_files(sweep)
+    _check_folders(folder, (*files, METADATA))
     try:
         check_files(label(sweep), "metadata", folder, files, LARGEST_METADATA, METADATA)
     except DamageError as damage:

@@ -545,8 +545,14 @@ def test_the_folder_is_limited_and_cleaned(folder: Path, monkeypatch: pytest.Mon
     left.mkdir()
     os.utime(left, (1, 1))
     os.utime(file, (0, 0))  # older than the folder
+    outside = folder.parent / "outside" / "mine"
+    outside.parent.mkdir()
+    outside.touch()
+    (folder / "new-link").symlink_to(outside.parent)
+    os.utime(folder / "new-link", (1, 1), follow_symlinks=False)
     monkeypatch.setattr(leaf_cache, "MOST_BYTES", 100)
     prepare(scene_of(lambda t, w: -w * w[1]), compiled=True)
     assert not left.exists()
     assert not file.exists()
-    assert len(list(folder.iterdir())) == 1
+    assert outside.exists()
+    assert len(list(folder.iterdir())) == 2  # the new code and the link

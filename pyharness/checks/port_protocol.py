@@ -10,6 +10,7 @@ import numpy as np
 from pyharness.checks.port_process import PortError
 from pyharness.model.errors import kind_of
 from pyharness.model.facts import facts
+from pyharness.model.json_text import parse_json
 from pyharness.model.listing import Listing
 from pyharness.model.records import listing_record, scene_record
 from pyharness.model.scene import Scene
@@ -80,8 +81,8 @@ def read_answer(line: bytes, steps: int) -> Answer:
 
 def read_object(line: bytes) -> dict[str, Any]:
     try:
-        given = json.loads(line)
-    except (ValueError, RecursionError) as error:
+        given = parse_json(line)
+    except ValueError as error:
         shown = repr(line[:60].decode(errors="replace"))
         raise PortError(f"no JSON: {shown} ({error})") from None
     if not isinstance(given, dict):

@@ -3,13 +3,13 @@
 Messages name `option`, by which the user specified the path.
 """
 
-import json
 import os
 import shutil
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from pyharness.model.errors import InputError
+from pyharness.model.json_text import parse_json
 from pyharness.model.output_files import (
     DeferredInterrupt,
     check_inside,
@@ -116,9 +116,9 @@ def _why_not_anew(folder: Path, made: Callable[[Path], set[str]]) -> str:
 
 def _listed(mark: Path, kind: str) -> Iterable[str]:
     try:
-        described = json.loads(read_input(mark, "--out", _LARGEST_MARK, "a list of files"))
+        described = parse_json(read_input(mark, "--out", _LARGEST_MARK, "a list of files"))
         files = described["files"]
-    except (OSError, ValueError, TypeError, KeyError, RecursionError):
+    except (OSError, ValueError, TypeError, KeyError):
         return ()
     if not isinstance(files, dict):
         return ()

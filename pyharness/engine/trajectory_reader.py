@@ -13,6 +13,7 @@ from pyharness.model.archive import checked_path, read_archive, text_of
 from pyharness.model.changing import ChangingInertia, ChangingMoments
 from pyharness.model.errors import InputError
 from pyharness.model.inertia_function import COUNTS, InertiaFunction, checked_function
+from pyharness.model.json_text import unique
 from pyharness.model.own_states import checked_states
 from pyharness.model.principal import PrincipalScene
 from pyharness.model.scene import Scene
@@ -104,7 +105,7 @@ def _trajectory(arrays: dict[str, Any], header: dict[str, Any], where: str) -> T
         _check_array(array, "f8", count, n + n_own, sum(counts))
         _require(all(type(name) is str for name, _ in names))
         parts = np.split(array, np.cumsum(counts)[:-1], axis=2) if counts else []
-        sensitivities = dict(zip((name for name, _ in names), parts, strict=True))
+        sensitivities = unique(zip((name for name, _ in names), parts, strict=True))
     stop = None
     if header["stop"] is not None:
         stop = Stop(**header["stop"])
@@ -158,7 +159,7 @@ def _scene(text: str, record: dict[str, Any], where: str) -> Scene:
     if "inertia" in record:
         scene = replace(scene, moments=None, changing=_moments(record["inertia"]))
     if record["torque"] is not None:
-        states = checked_states({name: pair for name, *pair in record.get("states", ())})
+        states = checked_states(unique((name, pair) for name, *pair in record.get("states", ())))
         tape = tape_of(record["torque"], len(states))
         names = tuple(each.name for each in states)
         torque = StateTorque(tape, None, tape.needs_attitude, own=names)

@@ -7,7 +7,6 @@ size.
 
 import hashlib
 import io
-import json
 import math
 import os
 import zipfile
@@ -17,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from pyharness.model.errors import InputError, kind_of
+from pyharness.model.json_text import parse_json
 from pyharness.model.output_files import check_writable
 from pyharness.model.pipes import read_input
 from pyharness.model.schema import check_schema
@@ -76,11 +76,17 @@ def read_archive(
     content = read_input(name, where, memory // 4, written)
     damaged = InputError(f"{where}: no {kinds[1]}, or damaged; give {written}")
     try:
-        header = json.loads(text_of(_arrays(content, known, ["header"])[0], "header"))
-        if header["kind"] != kinds[0]:
-            raise ValueError("another kind of file")
-    except Exception:  # zipfile, json and NumPy raise errors of many types
+        text = text_of(_arrays(content, known, ["header"])[0], "header")
+    except Exception:  # zipfile and NumPy raise errors of many types
         raise damaged from None
+    try:
+        header = parse_json(text, only_finite=False)
+    except ValueError as error:
+        raise InputError(
+            f"{where}: no {kinds[1]}, or damaged (header: {error}); give {written}"
+        ) from None
+    if not isinstance(header, dict) or header.get("kind") != kinds[0]:
+        raise damaged
     # The schema is checked first: other versions may have other arrays.
     kind = f"{kinds[1]} file"
     check_schema(where, kind, header.get("schema"), "take a version that reads it")

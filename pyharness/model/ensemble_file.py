@@ -10,6 +10,7 @@ import numpy as np
 from pyharness.model.archive import archive_of, checked_file, checked_path, read_archive
 from pyharness.model.errors import InputError
 from pyharness.model.extension import ENDS
+from pyharness.model.json_text import unique
 from pyharness.model.output_files import write_files
 from pyharness.model.schema import SCHEMAS
 from pyharness.model.trajectory import Array
@@ -67,7 +68,7 @@ def load_ensemble(path: str | os.PathLike[str]) -> dict[str, Any]:
 def _attributes(arrays: dict[str, Any], header: dict[str, Any]) -> dict[str, Any]:
     given: dict[str, Any] = {name: arrays.get(name) for name in _ARRAYS}
     rows = given["status"].shape
-    given["names"] = tuple(map(str, header["names"]))
+    given["names"] = tuple(unique((str(name), None) for name in header["names"]))
     leaves = header.get("leaves")  # files of earlier versions have none
     given["leaves"] = None if leaves is None else str(leaves)
     for name, width in {**_WIDTHS, "own": len(given["names"])}.items():
@@ -80,15 +81,15 @@ def _attributes(arrays: dict[str, Any], header: dict[str, Any]) -> dict[str, Any
     if rows[1:] != (() if times is None else times.shape) or not len(rows) <= 2:
         raise ValueError("another number of times")
     if header["refusals"] is not None:
-        given["refusals"] = {body: str(reason) for body, reason in header["refusals"]}
+        given["refusals"] = unique((body, str(reason)) for body, reason in header["refusals"])
         if not all(type(body) is int and 0 <= body < rows[0] for body in given["refusals"]):
             raise ValueError("refusals of unknown bodies")
     width = 3 if given["attitude"] is None else 7
     if header["sensitivities"] is not None:
-        found = {
-            str(name): arrays[f"{_SENSITIVITY}{number}"]
+        found = unique(
+            (str(name), arrays[f"{_SENSITIVITY}{number}"])
             for number, name in enumerate(header["sensitivities"])
-        }
+        )
         if any(each.dtype != "f8" or each.shape[:-1] != (*rows, width) for each in found.values()):
             raise ValueError("sensitivities of another shape")
         given["sensitivities"] = found

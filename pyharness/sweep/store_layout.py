@@ -9,7 +9,6 @@ import atexit
 import contextlib
 import errno
 import hashlib
-import json
 import math
 import os
 import re
@@ -26,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.model.distribution import version
+from pyharness.model.json_text import parse_json
 from pyharness.model.scene_file import scene_text
 from pyharness.model.schema import SCHEMAS
 from pyharness.sweep.axes import MOST_VALUES, units_of
@@ -175,10 +175,8 @@ def label(sweep: Sweep) -> Label:
 def labels(folder: Path) -> list[Label]:
     """Return the labels that are readable in a store's metadata and its file of checksums."""
     found = []
-    with contextlib.suppress(
-        DamageError, OSError, ValueError, LookupError, TypeError, RecursionError
-    ):
-        attributes = json.loads(read_bounded(folder, "zarr.json", LARGEST_METADATA))["attributes"]
+    with contextlib.suppress(DamageError, OSError, ValueError, LookupError, TypeError):
+        attributes = parse_json(read_bounded(folder, "zarr.json", LARGEST_METADATA))["attributes"]
         words = [attributes[key] for key in ("pyharness_version", "sweep_sha256")]
         if all(isinstance(each, str) for each in words):
             found.append(Label(attributes.get("schema"), *words))

@@ -8,7 +8,6 @@ The test vectors in `data/words/cdc.json` follow from the CYBER 170 hardware ref
 60463560; a public emulator confirms them.
 """
 
-import json
 import math
 import operator
 import re
@@ -16,6 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from pyharness.model.errors import InputError, kind_of, kind_or_empty, unknown
+from pyharness.model.json_text import parse_json
 from pyharness.model.pipes import read_input
 from pyharness.model.schema import check_schema
 from pyharness.thesis.word import WORDS, Pair, framed
@@ -57,8 +57,8 @@ class Answer(NamedTuple):
 def answers(path: str | Path = OURS) -> list[Answer]:
     content = read_input(path, f"vectors '{path}'", _LARGEST, "a JSON file")
     try:
-        data = json.loads(content)
-    except (ValueError, RecursionError) as error:
+        data = parse_json(content)
+    except ValueError as error:
         raise InputError(f"vectors '{path}': not JSON: {error}; give a JSON file") from None
     allowed = 'allowed: {"schema": 1, "vectors": [...]}'
     if not isinstance(data, dict):

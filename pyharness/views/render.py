@@ -109,7 +109,9 @@ def csv_text(table: Table) -> str:
     import csv
 
     buffer = io.StringIO()
-    csv.writer(buffer, lineterminator="\n").writerows(table.in_full())
+    cells = table.in_full()
+    assert len(set(cells[0])) == len(cells[0])  # readers find columns by their heads
+    csv.writer(buffer, lineterminator="\n").writerows(cells)
     return buffer.getvalue()
 
 

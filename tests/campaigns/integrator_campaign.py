@@ -230,8 +230,16 @@ class _InProcess:
         pass
 
     def ask(self, line: bytes) -> bytes:
-        """Return the answer to a request."""
-        return json.dumps(self._solve(json.loads(line))).encode()
+        """Return the answer to a request, with numbers as text."""
+        return json.dumps(_texts(self._solve(json.loads(line)))).encode()
+
+
+def _texts(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _texts(each) for name, each in value.items()}
+    if isinstance(value, list):
+        return [*map(_texts, value)]
+    return repr(value) if isinstance(value, float) else value
 
 
 def judged(each: Drawn, chosen: Sequence[Problem]) -> Verdict:

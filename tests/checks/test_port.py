@@ -136,6 +136,9 @@ def test_what_is_no_answer_is_told_in_a_line(change: dict[str, Any], words: str)
         (b"step 1", "no JSON: 'step 1'"), (b"", "no JSON: ''"), (b"\xff\x00", "no JSON: "),
         (b"[" * 100_000, "no JSON: "), (b"3", "a whole number where an object belongs"),
         (b"9" * 5000, "no JSON: "), (b'{"rows": []}', "no 'ended'; an answer has rows"),
+        (b'{"rows": [], "ended": "complete", "rows": [[]]}', 'the key "rows" occurs twice'),
+        (b'{"stop": {"step": 1, "step": 2}}', 'the key "step" occurs twice'),
+        (b'{"rows": [[NaN]]}', "NaN is not JSON"), (b"[-Infinity]", "-Infinity is not JSON"),
     ],
 )  # fmt: skip
 def test_what_is_no_object_is_told_in_a_line(line: bytes, words: str) -> None:

@@ -548,6 +548,27 @@ def test_wrong_value_of_the_header_is_refused(name: str, value: Any, tmp_path: P
         load(tmp_path / "found.npz")
 
 
+@pytest.mark.parametrize("key", ["kind", "schema", "steps", "quotient"])
+def test_a_key_twice_in_the_header_is_named(key: str, tmp_path: Path) -> None:
+    arrays = arrays_of(of_program("runge-kutta", 2))
+    twice = str(arrays["header"]).replace(f'"{key}"', f'"{key}": 1, "{key}"')
+    assert json.loads(twice) == json.loads(str(arrays["header"]))
+    (tmp_path / "found.npz").write_bytes(archive_of({**arrays, "header": twice}))
+    with pytest.raises(InputError, match=f'header: the key "{key}" occurs twice'):
+        load(tmp_path / "found.npz")
+
+
+def test_a_parameter_twice_is_refused(tmp_path: Path) -> None:
+    """The columns of the first would be lost."""
+    saved = solve(case_scene(5), [1.0], sensitivities=["omega", "moments"])
+    arrays = arrays_of(saved)
+    twice = str(arrays["header"]).replace('["moments", 3]', '["omega", 3]')
+    assert twice.count('["omega", 3]') == 2
+    (tmp_path / "found.npz").write_bytes(archive_of({**arrays, "header": twice}))
+    with pytest.raises(InputError, match="a value is missing or damaged"):
+        load(tmp_path / "found.npz")
+
+
 @pytest.mark.campaign
 def test_each_value_of_the_header_is_checked(tmp_path: Path) -> None:
     saved = replace(

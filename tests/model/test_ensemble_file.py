@@ -86,6 +86,19 @@ def test_wrong_files_are_refused(tmp_path: Path) -> None:
         {"event_counts": np.zeros((1, 4), "i8")},
         {"header": str(arrays["header"]).replace('"refusals": null', '"refusals": [[9, "x"]]')},
         {"header": str(arrays["header"]).replace('ties": null', 'ties": ["moments"]')},
+        {
+            "header": str(arrays["header"]).replace(
+                '"refusals": null', '"refusals": [[1, "x"], [1, "y"]]'
+            )
+        },
+        {
+            "header": str(arrays["header"]).replace('"names": []', '"names": ["a", "a"]'),
+            "own": np.zeros((*arrays["status"].shape, 3, 2)),
+        },
+        {
+            "header": str(arrays["header"]).replace('ties": null', 'ties": ["a", "a"]'),
+            **{f"sensitivity_{k}": np.zeros((4, 3, 7, 1)) for k in range(2)},
+        },
     ]
     for change in changes:
         path.write_bytes(archive_of({**arrays, **change}))

@@ -31,6 +31,6 @@ for line in sys.stdin:
     asked = json.loads(line)
     start = asked["omega"] + asked["attitude"]
     solver = heyoka.taylor_adaptive(equations(asked), start, tol=asked["tolerance"])
-    rows = solver.propagate_grid([0.0, *asked["times"]])[-1][1:]
+    rows = solver.propagate_grid([0.0, *asked["times"]])[-1][1:].astype(str)  # may be infinite
     answer = {"omega": rows[:, :3].tolist(), "attitude": rows[:, 3:].tolist()}
     print(json.dumps({**answer, "control": "tolerance"}), flush=True)

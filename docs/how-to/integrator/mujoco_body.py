@@ -49,7 +49,7 @@ def states(asked, integrator):
         count = round(t / h)
         mujoco.mj_step(model, data, nstep=count - n)
         n = count
-        rows.append([data.qvel[3:].tolist(), data.qpos[3:].tolist()])
+        rows.append([data.qvel[3:].astype(str).tolist(), data.qpos[3:].astype(str).tolist()])
     mujoco.set_mjcb_passive(None)
     return rows
 

@@ -53,4 +53,6 @@ for line in sys.stdin:
     schema = asked.get("schema")
     if type(schema) is not int or schema != SCHEMA:
         sys.exit(f"schema {schema}; this integrator reads schema {SCHEMA} of an integrator request")
-    print(json.dumps(solve(asked)), flush=True)
+    # Numbers are text, because JSON has no infinity and no NaN.
+    answer = {k: [list(map(repr, row)) for row in rows] for k, rows in solve(asked).items()}
+    print(json.dumps(answer), flush=True)

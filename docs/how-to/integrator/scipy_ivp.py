@@ -69,5 +69,6 @@ for line in sys.stdin:
         rows, control = by_steps(asked, {"RK45": RK45, "DOP853": DOP853}[name])
     else:
         rows, control = by_tolerance(asked, name)
+    rows = rows.astype(str)  # JSON has no infinity and no NaN
     answer = {"omega": rows[:, :3].tolist(), "attitude": rows[:, 3:].tolist(), "control": control}
     print(json.dumps(answer), flush=True)

@@ -15,7 +15,7 @@ from pyharness.checks.plants.faults import change_at
 from pyharness.checks.plants.outcome import Outcome, control
 from pyharness.checks.port import Cell, compared
 from pyharness.checks.port_process import PortError, PortProcess
-from pyharness.checks.port_protocol import VARIABLES, read_number
+from pyharness.checks.port_protocol import VARIABLES, read_number, read_object
 from pyharness.model.listing import Listing
 from pyharness.model.records import listing_record
 from pyharness.model.report import counted
@@ -232,7 +232,7 @@ def _planted(process: PortProcess, cells: Sequence[Cell]) -> Iterator[Outcome]:
 
 
 def _parsed(line: bytes) -> dict[str, Any]:
-    answer: dict[str, Any] = json.loads(line)
+    answer = read_object(line)
     answer["rows"] = [[read_number("rows", x) for x in row] for row in answer["rows"]]
     change_at("stop.quotient", partial(read_number, "stop"))(answer)
     return answer

@@ -73,11 +73,12 @@ module problem
     !! errors are relative
     real(dp), pointer, contiguous :: own(:, :) => null()
     real(dp), pointer, contiguous :: own_sizes(:) => null()
-    ! The unknowns at nodes of each step; null if not requested.
-    real(dp), pointer, contiguous :: nodes(:) => null()          !! in parts of a step, 0 to 1
-    real(dp), pointer, contiguous :: at_nodes(:, :, :) => null() !! (unknowns, nodes, steps)
-    real(dp), pointer, contiguous :: ends(:) => null()           !! 0 and the ends of steps, s
+    ! The unknowns at nodes of each part of a step; null if not requested.
+    real(dp), pointer, contiguous :: nodes(:) => null()          !! from 0 to 1
+    real(dp), pointer, contiguous :: at_nodes(:, :, :) => null() !! (unknowns, nodes, parts)
+    real(dp), pointer, contiguous :: ends(:) => null()           !! 0 and the ends of parts, s
     integer :: n_steps = 0                                       !! may exceed the number of `ends`
+    real(dp) :: between = 0.0_dp !! largest error of polynomials through the nodes, relative
     integer :: n_rows                              !! number of rows that hold a result
     integer :: status                              !! of the module statuses
     integer(int64) :: steps = 0                    !! of the last integration

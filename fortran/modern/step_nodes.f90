@@ -29,9 +29,41 @@ module step_nodes
     real(dp) :: values(AT_ONCE, 4), integrals(AT_ONCE, 4)
   end type nodes_t
 
-  public :: AT_ONCE, nodes_of, powers_of, sum_at_nodes
+  ! Largest error of a polynomial through the nodes, in tolerances; and most parts of a step.
+  real(dp), parameter :: LARGEST_ERROR = 0.01_dp, MOST_PARTS = 32.0_dp
+
+  public :: AT_ONCE, divide_step, nodes_of, powers_of, sum_at_nodes
 
 contains
+
+  pure subroutine divide_step(sizes, tolerance, parts, error)
+    !! Compute into how many parts a step is divided, so that a polynomial through the nodes of each
+    !! has an error within the tolerance, and bound this error.
+    !!
+    !! With n nodes, the error for f is at most max|w| max|f^(n)|/n!, where w is the product of the
+    !! distances from the nodes (Suli and Mayers 2003, An Introduction to Numerical Analysis,
+    !! theorem 6.2). In the parts of a step of length 1, max|w| <= 4 (1/(4 parts))^n for Chebyshev
+    !! points of the second kind, and f = x^k has max|f^(n)|/n! = binomial(k, n).
+    real(dp), intent(in) :: sizes(:)  !! relative sizes of the step's terms from x^n on
+    real(dp), intent(in) :: tolerance !! relative
+    integer, intent(out) :: parts
+    real(dp), intent(out) :: error
+    integer, parameter :: N = AT_ONCE + 1
+    real(dp) :: binomial, ratio
+    integer :: k
+
+    error = 0.0_dp
+    binomial = 1.0_dp
+    do k = 1, size(sizes)
+      error = error + binomial*sizes(k)
+      binomial = binomial*real(N + k, dp)/real(k, dp)
+    end do
+    error = error*4.0_dp*0.25_dp**N
+    ratio = error/max(LARGEST_ERROR*tolerance, epsilon(error))
+    parts = 1
+    if (ratio > 1.0_dp) parts = ceiling(min(MOST_PARTS, ratio**(1.0_dp/N)))
+    error = error/real(parts, dp)**N
+  end subroutine divide_step
 
   pure function nodes_of(parts, order) result(found)
     !! Compute the weights for nodes of steps whose series have the order.

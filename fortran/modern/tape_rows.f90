@@ -4,7 +4,7 @@ module tape_rows
   use kinds, only: dp
   use problem, only: request_t, solution_t
   use statuses, only: COMPLETE, INTERRUPTED, OVERFLOW
-  use step_nodes, only: AT_ONCE, powers_of, sum_at_nodes
+  use step_nodes, only: AT_ONCE, divide_step, powers_of, sum_at_nodes
   use tape, only: FIRST_UNKNOWN
   use tape_error, only: error_t
   use tape_series, only: MOST_ORDER, series_t, SIDE_BY_SIDE
@@ -105,7 +105,7 @@ contains
   end subroutine add_row
 
   subroutine add_nodes(x, s, e, factor, t_end, tolerance, solution, largest)
-    !! Compute the unknowns at the nodes of the step, as `evaluate` and `add_row`, side by side.
+    !! Compute the unknowns at the nodes of the step, divided as a polynomial between them requires.
     type(state_t), intent(in) :: x
     type(series_t), intent(in) :: s
     type(error_t), intent(in) :: e
@@ -114,21 +114,52 @@ contains
     real(dp), intent(in) :: tolerance !! of the results
     type(solution_t), intent(inout) :: solution
     real(dp), intent(inout) :: largest !! error before it is subtracted
+    real(dp) :: sizes(AT_ONCE + 1:MOST_ORDER + 1), power, error
+    integer :: k, part, parts
+
+    sizes(s%order + 1) = maxval(x%weights*abs(e%left))
+    power = factor**AT_ONCE
+    do k = AT_ONCE + 1, s%order
+      power = power*factor
+      sizes(k) = power*maxval(x%weights*abs(s%a(k, FIRST_UNKNOWN:FIRST_UNKNOWN - 1 + x%n)))
+    end do
+    call divide_step(sizes(:s%order + 1), tolerance, parts, error)
+    solution%between = max(error, merge(solution%between, 0.0_dp, solution%n_steps > 0))
+    do part = 1, parts
+      solution%n_steps = solution%n_steps + 1
+      if (solution%n_steps >= size(solution%ends)) cycle
+      associate (end => solution%ends(solution%n_steps + 1))
+        end = t_end
+        if (part < parts) end = x%t(1) + (x%t(2) + (real(part, dp)/real(parts, dp))*(factor*s%h))
+      end associate
+      call add_part(x, s, e, factor, (real(part - 1, dp) + solution%nodes(2:))/real(parts, dp), &
+                    tolerance, solution, largest)
+    end do
+  end subroutine add_nodes
+
+  subroutine add_part(x, s, e, factor, nodes, tolerance, solution, largest)
+    !! Compute the unknowns at the nodes of a part of the step, as `evaluate` and `add_row`, side by
+    !! side.
+    type(state_t), intent(in) :: x
+    type(series_t), intent(in) :: s
+    type(error_t), intent(in) :: e
+    real(dp), intent(in) :: factor    !! the step over that of the series
+    real(dp), intent(in) :: nodes(AT_ONCE) !! in parts of the step
+    real(dp), intent(in) :: tolerance !! of the results
+    type(solution_t), intent(inout) :: solution
+    real(dp), intent(inout) :: largest !! error before it is subtracted
     real(dp) :: parts(AT_ONCE), powers(AT_ONCE), errors(AT_ONCE, x%n)
     real(dp) :: changes(AT_ONCE, x%n), sizes(AT_ONCE), value(AT_ONCE)
     integer :: i, k
 
-    solution%n_steps = solution%n_steps + 1
-    if (solution%n_steps >= size(solution%ends)) return
     associate (at_nodes => solution%at_nodes(:, :, solution%n_steps), n => x%n, y => x%y)
-      solution%ends(solution%n_steps + 1) = t_end
       if (solution%n_steps > 1) then
         at_nodes(:, 1) = solution%at_nodes(:, 1 + AT_ONCE, solution%n_steps - 1)
       else
         at_nodes(:, 1) = y
       end if
-      parts = factor*solution%nodes(2:)
-      powers = powers_of(solution%nodes(2:), s%order + 1)
+      parts = factor*nodes
+      powers = powers_of(nodes, s%order + 1)
       sizes = 0.0_dp
       call sum_at_nodes(s%a(:, FIRST_UNKNOWN:FIRST_UNKNOWN - 1 + n), n*(LAST_TERM + 1), 1, &
                         LAST_TERM + 1, n, s%order, parts, changes)
@@ -157,6 +188,6 @@ contains
     do k = 1, AT_ONCE
       if (.not. sizes(k) <= largest) largest = sizes(k)
     end do
-  end subroutine add_nodes
+  end subroutine add_part
 
 end module tape_rows

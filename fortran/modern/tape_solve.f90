@@ -112,6 +112,7 @@ contains
     error = outcome%least*sqrt(outcome%growth)
     if (blurred <= UNSURE*request%tolerance) error = max(error, FITTED*outcome%error)
     solution%error = max(outcome%error, min(error, UNSURE*request%tolerance)) + blurred
+    solution%error = solution%error + solution%between
     solution%growth = outcome%growth
     solution%spent = spent
     if (solution%status == COMPLETE &

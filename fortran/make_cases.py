@@ -67,6 +67,9 @@ def texts() -> dict[str, str]:
             if name != "WAVE" and len(each.slopes) == 1 and each.slopes[0].startswith("m_")
         },
         "ROUNDING_CASES": {name: roundings(each, name == "WAVE") for name, each in table.items()},
+        "FUNCTION_CASES": {
+            name: [f"return {each.function}"] * bool(each.function) for name, each in table.items()
+        },
     }
     kinds = {
         "HAS_OWN_VALUE": [name for name, each in table.items() if each.value],

@@ -103,6 +103,7 @@ struct group {
 
 extern int interrupt_raised(void);
 extern int fits_lanes(int64_t address);
+extern double function_of(int kind, double x, double y, int saturates);
 
 static inline lanes all_of(double x) { return (lanes){0.0} + x; }
 static inline lanes select_of(bits mask, lanes a, lanes b)
@@ -218,10 +219,10 @@ static void set_values(struct group *g)
       out[1][0] = shrunk * shrunk;
       break;
     case TABLE: set_table(g, operation[1] - 1, out[0]); break;
-    case LOG: out[0][0] = each_of(log, x); break;
-    case ATAN: out[0][0] = each_of(atan, x); break;
-    case ASIN: out[0][0] = each_of(asin, x); break;
     default:
+      for (int i = 0; i < SIDE_BY_SIDE; i++) out[0][0][i] = function_of(operation[0], x[i], y[i], 0);
+      break;
+    case SINE_COSINE:
       if (operation[2] > 0) {
         set_wave(g, tape->coefficients[tape->starts[operation[2] - 1] - 1], out[0], out[1]);
       } else {

@@ -136,7 +136,9 @@ static void order_operations(const struct tape *tape, struct work *work)
       other = level_of_combination(tape, second + 1, levels);
       break;
     case PRODUCT:
-    case QUOTIENT: other = levels[second]; /* fall through */
+    case QUOTIENT:
+    case EXPM1:
+    case EXP2: other = levels[second]; /* fall through */
     default: level = levels[first]; break;
     }
     if (other > level) level = other;

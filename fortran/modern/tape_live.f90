@@ -3,8 +3,7 @@ module tape_live
   !! matter, and may be singular: for example 1/t, if it is chosen only for t > 1.
   use, intrinsic :: iso_c_binding, only: c_loc
   use kinds, only: dp
-  use operations, only: ARCSINE => ASIN, ARCTANGENT => ATAN, LINEAR, LOGARITHM => LOG, PRODUCT, &
-                        QUOTIENT, SELECT_OF => SELECT, TABLE
+  use operations, only: LINEAR, LOGARITHM => LOG, PRODUCT, QUOTIENT, SELECT_OF => SELECT, TABLE
   use tape, only: arrays_of, tape_t
   use tape_series, only: begin_work, derivatives_at, series_t
   use tape_switches, only: switches_t, update
@@ -62,7 +61,7 @@ contains
         case (SELECT_OF)
           is_used(first) = .true.
           call use_combination(chosen(tape, n, s%a))
-        case (PRODUCT, QUOTIENT, LOGARITHM, ARCTANGENT, ARCSINE)
+        case (PRODUCT, QUOTIENT, LOGARITHM:)
           is_used(first) = .true.
           is_used(second) = .true.
         case default

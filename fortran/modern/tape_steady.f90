@@ -2,8 +2,7 @@ module tape_steady
   !! Steps of nearly steady motions. A time function that multiplies an unknown near 0 changes
   !! perturbations but not the motion, whose terms do not show whether its series converges.
   use kinds, only: dp
-  use operations, only: ARCSINE => ASIN, ARCTANGENT => ATAN, LINEAR, LOGARITHM => LOG, PRODUCT, &
-                        QUOTIENT, TABLE
+  use operations, only: LINEAR, LOGARITHM => LOG, PRODUCT, QUOTIENT, TABLE
   use tape, only: FIRST_UNKNOWN, tape_t, TIME_SLOT
   use tape_growth, only: MOST_UNKNOWNS
   use tape_series, only: BLOCKS_OF_COLUMNS, jacobian_at, series_t, SIDE_BY_SIDE
@@ -50,7 +49,7 @@ contains
         case (LINEAR)
           call add_combination(out, first)
           cycle
-        case (PRODUCT, QUOTIENT, LOGARITHM, ARCTANGENT, ARCSINE)
+        case (PRODUCT, QUOTIENT, LOGARITHM:)
           moves(out:last_slot) = moves(first) .or. moves(second)
           depends(out:last_slot) = depends(first) .or. depends(second)
         case (TABLE)

@@ -1,10 +1,10 @@
 module tape_values
   !! The values (terms 0) of all slots of a tape. Where the exponential of a large argument
   !! overflows but does not matter, a smaller number replaces it.
+  use, intrinsic :: iso_c_binding, only: c_int
   use kinds, only: dp
-  use operations, only: ARCSINE => ASIN, ARCTANGENT => ATAN, EXPONENTIAL => EXP, &
-                        FLOOR_OF => FLOOR, LINEAR, LOGARITHM => LOG, PRODUCT, QUOTIENT, &
-                        SELECT_OF => SELECT, SQUARE_ROOT => SQRT, SWITCH, TABLE, &
+  use operations, only: EXPONENTIAL => EXP, FLOOR_OF => FLOOR, LINEAR, LOGARITHM => LOG, PRODUCT, &
+                        QUOTIENT, SELECT_OF => SELECT, SQUARE_ROOT => SQRT, SWITCH, TABLE, &
                         TANGENT => TANH
   use storage, only: SERIES_LENGTH
   use tape, only: FIRST_UNKNOWN, piece_at, tape_t, TIME_SLOT
@@ -28,6 +28,17 @@ module tape_values
   real(dp), parameter :: MOVED = 2.0_dp**(-10)
   ! Largest part of a derivative that may depend on them.
   real(dp), parameter :: UNSEEN = 2.0_dp**(-150)
+
+  interface
+    pure real(dp) function function_of(kind, x, y, saturates) bind(c)
+      !! Return the value of a function of C's library at x, where its derivative is y.
+      import :: c_int, dp
+      implicit none(type, external)
+      integer(c_int), intent(in), value :: kind
+      real(dp), intent(in), value :: x, y
+      integer(c_int), intent(in), value :: saturates !! not 0: others may replace exponentials in y
+    end function function_of
+  end interface
 
   public :: chosen, find_values, value_of
 
@@ -177,12 +188,9 @@ contains
           a(0, out + 1) = (2.0_dp/(exp(abs(a(0, first))) + exp(-abs(a(0, first)))))**2
         case (TABLE)
           call set_table_terms(tape, first, a(0, TIME_SLOT), t_low, h, a(:, out))
-        case (LOGARITHM)
-          a(0, out) = log(a(0, first))
-        case (ARCTANGENT)
-          a(0, out) = atan(a(0, first))
-        case (ARCSINE)
-          a(0, out) = asin(a(0, first))
+        case (LOGARITHM:)
+          a(0, out) = function_of(tape%operations(1, n), a(0, first), a(0, second), &
+                                  merge(1, 0, powers /= NONE))
         case (SWITCH, FLOOR_OF)
           ! The caller sets the result.
           cycle

@@ -4,6 +4,7 @@ numba compiles a Runge-Kutta method for each scene, with the scene's numbers in 
 and an unrolled loop over stages.
 """
 
+import math
 import warnings
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -204,10 +205,18 @@ def heyoka_functions() -> Functions[Any]:
         raise InputError("heyoka can't evaluate a floor; allowed: a torque without floor")
 
     elementary = heyoka.sqrt, heyoka.exp, heyoka.tanh, heyoka.sin, heyoka.cos
-    others = heyoka.log, heyoka.atan, heyoka.asin
+    names = ("log", "atan", "asin", "acos", "asinh", "acosh", "atanh")
+    others = {name: getattr(heyoka, name) for name in names} | {
+        "log1p": lambda x: heyoka.log(1.0 + x),
+        "log2": lambda x: heyoka.log(x) / math.log(2.0),
+        "log10": lambda x: heyoka.log(x) / math.log(10.0),
+        "cbrt": lambda x: heyoka.exp(heyoka.log(x) / 3.0),
+        "expm1": lambda x: heyoka.exp(x) - 1.0,
+        "exp2": lambda x: heyoka.exp(x * math.log(2.0)),
+    }
     one, zero = heyoka.expression(1.0), heyoka.expression(0.0)
     return Functions(
-        heyoka.expression, *elementary, table, *others, lambda x: chosen(x, one, zero), refused,
+        heyoka.expression, *elementary, table, others, lambda x: chosen(x, one, zero), refused,
         chosen,
     )  # fmt: skip
 

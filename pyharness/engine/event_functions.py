@@ -12,8 +12,9 @@ import numpy as np
 
 from pyharness.engine.recorded import outputs_at
 from pyharness.model.array_type import Array
+from pyharness.model.called_function import called_once
 from pyharness.model.errors import InputError, kind_of
-from pyharness.model.numpy_calls import called_once, symbol_array
+from pyharness.model.numpy_protocol import symbol_array
 from pyharness.model.own_states import OwnState
 from pyharness.model.symbols import Recorder, recorded_twice
 from pyharness.model.tape import N_INPUTS, Tape

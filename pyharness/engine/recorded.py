@@ -13,9 +13,11 @@ from pyharness.engine.problem import normalized, remainders
 from pyharness.model.attitude import IDENTITY, quaternion_rates
 from pyharness.model.codes import Methods, Operations, Places, Statuses, Storage
 from pyharness.model.constant_body import with_constant_body
+from pyharness.model.elementary import WITH_DERIVATIVE
 from pyharness.model.errors import SLIDING, InputError, TimedError
 from pyharness.model.extension import COMPLETE, extension
 from pyharness.model.principal import PrincipalScene
+from pyharness.model.recurrences import n_results
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque, torque_of
 from pyharness.model.symbols import MOST_OPERATIONS, Recorder
@@ -25,21 +27,18 @@ from pyharness.model.trajectory import Array
 from pyharness.model.values import Triple
 
 _KINDS = {
-    "linear": (Operations.LINEAR, 1),
-    "product": (Operations.PRODUCT, 1),
-    "quotient": (Operations.QUOTIENT, 1),
-    "sqrt": (Operations.SQRT, 1),
-    "exp": (Operations.EXP, 2),
-    "tanh": (Operations.TANH, 3),
-    "sine": (Operations.SINE_COSINE, 3),
-    "table": (Operations.TABLE, 1),
-    "log": (Operations.LOG, 2),
-    "atan": (Operations.ATAN, 2),
-    "asin": (Operations.ASIN, 2),
-    "switch": (Operations.SWITCH, 1),
-    "floor": (Operations.FLOOR, 1),
-    "select": (Operations.SELECT, 1),
-}
+    "linear": Operations.LINEAR,
+    "product": Operations.PRODUCT,
+    "quotient": Operations.QUOTIENT,
+    "sqrt": Operations.SQRT,
+    "exp": Operations.EXP,
+    "tanh": Operations.TANH,
+    "sine": Operations.SINE_COSINE,
+    "table": Operations.TABLE,
+    "switch": Operations.SWITCH,
+    "floor": Operations.FLOOR,
+    "select": Operations.SELECT,
+} | {kind: getattr(Operations, kind.upper()) for kind in WITH_DERIVATIVE}
 # The first trial step, in the user's unit of time. It hardly matters, because the series then gives
 # a step up to 16 times as long.
 LONGEST_TRIAL = 1e3
@@ -173,7 +172,7 @@ def listing(tape: Tape, n_unknowns: int | None = None) -> Listing:
         if kind in ("sine", "cosine") and operands[0] in waves:
             places[number] = waves[operands[0]] + (kind == "cosine")
             continue
-        code, count = _KINDS["sine" if kind == "cosine" else kind]
+        code = _KINDS["sine" if kind == "cosine" else kind]
         first, second, *_ = *(places[slot] for slot in operands), 0, 0
         if linear is not None:
             first = combined(linear)
@@ -192,7 +191,7 @@ def listing(tape: Tape, n_unknowns: int | None = None) -> Listing:
             waves[operands[0]] = n_slots + 1
         operations.append((code, first, second, n_slots + 1))
         places[number] = n_slots + 1 + (kind == "cosine")
-        n_slots += count
+        n_slots += n_results(code)
     for output in tape.outputs:
         combined(output)
     return Listing(n_unknowns or len(tape.outputs), n_slots, operations, combinations, tables)

@@ -5,14 +5,17 @@ from typing import Any
 
 import numpy as np
 
+from pyharness.model.elementary import WITH_DERIVATIVE
 from pyharness.model.errors import TimedError
-from pyharness.model.tape import OMEGA, WITH_DERIVATIVE, Tape, live_slots, slot_values
+from pyharness.model.tape import OMEGA, Tape, live_slots, slot_values, slots_of
 from pyharness.model.tape_arrays import ARRAYS
 
 # An operand counts as 0 if it is at most _NEARLY_ZERO times its initial value, and at most _SHRUNK
 # times its value before the last, very short step.
 _NEARLY_ZERO = 1e-6
 _SHRUNK = 0.9
+# Where logarithms are infinite.
+_POLES = {"log": 0.0, "log2": 0.0, "log10": 0.0, "log1p": -1.0}
 # Omega counts as unbounded if its ratio to the initial omega is larger.
 _UNBOUNDED = 1e6
 
@@ -47,16 +50,21 @@ def undefined_operation(
             for inputs in (begin, before, end)
         )
 
-    def vanishes(slot: int) -> bool:
-        size, step = (abs(x[slot]) if np.isfinite(x[slot]) else 0.0 for x in (at_begin, earlier))
+    def vanishes(slot: int, zero: float = 0.0) -> bool:
+        size, step = (
+            abs(x[slot] - zero) if np.isfinite(x[slot]) else 0.0 for x in (at_begin, earlier)
+        )
         if begin == end:
             size = step = 0.0
-        return not abs(values[slot]) > min(_NEARLY_ZERO * size, _SHRUNK * step)
+        return not abs(values[slot] - zero) > min(_NEARLY_ZERO * size, _SHRUNK * step)
 
     live = live_slots(tape, lambda slot: None, lambda slot: bool(values[slot]))
     derivatives = {each.operands[1] for each in tape.operations if each.kind in WITH_DERIVATIVE}
-    slopes = (each.operands[1] for each in tape.operations if each.kind == "asin")
-    roots_of_arcs = {x for n in slopes for x in tape.operations[n - tape.n_inputs].operands}
+    arcs = ("asin", "acos", "acosh")
+    of_arcs = {each.operands[1] for each in tape.operations if each.kind in arcs}
+    for slot in live[::-1]:
+        if slot in of_arcs and tape.operations[slot - tape.n_inputs].kind != "sqrt":
+            of_arcs.update(slots_of(tape.operations[slot - tape.n_inputs]))
     # The operation may belong to a branch that begins here.
     for slot in [*live, *range(tape.n_inputs, tape.n_inputs + len(tape.operations))]:
         kind, operands, *_ = tape.operations[slot - tape.n_inputs]
@@ -64,16 +72,17 @@ def undefined_operation(
             continue
         if kind == "quotient" and begin != end and values[operands[0]] == earlier[operands[0]] == 0:
             continue
-        if kind == "log" and (not values[operands[0]] > 0.0 or vanishes(operands[0])):
+        pole = _POLES.get(kind)
+        if pole is not None and (not values[operands[0]] > pole or vanishes(operands[0], pole)):
             return (
                 "the logarithm or power of a number that becomes 0 or negative; write a smooth "
                 "function, such as (x**2 + e**2)**(p/2) for abs(x)**p"
             )
         if kind == "sqrt" and (values[operands[0]] < 0.0 or vanishes(operands[0])):
-            if slot in roots_of_arcs:
+            if slot in of_arcs:
                 return (
-                    "the arcsine or arccosine of a number that becomes 1 or -1; write the angle as "
-                    "arctan2(y, x)"
+                    "the arcsine, arccosine or arccosh of a number that becomes 1 or -1; write an "
+                    "angle as arctan2(y, x)"
                 )
             return (
                 "the square root of a number that becomes 0 or negative; write a smooth function, "

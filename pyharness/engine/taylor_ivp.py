@@ -15,8 +15,9 @@ from scipy.integrate import DenseOutput, OdeSolver
 
 from pyharness.engine.recorded import LONGEST_TRIAL, Step, kernel_tape, taylor_step
 from pyharness.model.arrays import numbers_of
+from pyharness.model.called_function import called_once
 from pyharness.model.errors import SLIDING, InputError, TimedError
-from pyharness.model.numpy_calls import called_once, symbol_array
+from pyharness.model.numpy_protocol import symbol_array
 from pyharness.model.symbols import Recorder, recorded_twice
 from pyharness.model.tape import Tape
 from pyharness.model.trajectory import Array

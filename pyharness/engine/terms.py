@@ -11,7 +11,7 @@ from pyharness.engine.term_input import law_of_vector, matrix_of, ready_term
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY, product, unit_quaternion
 from pyharness.model.errors import InputError
-from pyharness.model.numpy_calls import symbol_array
+from pyharness.model.numpy_protocol import symbol_array
 from pyharness.model.own_states import OwnState
 from pyharness.model.state_torque import StateTorque, count_arguments, recorded
 from pyharness.model.torque_law import TorqueLaw, law_integral, law_value

@@ -102,13 +102,25 @@ class Operations:
     SINE_COSINE = 6  # results: the sine, the cosine, and the weighted terms of their argument
     TABLE = 7  # cubic polynomials of time between breakpoints
     TANH = 8  # results: the function, its derivative, and the weighted terms of its argument
-    # Operand 2 is the derivative. Results: the function, and the weighted terms of its argument.
-    LOG = 9
-    ATAN = 10
-    ASIN = 11
     # The result is constant in a step.
-    SWITCH = 12  # 1 where the operand is positive, else 0
-    FLOOR = 13
+    SWITCH = 9  # 1 where the operand is positive, else 0
+    FLOOR = 10
     # Operand 2 is the number of a linear combination. The result is this combination where operand
     # 1 is not 0, else the next combination.
-    SELECT = 14
+    SELECT = 11
+    # Operand 2 is the derivative. Results: the function, and the weighted terms of its argument.
+    # These kinds are the last ones.
+    LOG = 12
+    LOG1P = 13
+    LOG2 = 14
+    LOG10 = 15
+    ATAN = 16
+    ASIN = 17
+    ACOS = 18
+    ASINH = 19
+    ACOSH = 20
+    ATANH = 21
+    CBRT = 22
+    # The same, with one result.
+    EXPM1 = 23
+    EXP2 = 24

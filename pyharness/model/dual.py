@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from pyharness.model.elementary import WITH_DERIVATIVE
 from pyharness.model.symbols import MOST_OPERATIONS, SYMBOLS, Recorder
 from pyharness.model.tape import Functions, Table, Tape, evaluate, selected, step, whole
 
@@ -126,6 +127,10 @@ def _of_table(table: Table, time: Dual) -> Dual:
     )
 
 
+def _slope(kind: str) -> Callable[[Any, Any], Any]:
+    return lambda x, _: WITH_DERIVATIVE[kind].derivative(x)
+
+
 _DUALS: Functions[Any] = Functions(
     float,
     of_duals(math.sqrt, lambda _, root: 0.5 / root, np.sqrt),
@@ -134,9 +139,10 @@ _DUALS: Functions[Any] = Functions(
     of_duals(math.sin, lambda x, _: np.cos(x), np.sin),
     of_duals(math.cos, lambda x, _: -1.0 * np.sin(x), np.cos),
     _of_table,
-    of_duals(math.log, lambda x, _: 1.0 / x, np.log),
-    of_duals(math.atan, lambda x, _: 1.0 / (1.0 + x * x), np.arctan),
-    of_duals(math.asin, lambda x, _: 1.0 / np.sqrt(1.0 + -1.0 * (x * x)), np.arcsin),
+    {
+        kind: of_duals(getattr(math, kind), _slope(kind), SYMBOLS.elementary[kind])
+        for kind in WITH_DERIVATIVE
+    },
     of_duals(step, lambda x, _: 0.0, SYMBOLS.switch),
     of_duals(whole, lambda x, _: 0.0, SYMBOLS.floor),
     _selected,

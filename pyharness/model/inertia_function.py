@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from pyharness.model.array_type import Array
+from pyharness.model.called_function import called_once
 from pyharness.model.changing import Changing
 from pyharness.model.dual import with_derivatives
 from pyharness.model.errors import InputError
 from pyharness.model.expressions import text_components
-from pyharness.model.numpy_calls import called_once
 from pyharness.model.symbols import SYMBOLS, Recorder, Symbol, recorded_twice
 from pyharness.model.tape import N_INPUTS, TIME, Table, Tape, evaluate, float_outputs, slots_of
 from pyharness.model.tape_arrays import ARRAYS, value_of_table, without_equal_constants

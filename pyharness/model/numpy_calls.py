@@ -1,167 +1,35 @@
-"""Replacements of NumPy's functions while a user's function is recorded with symbols.
-
-NumPy's own functions do not support choices (such as where), comparisons of arrays, linear algebra
-or assignment to elements of numpy.zeros for symbols. Calls from other threads or without symbols
-reach the originals.
-"""
+"""NumPy's functions of symbols that its loops over objects do not compute."""
 
 import math
 import operator
-import re
-import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from functools import partial, update_wrapper
+from collections.abc import Callable
+from operator import methodcaller
 from typing import Any
 
 import numpy as np
 
-from pyharness.model.errors import InputError, printable
-from pyharness.model.symbols import Recorder, Symbol, negated, select
+from pyharness.model.numpy_protocol import (
+    ELEMENTS,
+    FUNCTIONS,
+    has_symbol,
+    is_symbol,
+    of_ufunc,
+    symbol_in,
+    viewed,
+)
+from pyharness.model.symbols import METHODS, Symbol, negated, select
 from pyharness.model.tape import Table
 
 _MOST_PIECES = 200  # most points of an interpolation in the state
-
-_lock = threading.Lock()
-_installed = 0
-_here = threading.local()
-_originals: list[tuple[Any, str, Any]] = []
-
-
-@contextmanager
-def replaced_functions(with_targets: bool) -> Iterator[None]:
-    """Replace functions of NumPy and math in this thread.
-
-    If `with_targets`, numpy.zeros, empty and ones are replaced too.
-    """
-    global _installed
-    before = getattr(_here, "targets", None)
-    with _lock:
-        if _installed == 0:
-            _install()
-        _installed += 1
-    _here.targets = with_targets
-    try:
-        yield
-    finally:
-        _here.targets = before
-        with _lock:
-            _installed -= 1
-            while _originals and not _installed:
-                setattr(*_originals.pop())
-
-
-def _install() -> None:
-    for module, functions in _REPLACEMENTS:
-        for name, replaced in functions.items():
-            original = getattr(module, name)
-            _originals.append((module, name, original))
-            setattr(module, name, replaced(original))
-
-
-class _Replaced:
-    def __init__(self, original: Callable[..., Any], function: Callable[..., Any]) -> None:
-        self._original, self._function = original, function
-        # Modules that are imported meanwhile read the function's name and signature.
-        update_wrapper(self, original)
-
-    def __call__(self, *given: Any, **named: Any) -> Any:
-        every = (*given, *named.values())
-        if getattr(_here, "targets", None) is None or not any(map(_has_symbol, every)):
-            return self._original(*given, **named)
-        _refuse_out(every, named)
-        try:
-            return self._function(*given, **named)
-        except TypeError as error:
-            what = f"{getattr(self._original, '__name__', 'a function')} with these arguments"
-            raise _symbol_in(every).recorder.refusal(what) from error
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._original, name)
-
-
-class _Target(_Replaced):
-    """A replacement of numpy.zeros, empty or ones, whose array accepts symbols."""
-
-    def __init__(self, original: Callable[..., Any], value: float) -> None:
-        super().__init__(original, lambda shape, *_, **__: symbol_array(np.full(shape, value)))
-
-    def __call__(self, *given: Any, **named: Any) -> Any:
-        is_target = getattr(_here, "targets", None) and _is_float(given, named)
-        return (self._function if is_target else self._original)(*given, **named)
-
-
-def _is_float(given: Sequence[Any], named: Mapping[str, Any]) -> bool:
-    kind = given[1] if len(given) > 1 else named.get("dtype", float)
-    return kind is float or kind is object or kind is np.float64
-
-
-def _refuse_out(given: Any, named: Mapping[str, Any]) -> None:
-    if named.get("out") is not None:
-        raise _symbol_in(given).recorder.refusal("the argument out", "an assignment")
-
-
-def _has_symbol(value: Any) -> bool:
-    if isinstance(value, (list, tuple)):
-        return any(map(_has_symbol, value))
-    if isinstance(value, np.ndarray):
-        return value.dtype == object and any(isinstance(x, Symbol) for x in value.flat)
-    return isinstance(value, Symbol)
-
-
-def _comparison(compare: Callable[[Any, Any], Any]) -> Any:
-    def compared(x: Any, y: Any) -> Any:
-        found = compare(x, y)
-        # ~True is -2 in Python, not False.
-        return np.bool_(found) if isinstance(found, bool) else found
-
-    return lambda array, other: np.frompyfunc(compared, 2, 1)(array, other)
-
-
-class SymbolArray(np.ndarray[Any, Any]):
-    """An array of symbols, whose comparisons are arrays of conditions."""
-
-    __lt__, __le__ = _comparison(operator.lt), _comparison(operator.le)
-    __gt__, __ge__ = _comparison(operator.gt), _comparison(operator.ge)
-
-    def __array_wrap__(self, array: Any, *_: Any) -> Any:
-        return array.view(SymbolArray) if array.shape else array.item()
-
-    def clip(self, *given: Any, **named: Any) -> Any:
-        _refuse_out(self, named)
-        return _clip(self, *given, **named)
-
-
-def symbol_array(values: Any) -> Any:
-    return np.array(values, dtype=object).view(SymbolArray)
-
-
-def _wrapped(original: Callable[..., Any]) -> _Replaced:
-    return _Replaced(original, lambda *given, **named: _viewed(original(*given, **named)))
-
-
-def _viewed(found: Any) -> Any:
-    is_array = isinstance(found, np.ndarray) and found.dtype == object
-    return found.view(SymbolArray) if is_array else found
 
 
 def _by_element(function: Callable[..., Any], count: int) -> Callable[..., Any]:
     loop = np.frompyfunc(function, count, 1)
 
     def called(*given: Any) -> Any:
-        found = loop(
-            *(np.asarray(x, dtype=object) if isinstance(x, (list, tuple)) else x for x in given)
-        )
-        return _viewed(found)
+        return viewed(loop(*(np.array(x, dtype=object) for x in given)))
 
     return called
-
-
-def _of_symbol(name: str, function: Callable[[float], float]) -> Callable[[Any], Any]:
-    def called(x: Any) -> Any:
-        return getattr(x, name)() if isinstance(x, Symbol) else function(x)
-
-    return _by_element(called, 1)
 
 
 def _largest(x: Any, y: Any) -> Any:
@@ -177,15 +45,10 @@ def _limited(x: Any, low: Any, high: Any) -> Any:
     return found if high is None else _smallest(found, high)
 
 
-def _clip(x: Any, a_min: Any = None, a_max: Any = None, **named: Any) -> Any:
-    low, high = named.get("min", a_min), named.get("max", a_max)
-    return _by_element(_limited, 3)(x, low, high)
-
-
 def _selected(condlist: Any, choicelist: Any, default: Any = 0) -> Any:
     found = default
     for condition, choice in zip(reversed(condlist), reversed(choicelist), strict=True):
-        found = _CHOICES["where"](condition, choice, found)
+        found = _where(condition, choice, found)
     return found
 
 
@@ -194,13 +57,10 @@ def _with_sign(x: Any, y: Any) -> Any:
 
 
 def _remainder(x: Any, y: Any) -> Any:
-    is_number = not (isinstance(x, Symbol) or isinstance(y, Symbol))
-    return math.fmod(x, y) if is_number else x - y * (x / y).trunc()
+    return x - y * (x / y).trunc()
 
 
 def _arctan2(y: Any, x: Any) -> Any:
-    if not isinstance(y, Symbol) and not isinstance(x, Symbol):
-        return math.atan2(y, x)
     return (y if isinstance(y, Symbol) else 0.0 * x + y).arctan2(x)
 
 
@@ -210,7 +70,7 @@ def _interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None) -> An
     widths = np.diff(places)
     if not (np.isfinite(places).all() and (widths >= 0.0).all()):
         what = "interp of points that are not finite, or not in ascending order,"
-        raise _symbol_in([x, left, right]).recorder.refusal(what)
+        raise symbol_in([x, left, right]).recorder.refusal(what)
     slopes = np.divide(np.diff(values), widths, out=np.zeros(len(widths)), where=widths > 0.0)
 
     def piecewise(at: Any) -> Any:
@@ -243,20 +103,10 @@ def _interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None) -> An
     return _by_element(piecewise, 1)(x)
 
 
-def _extreme(choose: Callable[[Any, Any], Any]) -> Callable[..., Any]:
-    def called(values: Any, axis: Any = None) -> Any:
-        array = np.asarray(values, dtype=object)
-        return np.frompyfunc(choose, 2, 1).reduce(
-            array.ravel() if axis is None else array, axis=axis or 0
-        )
-
-    return called
-
-
 def _norm(x: Any, ord: Any = None, axis: Any = None, keepdims: bool = False) -> Any:
     array = np.asarray(x, dtype=object)
     if ord not in (None, 2) or (ord == 2 and array.ndim > 1 and axis is None):
-        raise _symbol_in(array).recorder.refusal(f"the norm of order {ord}", "the Euclidean norm")
+        raise symbol_in(array).recorder.refusal(f"the norm of order {ord}", "the Euclidean norm")
     return np.sum(array * array, axis=axis, keepdims=keepdims) ** 0.5
 
 
@@ -266,7 +116,7 @@ def _solve(a: Any, b: Any) -> Any:
 
 def _inverse(a: Any) -> Any:
     array = np.asarray(a)
-    if not _has_symbol(array):
+    if not has_symbol(array):
         return np.linalg.inv(array.astype(float))
     _check_small(array, "inverse")
     cofactors = np.empty(array.shape, dtype=object)
@@ -284,7 +134,7 @@ def _determinant_of(a: Any) -> Any:
 
 def _check_small(array: Any, what: str) -> None:
     if array.shape not in ((1, 1), (2, 2), (3, 3)):
-        raise _symbol_in(array).recorder.refusal(
+        raise symbol_in(array).recorder.refusal(
             f"the {what} of a matrix of shape {array.shape}", "matrices of at most three rows"
         )
 
@@ -299,115 +149,59 @@ def _determinant(matrix: Any) -> Any:
     return matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0]
 
 
-def _symbol_in(values: Any) -> Symbol:
-    if isinstance(values, Symbol):
-        return values
-    if isinstance(values, np.ndarray):
-        values = values.ravel().tolist()
-    return next(_symbol_in(each) for each in values if _has_symbol(each))
-
-
-def called_once(
-    function: Callable[..., Any], given: Sequence[Any], recorder: Recorder, allowed: str
-) -> list[Any]:
-    """Return the components that a user's function returns for symbols.
-
-    Raise InputError if the call fails, or returns one number or nothing.
-    """
-    # Called again with numpy.zeros replaced, if a symbol had to become a float.
-    for with_targets in (False, True):
-        try:
-            with replaced_functions(with_targets):
-                found = function(*given)
-                if found is None or isinstance(found, (Symbol, float, int)):
-                    what = "nothing" if found is None else "one number"
-                    raise InputError(
-                        f"{recorder.place}: the function returned {what}; allowed: {allowed}"
-                    )
-                return list(found)
-        except InputError:
-            if with_targets or not recorder.was_converted:
-                raise
-        except Exception as error:
-            missing = re.search(r"no callable (\w+) method", str(error))
-            if missing:
-                raise recorder.refusal(f"{missing[1]} of the state") from None
-            if _OF_NUMBERS.search(str(error)):
-                reason = f"{type(error).__name__}: {printable(str(error))}"
-                raise recorder.refusal_of_numbers(reason) from error
-            raise InputError(
-                f"{recorder.place}: the function raised {type(error).__name__}: "
-                f"{printable(str(error))}; allowed: {allowed}"
-            ) from error
-    raise AssertionError
-
-
-# Messages of functions that accept numbers only.
-_OF_NUMBERS = re.compile(r"[Oo]bject\b|dtype\('O'\)|input types|Symbol")
-_WRAPPED = (
-    "array", "asarray", "cross", "dot", "inner", "outer", "matmul", "einsum", "stack",
-    "concatenate", "hstack", "vstack", "column_stack", "roll", "diff", "ravel", "reshape",
+_where = _by_element(select, 3)
+ELEMENTS.update({name: methodcaller(name) for name in METHODS})
+ELEMENTS.update(
+    {
+        "less": operator.lt, "less_equal": operator.le, "greater": operator.gt,
+        "greater_equal": operator.ge, "equal": operator.eq, "not_equal": operator.ne,
+        "invert": operator.invert, "logical_not": negated, "logical_and": operator.and_,
+        "logical_or": operator.or_, "logical_xor": operator.xor, "maximum": _largest,
+        "fmax": _largest, "minimum": _smallest, "fmin": _smallest, "clip": _limited,
+        "heaviside": lambda x, at_zero: select(x > 0.0, 1.0, 0.0), "fabs": abs,
+        "copysign": _with_sign, "fmod": _remainder, "arctan2": _arctan2,
+        "hypot": lambda x, y: (x * x + y * y) ** 0.5, "float_power": operator.pow,
+        "deg2rad": methodcaller("radians"), "rad2deg": methodcaller("degrees"),
+    }
 )  # fmt: skip
-_ELEMENTARY = {
-    "sqrt": math.sqrt, "exp": math.exp, "sin": math.sin, "cos": math.cos, "tan": math.tan,
-    "sinh": math.sinh, "cosh": math.cosh, "tanh": math.tanh, "log": math.log, "log1p": math.log1p,
-    "log2": math.log2, "log10": math.log10, "exp2": lambda x: 2.0**x, "expm1": math.expm1,
-    "cbrt": lambda x: math.copysign(abs(x) ** (1.0 / 3.0), x), "floor": math.floor,
-    "ceil": math.ceil, "trunc": math.trunc, "radians": math.radians, "degrees": math.degrees,
-}  # fmt: skip
-_ARCS = {
-    "sin": math.asin, "cos": math.acos, "tan": math.atan, "sinh": math.asinh, "cosh": math.acosh,
-    "tanh": math.atanh,
-}  # fmt: skip
-_CHOICES: dict[str, Callable[..., Any]] = {
-    "where": _by_element(select, 3), "select": _selected, "clip": _clip,
-    "heaviside": _by_element(lambda x, at_zero: select(x > 0.0, 1.0, 0.0), 2),
-    "maximum": _by_element(_largest, 2), "minimum": _by_element(_smallest, 2),
-    "fmax": _by_element(_largest, 2), "fmin": _by_element(_smallest, 2),
-    "max": _extreme(_largest), "min": _extreme(_smallest), "amax": _extreme(_largest),
-    "amin": _extreme(_smallest), "interp": _interp, "arctan2": _by_element(_arctan2, 2),
-    "hypot": _by_element(lambda x, y: (x * x + y * y) ** 0.5, 2),
-    "sign": _of_symbol("sign", np.sign), "fabs": _by_element(abs, 1),
-    "copysign": _by_element(_with_sign, 2), "fmod": _by_element(_remainder, 2),
-    "logical_and": _by_element(operator.and_, 2), "logical_or": _by_element(operator.or_, 2),
-    "logical_not": _by_element(negated, 1),
-}  # fmt: skip
-_OF_NUMPY = (
-    {name: _of_symbol(name, each) for name, each in _ELEMENTARY.items()}
-    | {f"arc{name}": _of_symbol(f"arc{name}", each) for name, each in _ARCS.items()}
-    | {"rint": _of_symbol("rint", round)}
-    | {"deg2rad": _of_symbol("radians", math.radians)}
-    | {"rad2deg": _of_symbol("degrees", math.degrees)}
-    | _CHOICES
-)
-_OF_MATH = (
-    {name: _of_symbol(name, each) for name, each in _ELEMENTARY.items() if hasattr(math, name)}
-    | {f"a{name}": _of_symbol(f"arc{name}", each) for name, each in _ARCS.items()}
-    | {name: _CHOICES[name] for name in ("copysign", "fabs", "fmod", "hypot")}
-    | {"atan2": _CHOICES["arctan2"], "pow": _by_element(operator.pow, 2)}
-)
-# The functions of scene files, for numbers and symbols.
-ELEMENTARY: dict[str, Callable[..., Any]] = {
-    name: _OF_MATH[name]
+FUNCTIONS.update(
+    {
+        np.where: _where, np.select: _selected, np.interp: _interp, np.linalg.norm: _norm,
+        np.linalg.solve: _solve, np.linalg.inv: _inverse, np.linalg.det: _determinant_of,
+    }
+)  # fmt: skip
+# The functions of `math`, by NumPy's.
+OF_MATH: dict[str, np.ufunc] = {
+    name: getattr(np, name)
     for name in (
-        "sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh", "tanh",
-        "floor", "atan2",
+        "sqrt", "exp", "sin", "cos", "tan", "sinh", "cosh", "tanh", "log", "log1p", "log2", "log10",
+        "exp2", "expm1", "cbrt", "floor", "ceil", "trunc", "radians", "degrees", "copysign", "fabs",
+        "fmod", "hypot",
     )
 } | {
-    "cbrt": _OF_NUMPY["cbrt"], "abs": abs, "sign": lambda x: (x > 0.0) * 2.0 - 1.0,
+    "asin": np.arcsin, "acos": np.arccos, "atan": np.arctan, "asinh": np.arcsinh,
+    "acosh": np.arccosh, "atanh": np.arctanh, "atan2": np.arctan2, "pow": np.power,
+}  # fmt: skip
+
+
+def _of_math(name: str) -> Callable[..., Any]:
+    def called(*given: Any) -> Any:
+        if any(map(is_symbol, given)):
+            return of_ufunc(OF_MATH[name], "__call__", given, {})
+        return getattr(math, name)(*given)
+
+    return called
+
+
+# The functions of scene files, for numbers and symbols.
+ELEMENTARY: dict[str, Callable[..., Any]] = {
+    name: _of_math(name)
+    for name in (
+        "sqrt", "cbrt", "sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh",
+        "tanh", "floor", "atan2",
+    )
+} | {
+    "abs": abs, "sign": lambda x: (x > 0.0) * 2.0 - 1.0,
     "heaviside": lambda x: select(x > 0.0, 1.0, 0.0), "min": _smallest, "max": _largest,
     "clip": _limited, "where": select,
 }  # fmt: skip
-_OF_LINALG: dict[str, Callable[..., Any]] = {
-    "norm": _norm, "solve": _solve, "inv": _inverse, "det": _determinant_of,
-}  # fmt: skip
-_TARGETS = {"zeros": 0.0, "empty": 0.0, "ones": 1.0}
-# By module and name: a function from the original to its replacement.
-_REPLACEMENTS: list[tuple[Any, dict[str, Callable[..., Any]]]] = [
-    (module, {name: partial(_Replaced, function=each) for name, each in functions.items()})
-    for module, functions in ((np, _OF_NUMPY), (np.linalg, _OF_LINALG), (math, _OF_MATH))
-]
-_REPLACEMENTS += [
-    (np, dict.fromkeys(_WRAPPED, _wrapped)),
-    (np, {name: partial(_Target, value=each) for name, each in _TARGETS.items()}),
-]

@@ -3,6 +3,7 @@
 The interpreter (fortran/make_cases.py) and compiled code (`pyharness.engine.leaves`) use them.
 """
 
+import math
 from typing import NamedTuple
 
 from pyharness.model.codes import Operations
@@ -23,9 +24,12 @@ class Operation(NamedTuple):
     # Rounding error of the operation alone, in units of 2**-53. The errors of the operands, times
     # the absolute slopes, are added.
     rounding: str = "2.0*size(z_o)"
+    # z_o from the numbers x and y, if it is a function of C's library. `saturates` says that other
+    # numbers may replace exponentials in y.
+    function: str = ""
 
 
-_OF_ANGLE = Operation(("t_p = k*t_x", "t_o = i*(s0 + t_p*z_y)"), ("py",), slopes=("m_y",))
+_WITH_DERIVATIVE = Operation(("t_p = k*t_x", "t_o = i*(s0 + t_p*z_y)"), ("py",), slopes=("m_y",))
 _SINE = Operation(
     ("t_q = k*t_x", "t_o = i*(s0 + t_q*z_p)", "t_p = -i*(s1 + t_q*z_o)"), ("qp", "qo"),
     slopes=("m_p",), second="-m_o", rounding="2.0",
@@ -58,7 +62,25 @@ OPERATIONS = {
         series=("t_q = k*t_x", "t_o = i*f_x*b_p", "t_p = -i*f_x*b_o"), pairs=()
     ),
     Operations.TABLE: Operation(("t_o = l_o",)),
-    Operations.LOG: _OF_ANGLE,
-    Operations.ATAN: _OF_ANGLE,
-    Operations.ASIN: _OF_ANGLE,
+    **{
+        getattr(Operations, name.upper()): _WITH_DERIVATIVE._replace(function=f"{name}(x)")
+        for name in (
+            "log", "log1p", "log2", "log10", "atan", "asin", "acos", "asinh", "acosh", "atanh",
+            "cbrt",
+        )
+    },
+    # Operand y is the exponential, or ln 2 times it.
+    Operations.EXPM1: Operation(
+        ("t_o = t_y",), slopes=("m_y",), function="x > 40.0 ? y : expm1(x)"
+    ),
+    Operations.EXP2: Operation(
+        (f"t_o = {1.0 / math.log(2.0)!r}*t_y",), slopes=("m_y",),
+        function=f"saturates ? {1.0 / math.log(2.0)!r}*y : exp2(x)",
+    ),
 }  # fmt: skip
+
+
+def n_results(kind: int) -> int:
+    """Return the number of an operation's results, each of which has a series."""
+    written = [line[2] for line in OPERATIONS[kind].series] if kind in OPERATIONS else ["o"]
+    return max(map("opq".index, written)) + 1

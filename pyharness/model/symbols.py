@@ -14,7 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from pyharness.model.elementary import WITH_DERIVATIVE
 from pyharness.model.errors import InputError, printable
+from pyharness.model.numpy_protocol import Recorded
 from pyharness.model.tape import (
     FLOATS,
     N_INPUTS,
@@ -69,6 +71,17 @@ class Recorder:
         self._slots: dict[Operation, int] = {}
         self.has_powers = True  # whether exponents may be symbols
         self.was_converted = False  # whether the function tried to make a symbol a float
+
+    @property
+    def count(self) -> int:
+        """The number of operations."""
+        return len(self._slots)
+
+    def restart(self, count: int) -> None:
+        """Keep the first operations alone."""
+        for operation in [*self._slots][count:]:
+            del self._slots[operation]
+        self.was_converted = False
 
     def inputs(self) -> list["Symbol"]:
         """Return symbols for all inputs: time, omega, attitude, and own states or parameters."""
@@ -163,7 +176,8 @@ def _function(
 ) -> Callable[["Symbol"], "Symbol"]:
     def called(self: "Symbol") -> "Symbol":
         if not self._terms:
-            return Symbol(self.recorder, getattr(FLOATS, kind)(self._constant), {})
+            function = FLOATS.elementary.get(kind) or getattr(FLOATS, kind)
+            return Symbol(self.recorder, function(self._constant), {})
         operands: tuple[int, ...] = (self._own_slot(),)
         if derivative is not None:
             argument = Symbol(self.recorder, 0.0, {operands[0]: 1.0})
@@ -173,30 +187,39 @@ def _function(
     return called
 
 
-# Compositions of other functions, by NumPy's name.
-_COMPOSED: dict[str, Callable[[Any], Any]] = {
+def _rint(x: Any) -> Any:
+    # The result is even where two numbers are nearest: after 2k + 0.5, and from 2k + 1.5 on, it
+    # grows by 1.
+    return (0.5 * x + 0.25).floor() - (0.25 - 0.5 * x).floor()
+
+
+# By kind.
+_WITH_DERIVATIVE = {
+    kind: _function(kind, each.derivative) for kind, each in WITH_DERIVATIVE.items()
+}
+# By NumPy's name; besides, compositions of other functions.
+_NAMED: dict[str, Callable[[Any], Any]] = {
+    WITH_DERIVATIVE[kind].of_numpy: each for kind, each in _WITH_DERIVATIVE.items()
+} | {
     "tan": lambda x: x.sin() / x.cos(),
-    "log1p": lambda x: (1.0 + x).log(),
-    "log2": lambda x: x.log() / math.log(2.0),
-    "log10": lambda x: x.log() / math.log(10.0),
-    "exp2": lambda x: (x * math.log(2.0)).exp(),
-    "expm1": lambda x: x.exp() - 1.0,
     "square": lambda x: x * x,
-    "cbrt": lambda x: x.sign() * (abs(x).log() / 3.0).exp(),
-    "arccos": lambda x: 0.5 * math.pi - x.arcsin(),
-    "arcsinh": lambda x: (x + (x * x + 1.0).sqrt()).log(),
-    "arccosh": lambda x: (x + (x * x - 1.0).sqrt()).log(),
-    "arctanh": lambda x: 0.5 * ((1.0 + x) / (1.0 - x)).log(),
+    "cbrt": lambda x: x.sign() * _WITH_DERIVATIVE["cbrt"](abs(x)),
     "radians": lambda x: x * (math.pi / 180.0),
     "degrees": lambda x: x * (180.0 / math.pi),
-    "rint": lambda x: (x + 0.5).floor(),
-    "sinh": lambda x: 0.5 * (x.exp() - (-x).exp()),
+    "rint": _rint,
+    # The difference of exponentials would lose digits of a small argument.
+    "sinh": lambda x: 0.5 * (x.expm1() - (-x).expm1()),
     "cosh": lambda x: 0.5 * (x.exp() + (-x).exp()),
     "conjugate": lambda x: x,
 }
 
 
-class Symbol:
+_logarithm, _exp2 = _WITH_DERIVATIVE["log"], _WITH_DERIVATIVE["exp2"]
+# The names of NumPy for functions of one argument that are methods of symbols.
+METHODS = ("sqrt", "exp", "sin", "cos", "tanh", "floor", "ceil", "trunc", "sign", *_NAMED)
+
+
+class Symbol(Recorded):
     """A linear combination of slots (inputs and results), which records operations on it."""
 
     __slots__ = ("_constant", "_terms", "recorder")
@@ -298,7 +321,7 @@ class Symbol:
         if isinstance(power, Symbol):
             if not self.recorder.has_powers:
                 raise self.recorder.refusal("a power that is not a number")
-            return (power * self.log()).exp()
+            return (power * _logarithm(self)).exp()
         exponent = converted(power)
         if not isinstance(exponent, float) or not math.isfinite(exponent):
             raise self.recorder.refusal("a power that is not a finite number")
@@ -306,7 +329,7 @@ class Symbol:
             root = self.sqrt()
             return root if exponent == 0.5 else self ** (exponent - 0.5) * root
         if exponent % 1.0 or abs(exponent) > _MOST_POWER:
-            return (exponent * self.log()).exp()
+            return (exponent * _logarithm(self)).exp()
         result, square, left = Symbol(self.recorder, 1.0, {}), self, abs(int(exponent))
         while left:
             if left % 2:
@@ -320,7 +343,7 @@ class Symbol:
         number = converted(base)
         if not isinstance(number, float) or not number > 0.0:
             raise self.recorder.refusal("a power of a number that is not positive")
-        return (self * math.log(number)).exp()
+        return _exp2(self) if number == 2.0 else (self * math.log(number)).exp()
 
     def _own_slot(self) -> int:
         slot, factor = self._slot()
@@ -333,9 +356,6 @@ class Symbol:
     sin = _function("sine")
     cos = _function("cosine")
     tanh = _function("tanh")
-    log = _function("log", lambda x: 1.0 / x)
-    arctan = _function("atan", lambda x: 1.0 / (1.0 + x * x))
-    arcsin = _function("asin", lambda x: 1.0 / (1.0 - x * x).sqrt())
     floor = __floor__ = _function("floor")
     _root = _function("sqrt")
 
@@ -436,9 +456,9 @@ class Symbol:
     __rmod__ = _of_symbols(lambda x, y: y - x * (y / x).floor())
 
     def __getattr__(self, name: str) -> Any:
-        """Return a composed function, such as tan, which NumPy looks up by name."""
-        if name in _COMPOSED:
-            return partial(_COMPOSED[name], self)
+        """Return a function, such as tan, which NumPy looks up by name."""
+        if name in _NAMED:
+            return partial(_NAMED[name], self)
         # numpy.mean works for objects without an attribute `dtype`.
         if name.startswith("_") or name == "dtype":
             raise AttributeError(name)
@@ -529,9 +549,14 @@ def _combined(linear: Linear, values: Sequence[Any]) -> Any:
     return constant if recorder is None else Symbol(recorder, constant, terms)
 
 
+def _elementary(kind: str, x: Any) -> Any:
+    functions = _WITH_DERIVATIVE if isinstance(x, Symbol) else FLOATS.elementary
+    return functions[kind](x)
+
+
 SYMBOLS: Functions[Any] = Functions(
     float, np.sqrt, np.exp, np.tanh, np.sin, np.cos, lambda table, time: time.of_table(table),
-    np.log, np.arctan, np.arcsin,
+    {kind: partial(_elementary, kind) for kind in WITH_DERIVATIVE},
     lambda x: x.switch() if isinstance(x, Symbol) else FLOATS.switch(x),
     lambda x: x.floor() if isinstance(x, Symbol) else FLOATS.floor(x), _selected, _combined,
 )  # fmt: skip

@@ -6,7 +6,7 @@ series or symbols. A slot is an input or a result.
 
 import math
 import operator
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial, reduce
 from typing import Any, Generic, NamedTuple, TypeVar
@@ -14,6 +14,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from pyharness.model.array_type import Array
+from pyharness.model.elementary import WITH_DERIVATIVE, of_float, with_exponential
 from pyharness.model.functions import cosine, sine
 
 T = TypeVar("T")
@@ -26,8 +27,6 @@ ATTITUDE = (4, 5, 6, 7)
 N_INPUTS = 8
 # The kinds of operations whose results are constant between certain values of the operand.
 SWITCHES = ("switch", "floor")
-# The kinds whose second operand is their derivative, which only Taylor series need.
-WITH_DERIVATIVE = ("log", "atan", "asin")
 
 
 class Linear(NamedTuple):
@@ -136,9 +135,7 @@ class Functions(Generic[T]):
     sine: Callable[[T], T]
     cosine: Callable[[T], T]
     table: Callable[[Table, T], T]  # the value of a table at a time
-    log: Callable[[T], T]
-    atan: Callable[[T], T]
-    asin: Callable[[T], T]
+    elementary: Mapping[str, Callable[[T], T]]  # those of WITH_DERIVATIVE
     switch: Callable[[T], T]
     floor: Callable[[T], T]
     select: Callable[[T, T, T], T]
@@ -182,7 +179,8 @@ def _result(operation: Operation, values: Sequence[Any], functions: Functions[An
         return values[operands[0]] / values[operands[1]]
     if kind == "select":
         return functions.select(*(values[each] for each in operands))
-    return getattr(functions, kind)(values[operands[0]])
+    function = functions.elementary.get(kind) or getattr(functions, kind)
+    return function(values[operands[0]])
 
 
 def live_slots(
@@ -231,16 +229,6 @@ def exponential(x: float) -> float:
         return math.inf
 
 
-def logarithm(x: float) -> float:
-    if x > 0.0:
-        return math.log(x)
-    return -math.inf if x == 0.0 else math.nan
-
-
-def arcsine(x: float) -> float:
-    return math.asin(x) if abs(x) <= 1.0 else math.nan
-
-
 def step(x: float) -> float:
     return 1.0 if x > 0.0 else 0.0
 
@@ -262,8 +250,8 @@ def _value(table: Table, time: float) -> float:
 
 # For arguments of type float. A division by zero raises ZeroDivisionError.
 FLOATS: Functions[float] = Functions(
-    float, _sqrt, exponential, math.tanh, sine, cosine, _value, logarithm, math.atan, arcsine, step,
-    whole, selected,
+    float, _sqrt, exponential, math.tanh, sine, cosine, _value,
+    {kind: of_float(kind) for kind in WITH_DERIVATIVE}, step, whole, selected,
 )  # fmt: skip
 # Exponentials of larger arguments are replaced by powers of 2, as in tape_values.f90.
 _LARGE_ARGUMENT = 210.0
@@ -291,8 +279,7 @@ def float_outputs(tape: Tape, inputs: Sequence[float]) -> list[float]:
     # A large number replaces an exponential that overflows, as in sinh(x)/cosh(x), unless outputs
     # depend on the choice of this number.
     own, other, large, moderate = (
-        evaluate(tape, inputs, replace(FLOATS, exp=partial(_saturated, kind)))
-        for kind in ("own", "other", "large", "moderate")
+        evaluate(tape, inputs, _saturating(kind)) for kind in ("own", "other", "large", "moderate")
     )
     # An output that is infinite has no scale.
     scales = (abs(x) if math.isfinite(x) else 0.0 for x in moderate)
@@ -315,6 +302,11 @@ def _without_branches(tape: Tape, inputs: Sequence[float]) -> Tape:
     nothing = Operation("linear", (), Linear(0.0, ()))
     kept = enumerate(tape.operations, tape.n_inputs)
     return replace(tape, operations=tuple(each if slot in live else nothing for slot, each in kept))
+
+
+def _saturating(kind: str) -> Functions[float]:
+    exp = partial(_saturated, kind)
+    return replace(FLOATS, exp=exp, elementary={**FLOATS.elementary, **with_exponential(exp)})
 
 
 def _saturated(kind: str, x: float) -> float:

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from pyharness.model.array_type import Array
+from pyharness.model.elementary import WITH_DERIVATIVE
 from pyharness.model.tape import Functions, Table
 
 
@@ -28,7 +29,8 @@ def value_of_table(table: Table, time: Any) -> Any:
     return time.of_table(table) if len(table.breaks) > 1 else float(table.pieces[0, 0])
 
 
+OF_NUMPY = {kind: getattr(np, each.of_numpy) for kind, each in WITH_DERIVATIVE.items()}
 ARRAYS: Functions[Any] = Functions(
-    float, np.sqrt, np.exp, np.tanh, np.sin, np.cos, table_values, np.log, np.arctan, np.arcsin,
+    float, np.sqrt, np.exp, np.tanh, np.sin, np.cos, table_values, OF_NUMPY,
     lambda x: np.where(x > 0.0, 1.0, 0.0), np.floor, lambda h, x, y: np.where(h > 0.0, x, y),
 )  # fmt: skip

@@ -9,7 +9,7 @@ combination, or the breaks and pieces of a table.
 import json
 import math
 import os
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +17,7 @@ import numpy as np
 
 from pyharness.model.archive import archive_of, checked_file
 from pyharness.model.changing import Changing, ChangingInertia, ChangingMoments
+from pyharness.model.elementary import WITH_DERIVATIVE
 from pyharness.model.errors import InputError
 from pyharness.model.inertia_function import InertiaFunction
 from pyharness.model.output_files import write_files
@@ -25,7 +26,7 @@ from pyharness.model.scene_file import scene_text
 from pyharness.model.schema import SCHEMAS
 from pyharness.model.state_torque import StateTorque, is_opaque
 from pyharness.model.symbols import MOST_OPERATIONS
-from pyharness.model.tape import N_INPUTS, Functions, Linear, Operation, Table, Tape
+from pyharness.model.tape import N_INPUTS, SWITCHES, Linear, Operation, Table, Tape
 from pyharness.model.torque_law import TorqueLaw
 
 if TYPE_CHECKING:
@@ -50,14 +51,11 @@ SENSITIVITIES = "sensitivities"  # columns of all parameters; the header has nam
 MOST_FUNCTIONS = 10_000  # of events; each has arrays of its own
 _TAPED = "The torque was recorded from a function. Its operations are in the header."
 # The number of operands by kind of operation.
-_OPERANDS = {each.name: 1 for each in fields(Functions) if each.name not in ("number", "table")} | {
-    "product": 2,
-    "quotient": 2,
-    "log": 2,
-    "atan": 2,
-    "asin": 2,
-    "select": 3,
-}
+_OPERANDS = (
+    dict.fromkeys(("sqrt", "exp", "tanh", "sine", "cosine", *SWITCHES), 1)
+    | dict.fromkeys(("product", "quotient", *WITH_DERIVATIVE), 2)
+    | {"select": 3}
+)
 
 
 def save(found: "Trajectory", path: str | os.PathLike[str]) -> None:

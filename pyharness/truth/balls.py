@@ -12,6 +12,7 @@ from typing import Any
 from flint import acb, arb, fmpq
 
 from pyharness.model.dual import of_duals
+from pyharness.model.elementary import WITH_DERIVATIVE
 from pyharness.model.errors import InputError
 from pyharness.model.tape import Functions, Table
 from pyharness.truth.enclosed import Balls
@@ -58,6 +59,20 @@ def _refuse(*_: Any) -> Any:
     )
 
 
+# Formulas suffice: enclosures show the digits that they lose.
+_ELEMENTARY: dict[str, Any] = dict.fromkeys(WITH_DERIVATIVE, _refuse) | {
+    "log": _log,
+    "log1p": lambda x: _log(1.0 + x),
+    "log2": lambda x: _log(x) / arb(2).log(),
+    "log10": lambda x: _log(x) / arb(10).log(),
+    "asinh": lambda x: _log(x + _sqrt(x * x + 1.0)),
+    "acosh": lambda x: _log(x + _sqrt(x * x - 1.0)),
+    "atanh": lambda x: 0.5 * _log((1.0 + x) / (1.0 - x)),
+    "expm1": lambda x: _exp(x) - 1.0,
+    "exp2": lambda x: _exp(arb(2).log() * x),
+}
+
+
 def functions_at(time: Fraction, forward: bool) -> Functions[Any]:
     """Return the functions that evaluate tapes (recorded operations) in a step from `time` (s)."""
 
@@ -69,5 +84,5 @@ def functions_at(time: Fraction, forward: bool) -> Functions[Any]:
         s = at - arb(float(each.breaks[piece]))
         return c0 + s * (c1 + s * (c2 + s * c3))
 
-    functions = _sqrt, _exp, _tanh, _sine, _cosine, table, _log
-    return Functions(arb, *functions, *[_refuse] * 5)
+    functions = _sqrt, _exp, _tanh, _sine, _cosine, table, _ELEMENTARY
+    return Functions(arb, *functions, *[_refuse] * 3)

@@ -2,7 +2,7 @@
 
 import decimal
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from decimal import Decimal
 from fractions import Fraction
 from functools import cache
@@ -62,6 +62,59 @@ def arcsin(x: Decimal) -> Decimal:
         context.prec += 10
         angle = arctan(x / (1 - x * x).sqrt())
     return +angle
+
+
+def arccos(x: Decimal) -> Decimal:
+    if x <= -1:
+        return pi(decimal.getcontext().prec) + arcsin(-1 - x)  # which fails below -1
+    with decimal.localcontext() as context:
+        context.prec += 10
+        angle = 2 * arctan(((1 - x) / (1 + x)).sqrt())
+    return +angle
+
+
+def _with_digits(function: Callable[[Decimal], Decimal], zero: int = 0) -> Callable[..., Decimal]:
+    """Return a function with the digits that its formula loses of small or large x - `zero`."""
+
+    def called(x: Decimal) -> Decimal:
+        with decimal.localcontext() as context:
+            context.prec += 10 + abs((x - zero).adjusted())
+            found = function(x)
+        return +found
+
+    return called
+
+
+def _arsinh(x: Decimal) -> Decimal:
+    return (abs(x) + (x * x + 1).sqrt()).ln().copy_sign(x)
+
+
+# By the kind of the recorded operation.
+ELEMENTARY: dict[str, Callable[[Decimal], Decimal]] = {
+    "log": Decimal.ln,
+    "log1p": _with_digits(lambda x: (1 + x).ln()),
+    "log2": _with_digits(lambda x: x.ln() / Decimal(2).ln()),
+    "log10": Decimal.log10,
+    "atan": arctan,
+    "asin": arcsin,
+    "acos": arccos,
+    "asinh": _with_digits(_arsinh),
+    "acosh": _with_digits(lambda x: (x + (x * x - 1).sqrt()).ln(), 1),
+    "atanh": _with_digits(lambda x: ((1 + x) / (1 - x)).ln() / 2),
+    "cbrt": _with_digits(lambda x: (x.ln() / 3).exp()),
+    "expm1": _with_digits(lambda x: x.exp() - 1),
+    "exp2": _with_digits(lambda x: (x * Decimal(2).ln()).exp()),
+}
+
+
+def logarithm(number: int) -> Decimal:
+    return _logarithm(number, decimal.getcontext().prec)
+
+
+@cache
+def _logarithm(number: int, digits: int) -> Decimal:
+    with decimal.localcontext(prec=digits):
+        return Decimal(number).ln()
 
 
 @cache

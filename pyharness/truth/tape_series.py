@@ -5,13 +5,20 @@ and solution are computed together, order by order (Jorba and Zou 2005, Experime
 14).
 """
 
+import math
 from bisect import bisect_left, bisect_right
 from collections import Counter
-from collections.abc import Callable
 from decimal import Context, Decimal
 
 from pyharness.model.tape import N_INPUTS, SWITCHES, Linear, Operation, Table, Tape, live_slots
-from pyharness.truth.decimal_functions import Row, arcsin, arctan, product, sine_cosine, value_at
+from pyharness.truth.decimal_functions import (
+    ELEMENTARY,
+    Row,
+    logarithm,
+    product,
+    sine_cosine,
+    value_at,
+)
 
 # A larger angle has no sine in any method, because its reduction would take too many digits.
 _LARGEST_ANGLE = Decimal("1e308")
@@ -29,11 +36,6 @@ _MOST_ORDER = 100
 _TRUSTED = Decimal("1e-6")
 
 _ROUGH = Context(prec=9)
-_FUNCTIONS: dict[str, Callable[[Decimal], Decimal]] = {
-    "log": Decimal.ln,
-    "atan": arctan,
-    "asin": arcsin,
-}
 
 
 # A product of many factors: how often each slot is a factor, the decimal logarithm of the product's
@@ -142,10 +144,18 @@ class TapeSeries:
             return self.results.get(slot, Decimal(0)) if k == 0 else Decimal(0)
         if kind == "select":
             return self._slots[operands[1] if x[0] else operands[2]][k]
-        if kind in _FUNCTIONS:
+        if kind in ELEMENTARY:
             if k == 0:
-                return _FUNCTIONS[kind](x[0])
-            return product(self._slope(operands[0], k), self._slots[operands[1]][:k][::-1]) / k
+                return ELEMENTARY[kind](x[0])
+            slope = self._slope(operands[0], k)
+            if kind == "exp2":
+                return logarithm(2) * product(slope, found[::-1]) / k
+            if kind == "cbrt":
+                return _cube_root_coefficient(x, slope, found, k)
+            # The derivative on the tape has a rounded factor.
+            base = {"log2": 2, "log10": 10}.get(kind)
+            exact = 1 / (logarithm(base) * Decimal(1.0 / math.log(base))) if base else 1
+            return exact * product(slope, self._slots[operands[1]][:k][::-1]) / k
         if kind == "product":
             return product(x, self._slots[operands[1]][::-1])
         if kind == "quotient":
@@ -327,6 +337,12 @@ def _expanded(table: Table, breaks: Row, time: Decimal, forward: bool) -> Row:
     c0, c1, c2, c3 = map(Decimal, table.pieces[piece].tolist())
     s = time - breaks[piece]
     return [c0 + s * (c1 + s * (c2 + s * c3)), c1 + s * (2 * c2 + s * 3 * c3), c2 + 3 * s * c3, +c3]
+
+
+def _cube_root_coefficient(x: Row, slope: Row, root: Row, k: int) -> Decimal:
+    """Return Taylor coefficient k of the cube root r of x, from 3 x r' = r x'."""
+    slopes = [j * each for j, each in enumerate(root)][1:]
+    return (product(slope, root[::-1]) / 3 - product(slopes, x[1:k][::-1])) / (k * x[0])
 
 
 def _root_coefficient(x: Row, root: Row, k: int) -> Decimal:

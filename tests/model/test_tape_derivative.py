@@ -10,6 +10,7 @@ import pytest
 from pyharness.checks.scenes.state_scenes import READY, STEADY, TURNING, draw, ready
 from pyharness.engine.recorded import system_of
 from pyharness.model.dual import with_derivatives
+from pyharness.model.elementary import WITH_DERIVATIVE
 from pyharness.model.state_torque import StateTorque, recorded, replayed, torque_of
 from pyharness.model.tape import ATTITUDE, FLOATS, OMEGA, TIME, Functions, Table, evaluate
 from pyharness.torques import table
@@ -23,10 +24,10 @@ def _piece(table: Table, time: Any) -> Any:
     return sum(mpmath.mpf(c) * s**power for power, c in enumerate(table.pieces[piece]))
 
 
+ELEMENTARY = {kind: getattr(mpmath, kind) for kind in WITH_DERIVATIVE}
 MPMATH: Functions[Any] = Functions(
-    mpmath.mpf, mpmath.sqrt, mpmath.exp, mpmath.tanh, mpmath.sin, mpmath.cos, _piece, mpmath.log,
-    mpmath.atan, mpmath.asin, lambda x: mpmath.mpf(x > 0), mpmath.floor,
-    lambda condition, x, y: x if condition else y,
+    mpmath.mpf, mpmath.sqrt, mpmath.exp, mpmath.tanh, mpmath.sin, mpmath.cos, _piece, ELEMENTARY,
+    lambda x: mpmath.mpf(x > 0), mpmath.floor, lambda condition, x, y: x if condition else y,
 )  # fmt: skip
 
 

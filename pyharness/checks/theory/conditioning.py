@@ -19,12 +19,13 @@ from pyharness.engine.recorded import inputs_of, outputs_at, system_of
 from pyharness.engine.solve import solve
 from pyharness.model.basis import Basis
 from pyharness.model.dual import with_derivatives
+from pyharness.model.elementary import WITH_DERIVATIVE
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.tape import ATTITUDE as _ATTITUDE_SLOTS
 from pyharness.model.tape import OMEGA, Functions, Tape, evaluate
-from pyharness.model.tape_arrays import table_values
+from pyharness.model.tape_arrays import OF_NUMPY, table_values
 from pyharness.model.trajectory import Array
 
 ROUNDING = 2.0**-53
@@ -279,6 +280,10 @@ def _selected(condition: Any, first: Any, second: Any) -> _Bounded:
     return _Bounded(choose(one.value, other.value), choose(one.error, other.error))
 
 
+def _bounded_value(kind: str, x: _Bounded) -> _Bounded:
+    return x.chained(OF_NUMPY[kind](x.value), WITH_DERIVATIVE[kind].derivative(x.value))
+
+
 _BOUNDS: Functions[Any] = Functions(
     float,
     lambda x: x.chained(np.sqrt(x.value), 0.5 / np.sqrt(x.value)),
@@ -288,9 +293,7 @@ _BOUNDS: Functions[Any] = Functions(
     lambda x: x.chained(np.sin(x.value), 1.0),
     lambda x: x.chained(np.cos(x.value), 1.0),
     lambda table, time: time.chained(table_values(table, time.value), 0.0),
-    lambda x: x.chained(np.log(x.value), 1.0 / x.value),
-    lambda x: x.chained(np.arctan(x.value), 1.0 / (1.0 + x.value**2)),
-    lambda x: x.chained(np.arcsin(x.value), 1.0 / np.sqrt(1.0 - x.value**2)),
+    {kind: partial(_bounded_value, kind) for kind in WITH_DERIVATIVE},
     lambda x: x.chained(np.where(x.value > 0.0, 1.0, 0.0), 0.0),
     lambda x: x.chained(np.floor(x.value), 0.0),
     _selected,

@@ -56,8 +56,9 @@ subroutine tape_rows(n_numbers, numbers, omega0, n_times, times, tolerance, n_at
                 real(solution%switch, 8)]
 end subroutine tape_rows
 
-subroutine tape_step(n_numbers, numbers, n, t, state, tolerances, relative, trial, longest, &
-                     is_beyond, n_terms, h, terms, ends, order, expansions, is_switched, status)
+subroutine tape_step(n_numbers, numbers, n, t, state, tolerances, relative, trial, t_end, &
+                     is_beyond, n_terms, h, t_next, terms, ends, order, expansions, is_switched, &
+                     is_cut, status)
   ! Compute one step of a system of ordinary differential equations by Taylor series: the terms of
   ! the unknowns, whose sums are the state at its end. The unit of time is the user's.
   !f2py threadsafe
@@ -72,28 +73,34 @@ subroutine tape_step(n_numbers, numbers, n, t, state, tolerances, relative, tria
   real(8), intent(in), target :: state(n)
   real(8), intent(in), target :: tolerances(n)  ! allowed errors of the unknowns in the step
   real(8), intent(in) :: relative               ! tolerance that decides the order
-  real(8), intent(in) :: trial, longest         ! step that is tried, and longest step
-  integer(4), intent(in) :: is_beyond           ! 1: steps end beyond switches, else 0
+  real(8), intent(in) :: trial                  ! length that is tried
+  real(8), intent(in) :: t_end                  ! latest end
+  integer(4), intent(in) :: is_beyond           ! 1: steps end beyond switches and breaks, else 0
   integer(4), intent(in) :: n_terms             ! largest order plus 1
-  real(8), intent(out) :: h                     ! step
+  real(8), intent(out) :: h, t_next             ! step, and time at its end
   real(8), intent(out), target :: terms(n_terms, n)
   real(8), intent(out), target :: ends(n)       ! state at the end
   integer(4), intent(out) :: order
   integer(4), intent(out) :: expansions         ! number of expansions that were tried
   integer(4), intent(out) :: is_switched        ! 1 if the step ended where a switch changes, else 0
+  integer(4), intent(out) :: is_cut             ! 1 if it ended at a break or at t_end, else 0
   integer(4), intent(out) :: status             ! 0 complete, 2 no step is short enough
   type(step_t) :: taken
 
   taken%h = 0.0d0
+  taken%t = t
+  taken%stop = t_end
   taken%order = 0
   taken%terms(0:n_terms - 1, 1:n) => terms
   taken%state => ends
-  call step(tape_of(numbers), step_request_t(t, trial, longest, relative, state, tolerances, &
+  call step(tape_of(numbers), step_request_t(t, t_end, trial, relative, state, tolerances, &
                                              is_beyond == 1), taken)
   h = taken%h
+  t_next = taken%t
   order = taken%order
   expansions = taken%expansions
   is_switched = merge(1, 0, taken%is_switched)
+  is_cut = merge(1, 0, abs(h) >= abs(taken%stop - t))
   status = taken%status
 end subroutine tape_step
 

@@ -30,17 +30,20 @@ module problem
 
   type, public :: step_request_t
     !! A step of a system of ordinary differential equations.
-    real(dp) :: t, trial, longest               !! time, trial step and longest step, s
+    real(dp) :: t, t_end                        !! beginning and latest end, s
+    real(dp) :: trial                           !! length that is tried first, s; positive
     real(dp) :: relative                        !! tolerance that decides the order
     real(dp), pointer, contiguous :: state(:)
     real(dp), pointer, contiguous :: tolerances(:) !! allowed errors of the unknowns in the step
-    !! whether a step ends a few rounding errors beyond a switch
+    !! whether a step ends a few rounding errors beyond a switch, or beyond a break before t_end
     logical :: is_beyond = .false.
   end type step_request_t
 
   type, public :: step_t
     !! A step that was taken: the state is the sum of the terms at its end.
     real(dp) :: h                               !! s
+    real(dp) :: stop                            !! next break, or t_end, s
+    real(dp) :: t                               !! time at its end, s
     integer :: order, status, expansions        !! status of the module statuses
     real(dp), pointer, contiguous :: terms(:, :) !! (0:, unknowns); 0 beyond the order
     real(dp), pointer, contiguous :: state(:)

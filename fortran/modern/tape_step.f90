@@ -4,7 +4,7 @@ module tape_step
   use kinds, only: dp
   use problem, only: step_request_t, step_t
   use statuses, only: COMPLETE, OVERFLOW, SLIDING
-  use tape, only: FIRST_UNKNOWN, tape_t, TIME_SLOT
+  use tape, only: FIRST_UNKNOWN, next_break, tape_t, TIME_SLOT
   use tape_crossings, only: CROSSES, IS_CHANGED, next_crossing, resolve_switches, SLIDES, STAYS
   use tape_live, only: keep_live, settle
   use tape_plan, only: converge, fitting, LONGER, MOST_TRIES, order_for
@@ -32,8 +32,9 @@ module tape_step
 contains
 
   subroutine step_tape(tape_at, request_at, step_at) bind(c, name="step_tape_level")
-    !! Compute the terms of a step, as long as the tolerances allow, or until a switch changes. The
-    !! status is COMPLETE, OVERFLOW if no step is short enough, or SLIDING.
+    !! Compute the terms of a step, as long as the tolerances allow, or until a switch changes, a
+    !! break of a table, or the end. The status is COMPLETE, OVERFLOW if no step is short enough, or
+    !! SLIDING.
     ! Addresses of a tape_t, a step_request_t and a step_t, passed through C.
     type(c_ptr), intent(in), value :: tape_at, request_at, step_at
     type(tape_t), pointer :: tape
@@ -59,10 +60,10 @@ contains
     type(series_t), intent(inout) :: s
     type(step_t), intent(inout) :: step
     real(dp), allocatable :: tolerances(:)
-    real(dp) :: factor
+    real(dp) :: factor, longest
     type(switches_t), target :: switches
     type(tape_t) :: live ! with the operations that matter
-    integer :: failed, i, k, verdict
+    integer :: failed, i, verdict
     logical :: is_rejected ! whether a longer step was rejected
     logical :: is_settled, is_moved ! results of the switches
 
@@ -73,7 +74,9 @@ contains
     tolerances = max(LEAST_TOLERANCE, request%tolerances)
     s%order = order_for(LOCAL_TOLERANCE*request%relative, s%powers, of_steps=.true.)
     step%order = s%order
-    s%h = request%trial
+    step%stop = next_break(tape, request%t, request%t_end)
+    longest = step%stop - request%t
+    s%h = sign(min(request%trial, abs(longest)), longest)
     is_rejected = .false.
     is_settled = .false.
     verdict = STAYS
@@ -88,7 +91,7 @@ contains
     do while (step%expansions < MOST_TRIES)
       ! The steps shrink to nothing before a singularity. The first trial may be short by chance.
       if (step%expansions > 0 .and. abs(s%h) <= spacing(request%t) &
-          .and. abs(s%h) < abs(request%longest)) return
+          .and. abs(s%h) < abs(longest)) return
       ! Term 0 of a switch is its result.
       s%a(1:, :) = 0.0_dp
       s%a(0, TIME_SLOT) = request%t
@@ -104,7 +107,7 @@ contains
         cycle
       end if
       if (is_rejected) factor = min(1.0_dp, factor)
-      factor = min(factor, request%longest/s%h)
+      factor = min(factor, longest/s%h)
       call converge(live, s%order, minval(tolerances), s%a, s%powers, factor)
       if (switches%n > 0) then
         if (.not. (is_rejected .or. factor < LONGER) .and. step%expansions < MOST_LONGER) then
@@ -132,13 +135,7 @@ contains
         end if
         if (verdict == IS_CHANGED) cycle
       end if
-      step%h = factor*s%h
-      ! The quotient of the two was rounded.
-      if (abs(step%h) >= (1.0_dp - 4.0_dp*epsilon(s%h))*abs(request%longest)) then
-        step%h = request%longest
-      end if
-      ! The time at the end is rounded. The state belongs to that time.
-      step%h = (request%t + step%h) - request%t
+      call end_after(factor*s%h)
       if (.not. abs(step%h) > 0.0_dp .and. verdict /= CROSSES) return
       if (verdict == CROSSES .and. (.not. abs(step%h) > 0.0_dp .or. is_at_once())) then
         ! A switch at the beginning of the step, but for rounding.
@@ -148,16 +145,13 @@ contains
         cycle
       end if
       step%is_switched = verdict == CROSSES
-      if (step%is_switched .and. request%is_beyond) step%h = step_beyond()
-      factor = step%h/s%h
-      do i = 1, tape%n_unknowns
-        step%terms(:, i) = 0.0_dp
-        do k = 0, s%order
-          step%terms(k, i) = s%a(k, FIRST_UNKNOWN - 1 + i)*factor**k
-        end do
-      end do
+      if (step%is_switched .and. request%is_beyond) call end_after(step_beyond())
+      call set_terms()
       if (is_continued()) then
         step%status = COMPLETE
+        if (request%is_beyond .and. step%t == step%stop .and. step%stop /= request%t_end) then
+          call end_beyond()
+        end if
         return
       end if
       s%h = 0.5_dp*step%h
@@ -165,6 +159,47 @@ contains
     end do
 
   contains
+
+    subroutine end_after(h)
+      !! Set the length of the step and the time at its end, which is rounded; the state belongs to
+      !! that time.
+      real(dp), intent(in) :: h !! s
+
+      step%t = request%t + h
+      ! The factor on the step was rounded.
+      if (abs(h) >= (1.0_dp - 4.0_dp*epsilon(h))*abs(longest)) step%t = step%stop
+      step%h = step%t - request%t
+    end subroutine end_after
+
+    subroutine end_beyond()
+      !! Let a step that ends at a break end beyond it.
+      real(dp) :: beyond(2)
+
+      beyond = [step%stop + sign(2.0_dp*spacing(step%stop), longest), request%t_end]
+      step%t = merge(minval(beyond), maxval(beyond), longest > 0.0_dp)
+      step%h = step%t - request%t
+      call set_terms()
+    end subroutine end_beyond
+
+    subroutine set_terms()
+      !! Compute the terms of the unknowns, and the state at the end of the step.
+      integer :: i, k
+
+      factor = step%h/s%h
+      step%terms = 0.0_dp
+      ! `is_continued` overwrites term 0 of the series.
+      step%terms(0, :) = request%state
+      do i = 1, tape%n_unknowns
+        do k = 1, s%order
+          step%terms(k, i) = s%a(k, FIRST_UNKNOWN - 1 + i)*factor**k
+        end do
+      end do
+      step%state = 0.0_dp
+      do k = s%order, 1, -1
+        step%state = step%state + step%terms(k, :)
+      end do
+      step%state = request%state + step%state
+    end subroutine set_terms
 
     real(dp) function step_beyond()
       !! Return a step to beyond the switch that crosses, in spite of rounding errors.
@@ -181,8 +216,7 @@ contains
       end associate
       longer = min(longer, LONGEST_BEYOND*request%relative*abs(s%h))
       longer = max(longer, 2.0_dp*spacing(request%t + step%h))
-      step_beyond = (request%t + (step%h + sign(longer, s%h))) - request%t
-      if (abs(step_beyond) > abs(request%longest)) step_beyond = request%longest
+      step_beyond = step%h + sign(longer, s%h)
     end function step_beyond
 
     logical function is_at_once()
@@ -204,23 +238,19 @@ contains
     end function is_at_once
 
     logical function is_continued()
-      !! Return whether the derivatives at the end of the step are those of the series. The state at
-      !! the end is computed too.
+      !! Return whether the derivatives at the end of the step are those of the series.
       real(dp) :: slope(tape%n_unknowns), sizes(tape%n_unknowns)
       real(dp) :: derivatives(tape%n_unknowns), noise(tape%n_unknowns)
       real(dp) :: allowed(tape%n_unknowns)
       integer :: k
 
-      step%state = 0.0_dp
       slope = 0.0_dp
       sizes = 0.0_dp
       do k = s%order, 1, -1
-        step%state = step%state + step%terms(k, :)
         slope = slope + k*step%terms(k, :)
         sizes = sizes + k*abs(step%terms(k, :))
       end do
-      step%state = request%state + step%state
-      call derivatives_at(live, [request%t + step%h, 0.0_dp], step%state, -s%h, s, derivatives)
+      call derivatives_at(live, [step%t, 0.0_dp], step%state, -s%h, s, derivatives)
       call noise_of(s, noise, abs(step%state))
       ! NaN is not allowed.
       is_continued = all(abs(step%h*derivatives - slope) <= MOST_DEFECT*tolerances &

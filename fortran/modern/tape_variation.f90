@@ -7,7 +7,7 @@ module tape_variation
   use problem, only: step_request_t, step_t, variation_request_t, variation_t
   use statuses, only: COMPLETE, GAVE_UP, OVERFLOW
   use step_limit, only: check_steps, limit_of, step_limit_t
-  use tape, only: arrays_of, FIRST_UNKNOWN, next_break, tape_t
+  use tape, only: arrays_of, FIRST_UNKNOWN, tape_t
   use tape_growth, only: MOST_UNKNOWNS
   use tape_series, only: allocate_series, block_t, derivatives_at, MOST_ORDER, series_t, &
                          SIDE_BY_SIDE, sum_perturbations, vary_tape
@@ -49,7 +49,7 @@ contains
     type(step_request_t) :: step_request
     type(step_t) :: step
     type(step_limit_t) :: limit
-    real(dp) :: t, t_end, break_time, longest, trial, local_tolerance, scale, largest, factor
+    real(dp) :: t, t_end, trial, local_tolerance, scale, largest, factor
     real(dp) :: cost, ahead
     integer(int64) :: steps
     integer :: failed, n, n_columns, n_blocks
@@ -73,8 +73,6 @@ contains
     call begin()
     do
       if (.not. found%n_rows < size(request%times)) exit
-      break_time = next_break(tape, t, t_end)
-      longest = break_time - t
       call take()
       if (step%status /= COMPLETE) then
         found%status = step%status
@@ -146,8 +144,8 @@ contains
         tolerances(:3) = local_tolerance*scale
         tolerances(4:) = 0.5_dp*local_tolerance
         step_request%t = t
-        step_request%trial = sign(min(trial, abs(longest)), longest)
-        step_request%longest = longest
+        step_request%t_end = t_end
+        step_request%trial = trial
         step_request%relative = local_tolerance
         step_request%state => state(:n)
         step_request%tolerances => tolerances(:n)
@@ -209,10 +207,10 @@ contains
 
       do while (found%n_rows < size(request%times))
         associate (time => request%times(found%n_rows + 1))
-          if (abs(time) > abs(break_time)) exit
+          if (abs(time) > abs(step%stop)) exit
           part = (time - t)/s%h
           ! The quotient of the step was rounded.
-          if (arrives() .and. .not. abs(time) < abs(break_time)) part = factor
+          if (arrives() .and. .not. abs(time) < abs(step%stop)) part = factor
         end associate
         if (part > factor) exit
         found%n_rows = found%n_rows + 1
@@ -227,7 +225,7 @@ contains
 
     pure logical function arrives()
       !! Return whether the step ends at the break or the last time.
-      arrives = abs(step%h) >= abs(longest)
+      arrives = abs(step%h) >= abs(step%stop - t)
     end function arrives
 
     subroutine advance()
@@ -246,7 +244,7 @@ contains
       state(:n) = state(:n) + ends(:n)
       ! The length of a cut step is no guess for the next.
       trial = merge(max(trial, abs(step%h)), abs(step%h), arrives())
-      t = merge(break_time, t + step%h, arrives())
+      t = merge(step%stop, t + step%h, arrives())
       largest = max(largest, maxval(abs(state(:3))))
       if (largest > 0.0_dp) scale = largest
       call weigh()

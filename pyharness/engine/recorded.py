@@ -297,10 +297,16 @@ class Step(NamedTuple):
     """A Taylor step of n unknowns."""
 
     h: float  # length (s); 0 if even the shortest step exceeds the tolerances
+    time: float  # at its end (s)
     terms: Array  # Taylor coefficients times powers of `h`, shape (order + 1, n)
     state: Array  # sum of the terms, shape (n,)
-    expansions: int  # number of computed series
+    expansions: int = 0  # number of computed series
     is_switched: bool = False  # whether the step ends where a branch of the torque changes
+    is_cut: bool = False  # whether it ends at a break of a table, or at the latest end
+
+    def next_trial(self, trial: float) -> float:
+        # The length of a shortened step is no guess for the next one.
+        return max(trial, abs(self.h)) if self.is_cut else abs(self.h)
 
 
 def taylor_step(
@@ -309,16 +315,19 @@ def taylor_step(
     state: Array,
     tolerances: Array,  # largest allowed errors of the unknowns, shape (n,)
     relative: float,  # tolerance that determines the order
-    trial: float,  # guess of the step (s), with the sign of `longest`
-    longest: float,
-    is_beyond: bool = False,  # whether to end a few rounding errors beyond a switch
+    trial: float,  # guess of the length (s), positive
+    end: float,  # latest end (s)
+    is_beyond: bool = False,  # whether to end a few rounding errors beyond a switch or break
 ) -> Step:
-    """Return a step of y' = tape(t, y) from the time `t` and the state, shape (n,)."""
-    h, terms, end, order, expansions, is_switched, status = extension().tape_step(
-        tape, t, state, tolerances, relative, trial, longest, is_beyond, Storage.PERTURBATION_LENGTH
+    """Return a step of y' = tape(t, y) from the time `t` and the state, shape (n,).
+
+    It ends at the latest where a switch or a piece of a table changes.
+    """
+    h, time, terms, last, order, expansions, is_switched, is_cut, status = extension().tape_step(
+        tape, t, state, tolerances, relative, trial, end, is_beyond, Storage.PERTURBATION_LENGTH
     )
     if status == Statuses.SLIDING:
         raise TimedError(SLIDING, t)
     if status != COMPLETE:
         h = 0.0
-    return Step(h, terms[: order + 1], end, expansions, bool(is_switched))
+    return Step(h, time, terms[: order + 1], last, expansions, bool(is_switched), bool(is_cut))

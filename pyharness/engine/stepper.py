@@ -1,7 +1,6 @@
 """Integration step by step, while the user changes torque or state."""
 
 import math
-from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
@@ -86,7 +85,7 @@ class Stepper:
 
     # With slots, setting another name, such as `torque`, is an error.
     __slots__ = (
-        "_begin", "_breaks", "_largest", "_last", "_n", "_origin", "_own_sizes", "_packed",
+        "_begin", "_largest", "_last", "_n", "_origin", "_own_sizes", "_packed",
         "_scene", "_state", "_steps", "_tape", "_time", "_tolerance", "_trial",
     )  # fmt: skip
 
@@ -110,7 +109,7 @@ class Stepper:
             self._state[3:7] = unit_quaternion("attitude", scene.attitude or IDENTITY)[0]
         self._origin = [0.0, *self._state.tolist()]
         self._trial, self._largest = LONGEST_TRIAL, 0.0
-        self._last = Step(0.0, self._state[None], self._state, 0)
+        self._last = Step(0.0, 0.0, self._state[None], self._state)
 
     @property
     def time(self) -> float:
@@ -146,7 +145,6 @@ class Stepper:
             )
         self._tape = _equations(scene, torque.tape, self._n)
         self._packed = kernel_tape(self._tape)
-        self._breaks = self._tape.breaks
         self._scene = scene
 
     @property
@@ -209,25 +207,19 @@ class Stepper:
                 f"longest is {longest:g} s; allowed: a positive or negative number, larger than "
                 f"{least:g} at this time"
             )
-        forward = longest > 0.0
-        place = (bisect_right if forward else bisect_left)(self._breaks, self._time) - (not forward)
-        if 0 <= place < len(self._breaks):
-            stop = self._breaks[place]
-            if abs(stop - self._time) < abs(longest):
-                end, longest = stop, stop - self._time
-        taken = self._take_step(longest)
+        return self._advance(end)
+
+    def _advance(self, end: float) -> float:
+        taken = self._take_step(end)
         self._begin, self._last = self._time, taken
-        is_cut = self._time + taken.h == self._time + longest
-        # The length of a shortened step is no guess for the next one.
-        self._trial = max(self._trial, abs(taken.h)) if is_cut else abs(taken.h)
-        self._time = end if is_cut else self._time + taken.h
+        self._trial, self._time = taken.next_trial(self._trial), taken.time
         self._state = taken.state.copy()
         self._state[3 : self._n] = _normalised(self._state[3 : self._n])
         self._largest = max(self._largest, float(np.abs(self._state[:3]).max()))
         self._steps += 1
         return self._time
 
-    def _take_step(self, longest: float) -> Step:
+    def _take_step(self, end: float) -> Step:
         self._largest = max(self._largest, float(np.abs(self._state[:3]).max()))
         # For a body at rest, a guess of the omega that it reaches.
         scale = self._largest or math.sqrt(np.abs(self._rates()[:3]).max()) or 1.0
@@ -236,16 +228,15 @@ class Stepper:
         self._own_sizes = own_sizes
         if not own_sizes.all():
             rates = np.abs(self._rates()[self._n : -3])
-            guess = rates * min(abs(longest), self._trial, 1.0 / scale)
+            guess = rates * min(abs(end - self._time), self._trial, 1.0 / scale)
             sizes = np.where(own_sizes > 0.0, own_sizes, np.where(rates > 0.0, guess, math.inf))
         while True:
             tolerances = np.full(len(self._state), math.inf)
             tolerances[:3] = self._tolerance * scale
             tolerances[3 : self._n] = 0.5 * self._tolerance
             tolerances[self._n : -3] = self._tolerance * sizes
-            trial = math.copysign(min(self._trial, abs(longest)), longest)
             taken = taylor_step(
-                self._packed, self._time, self._state, tolerances, self._tolerance, trial, longest
+                self._packed, self._time, self._state, tolerances, self._tolerance, self._trial, end
             )
             if taken.h == 0.0:
                 before = [self._begin, *self._last.terms[0].tolist()]
@@ -274,16 +265,13 @@ class Stepper:
         """
         end, begin, first = finite("time", time), self._time, self._steps
         while self._time != end:
-            self.step(end - self._time)
+            self._advance(end)
             taken = self._steps - first
             if taken % _LOOK == 0 and abs(end - begin) * taken > _MOST * abs(self._time - begin):
                 raise InputError(
                     f"time is {end:g} s; allowed: times that 1e8 steps reach; {taken} steps "
                     f"reached {self._time:g} s"
                 )
-            # The sum of time and step is rounded.
-            if abs(self._time - end) <= math.ulp(end):
-                self._time = end
 
     def at(self, times: float | Sequence[float] | Array) -> Array:
         """Return the state at times (s) within the last step, without changes made after it.
@@ -309,7 +297,7 @@ class Stepper:
         self._state = self._state.copy()
         self._state[place] = values
         if self._steps == 0:
-            self._last = Step(0.0, self._state[None], self._state, 0)
+            self._last = Step(0.0, 0.0, self._state[None], self._state)
 
 
 def _equations(scene: Scene, torque: Tape, n: int) -> Tape:

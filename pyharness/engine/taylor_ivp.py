@@ -145,13 +145,13 @@ class Taylor(OdeSolver):  # type: ignore[misc]
     def _first_step(self, span: float) -> float:
         if not (self.n and span):
             return span
-        scale = self._scale()
         try:
-            step = self._step_of(scale, self._trial, span)
+            step = self._step_to(self.t_bound)
         except TimedError:
             return span  # the first step, which fails too, has the message
         if step.h == 0.0:
             return span
+        scale = self._scale()
         change = _FIRST_CHANGE * max(1.0, float(np.abs(self.y / scale).max()))
         sizes = np.abs(step.terms[1:] / scale).max(axis=1)
         # The first term may have half the change, term k 2**-k of it.
@@ -160,10 +160,10 @@ class Taylor(OdeSolver):  # type: ignore[misc]
         first = float(np.clip(parts.min(), *_FIRST_PARTS)) * abs(step.h)
         return min(span, max(first, 10.0 * math.ulp(self.t)))
 
-    def _step_of(self, scale: Array, trial: float, longest: float) -> Step:
+    def _step_to(self, end: float) -> Step:
         step = taylor_step(
-            self._tape, self.t, self.y, scale, self._relative,
-            self.direction * trial, self.direction * longest, is_beyond=True,
+            self._tape, self.t, self.y, self._scale(), self._relative, self._trial, end,
+            is_beyond=True,
         )  # fmt: skip
         self.nfev += step.expansions
         return step
@@ -174,26 +174,23 @@ class Taylor(OdeSolver):  # type: ignore[misc]
         # As in SciPy's methods, a step is at least ten times the spacing of the times.
         if self.max_step < min(rest, 10.0 * math.ulp(self.t)):
             return False, self.TOO_SMALL_STEP
+        end = self.t_bound if longest == rest else self.t + self.direction * longest
         try:
-            step = self._step_of(self._scale(), min(self._trial, longest), longest)
+            step = self._step_to(end)
         except TimedError as error:
             return False, str(error)
         if step.h == 0.0:
             return False, self.TOO_SMALL_STEP
-        end = self.t + step.h
-        is_cut = end == self.t + self.direction * longest
         self._terms = step.terms
-        # The length of a shortened step is no guess for the next one.
-        self._trial = max(self._trial, abs(step.h)) if is_cut else abs(step.h)
+        self._trial = step.next_trial(self._trial)
         self._longest = max(self._longest, _MOST_GROWTH * abs(step.h))
         if step.is_switched:
-            self._longest = max(_AFTER_SWITCH * self._trial, 10.0 * math.ulp(end))
-        is_short = abs(step.h) <= _SHORT * math.ulp(end)
+            self._longest = max(_AFTER_SWITCH * self._trial, 10.0 * math.ulp(step.time))
+        is_short = abs(step.h) <= _SHORT * math.ulp(step.time)
         self._switches = self._switches + step.is_switched if is_short else 0
         if self._switches > _MOST_SWITCHES:
             return False, str(TimedError(SLIDING, self.t))
-        self.t = self.t_bound if is_cut and longest == rest else end
-        self.y = step.state
+        self.t, self.y = step.time, step.state
         return True, None
 
     def _scale(self) -> Array:

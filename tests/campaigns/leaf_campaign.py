@@ -43,7 +43,7 @@ def one_step(tape: Tape, address: int, t: float, state: Array, h: float) -> Step
     array = kernel_tape(tape).copy()
     array[_LEAVES : _LEAVES + 1].view(np.int64)[:] = address
     allowed = 1e-9 * np.abs(state).max() * np.ones(len(state))
-    return taylor_step(array, t, state, allowed, 1e-12, h, h)
+    return taylor_step(array, t, state, allowed, 1e-12, abs(h), t + h)
 
 
 def try_torque(tally: Tally) -> None:

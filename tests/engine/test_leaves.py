@@ -75,7 +75,7 @@ def terms(scene: Scene, address: int, h: float) -> Any:
     array[7:8].view(np.int64)[:] = address
     state = np.array([*scene.omega, *(scene.attitude or ())])
     allowed = np.full(len(state), 1e-9)
-    return taylor_step(array, 0.4, state, allowed, 1e-12, h, h).terms
+    return taylor_step(array, 0.4, state, allowed, 1e-12, abs(h), 0.4 + h).terms
 
 
 def scenes(number: int) -> Scene:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from pyharness.engine.recorded import outputs_at
+from pyharness.model.arguments import count_inputs, has_signature
 from pyharness.model.array_type import Array
 from pyharness.model.called_function import called_once
 from pyharness.model.errors import InputError, kind_of
@@ -219,17 +220,10 @@ def _arguments(given: Callable[..., Any], name: str, with_own: bool = False) -> 
         # A function without defaults, *args and **kwargs has exactly `count` arguments.
         if count in (2, 3) and not (code.co_kwonlyargcount or code.co_flags & _MORE_ARGUMENTS):
             return count
-    try:
-        signature = inspect.signature(given)
-    except (TypeError, ValueError):
+    least = 2 + with_own
+    if not has_signature(given):
         return 2
-    for count in (2, 3):
-        try:
-            signature.bind(*range(count + with_own))
-        except TypeError:
-            continue
-        return count
-    raise InputError(f"{name}: the function has other arguments; {_FUNCTIONS_ALLOWED}")
+    return count_inputs(given, name, _FUNCTIONS_ALLOWED, least, least) - with_own
 
 
 def _limit(terminal: Any, name: str) -> float:

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from pyharness.engine.term_input import law_of_vector, matrix_of, ready_term
+from pyharness.model.arguments import count_inputs
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY, product, unit_quaternion
 from pyharness.model.errors import InputError
 from pyharness.model.numpy_protocol import symbol_array
 from pyharness.model.own_states import OwnState
-from pyharness.model.state_torque import StateTorque, count_arguments, recorded
+from pyharness.model.state_torque import StateTorque, recorded
 from pyharness.model.torque_law import TorqueLaw, law_integral, law_value
 from pyharness.model.values import Number, Numbers, boolean, number_list, three
 
@@ -267,8 +268,8 @@ def wheels(
 
 def _wheels_under_a_law(start: Array, motor: Callable[..., Any]) -> StateTorque:
     names = [f"wheel{axis}" for axis in (1, 2, 3)]
-    allowed = "a function of (t, omega, h) or (t, omega, attitude, h)"
-    takes_attitude = count_arguments(motor, "[torque] wheels motor", allowed) == 4
+    allowed = "allowed: a function of (t, omega, h) or (t, omega, attitude, h)"
+    takes_attitude = count_inputs(motor, "[torque] wheels motor", allowed, 3, 4) == 4
 
     def law(t: Any, omega: Any, attitude: Any, states: Any) -> Any:
         h = symbol_array([states[name] for name in names])

@@ -40,8 +40,9 @@ def _is_user_code(frame: FrameType) -> bool:
 
 
 class _Replaced:
-    def __init__(self, original: Callable[..., Any], called: Callable[..., Any]) -> None:
-        self.original, self._called = original, called
+    def __init__(self, original: Any, called: Callable[..., Any]) -> None:
+        self.original: Any = original
+        self._called = called
         # Modules that are imported meanwhile read the function's name and signature.
         update_wrapper(self, original)
 
@@ -51,18 +52,26 @@ class _Replaced:
         return self._called(given, named)
 
     def __getattr__(self, name: str) -> Any:
-        return getattr(self.original, name)
+        found = getattr(self.original, name)
+        # Methods of a ufunc, such as np.maximum.reduce.
+        is_method = isinstance(self.original, np.ufunc) and callable(found)
+        return partial(_called_ufunc, self.original, name) if is_method else found
+
+
+def _called_ufunc(ufunc: np.ufunc, method: str, *given: Any, **named: Any) -> Any:
+    if any(map(has_symbol, given)):
+        return of_ufunc(ufunc, method, given, named)
+    return getattr(ufunc, method)(*given, **named)
 
 
 def _replacement(original: Any) -> _Replaced:
     """Return a replacement of NumPy's function that accepts lists with symbols."""
 
     def called(given: Sequence[Any], named: dict[str, Any]) -> Any:
-        if not any(map(has_symbol, (*given, *named.values()))):
-            return original(*given, **named)
         if isinstance(original, np.ufunc):
-            return of_ufunc(original, "__call__", given, named)
-        if isinstance(original, _DISPATCHED):
+            return _called_ufunc(original, "__call__", *given, **named)
+        is_own = isinstance(original, _DISPATCHED)
+        if is_own and any(map(has_symbol, (*given, *named.values()))):
             return of_function(original, given, named)
         return viewed(original(*given, **named))
 
@@ -71,9 +80,9 @@ def _replacement(original: Any) -> _Replaced:
 
 def _of_math(original: Any, ufunc: np.ufunc) -> _Replaced:
     def called(given: Sequence[Any], named: dict[str, Any]) -> Any:
-        if not any(map(has_symbol, given)):
-            return original(*given, **named)
-        return of_ufunc(ufunc, "__call__", given, named)
+        if any(map(has_symbol, given)):
+            return of_ufunc(ufunc, "__call__", given, named)
+        return original(*given, **named)
 
     return _Replaced(original, called)
 

@@ -60,9 +60,11 @@ def symbol_in(values: Any) -> Any:
 
 
 def viewed(found: Any) -> Any:
+    """Return an array of objects as a `SymbolArray`, or as a symbol if it has no dimension."""
     if not isinstance(found, np.ndarray) or found.dtype != object:
         return found
-    return found.view(SymbolArray) if found.shape else found.item()
+    is_array = found.shape or not is_symbol(found.item())
+    return found.view(SymbolArray) if is_array else found.item()
 
 
 def of_ufunc(ufunc: np.ufunc, method: str, given: Sequence[Any], named: dict[str, Any]) -> Any:

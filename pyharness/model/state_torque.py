@@ -4,11 +4,11 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
-from inspect import Parameter, signature
 from typing import Any
 
 import numpy as np
 
+from pyharness.model.arguments import count_inputs, defaults_of, has_argument
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import product, quaternion_of_axes
 from pyharness.model.called_function import called_once
@@ -51,7 +51,7 @@ class StateTorque:
         The other summands in a scene file: at most one `TorqueLaw`, and torques of
         `pyharness.torques`, each of these as pairs of key and value.
     parameters : tuple of pairs
-        Name and value of each keyword argument of the function whose default is a number.
+        Name and value of each argument of the function whose default is a number.
     varied : Tape or None
         The recorded operations, with `parameters` as further inputs.
     own : tuple of str
@@ -197,7 +197,7 @@ def recorded(function: Function, states: Sequence[str] = ()) -> StateTorque:
     ----------
     function : callable
         A function of (t, omega) or (t, omega, attitude) that returns the torque about the body axes
-        (N m). Keyword arguments with numbers as defaults are parameters for sensitivities.
+        (N m). Arguments with numbers as defaults are parameters for sensitivities.
     states : sequence of str
         The names of the scene's own states (`Scene.states`). With states, the function has a
         further argument, the dict of their values, and returns the torque and a dict of their time
@@ -243,7 +243,7 @@ def recorded(function: Function, states: Sequence[str] = ()) -> StateTorque:
 
 
 def _with_states(function: Function, names: tuple[str, ...]) -> StateTorque:
-    takes_attitude = count_arguments(function, "[torque]", _WITH_STATES) == 4
+    takes_attitude = count_inputs(function, "[torque]", f"allowed: {_WITH_STATES}", 3, 4) == 4
 
     def called(time: Symbol, omega: Any, attitude: Any, *states: Symbol) -> list[Any]:
         own = dict(zip(names, states, strict=True))
@@ -285,15 +285,6 @@ def _ordered_rates(rates: Any, names: tuple[str, ...]) -> list[Any]:
 
 def _listed(names: Iterable[str]) -> str:
     return ", ".join(names) or "none"
-
-
-def count_arguments(function: Function, where: str, allowed: str) -> int:
-    """Return the number of arguments of a torque with own states: 3, or 4 with the attitude."""
-    parameters = _parameters(function, where, f"allowed: {allowed}")
-    count = sum(each.kind in _POSITIONAL for each in parameters)
-    if count not in (3, 4):
-        raise InputError(f"{where}: the function has {count} arguments; allowed: {allowed}")
-    return count
 
 
 def opaque(function: Any) -> StateTorque:
@@ -392,10 +383,10 @@ def law_of(torque: StateTorque) -> TorqueLaw | None:
 
 def _with_parameters(torque: StateTorque, function: Function, called: Function) -> StateTorque:
     values = {
-        each.name: value
-        for each in signature(function).parameters.values()
-        if each.kind is Parameter.KEYWORD_ONLY and type(each.default) is not bool
-        if isinstance(value := converted(each.default), float) and math.isfinite(value)
+        name: value
+        for name, default in defaults_of(function).items()
+        if type(default) is not bool
+        if isinstance(value := converted(default), float) and math.isfinite(value)
     }
 
     def recorded_with(names: Sequence[str]) -> Tape | None:
@@ -471,23 +462,6 @@ def _sum(parts: "Sequence[StateTorque | TorqueLaw]") -> StateTorque:
 def _takes_attitude(function: object) -> bool:
     if not callable(function):
         raise InputError(f"[torque] is {kind_of(function)}; {_ARGUMENTS}")
-    parameters = _parameters(function, "[torque]", _ARGUMENTS)
-    places = [each for each in parameters if each.kind in _POSITIONAL]
-    required = [each.kind for each in parameters if each.default is Parameter.empty]
-    many = Parameter.VAR_POSITIONAL in required
-    count = sum(each in _POSITIONAL for each in required)
-    if any(each.name == "states" for each in places):
+    if has_argument(function, "states"):
         raise InputError("[torque]: the function has an argument states; give the scene's states=")
-    if Parameter.KEYWORD_ONLY in required or count > 3 or not (many or len(places) >= 2):
-        raise InputError(f"[torque]: the function has {len(places)} arguments; {_ARGUMENTS}")
-    return count == 3 or (count < 2 and many)
-
-
-def _parameters(function: Function, where: str, allowed: str) -> list[Parameter]:
-    try:
-        return [*signature(function).parameters.values()]
-    except (TypeError, ValueError):
-        raise InputError(f"{where}: the function's arguments are unknown; {allowed}") from None
-
-
-_POSITIONAL = (Parameter.POSITIONAL_ONLY, Parameter.POSITIONAL_OR_KEYWORD)
+    return count_inputs(function, "[torque]", _ARGUMENTS, 2, 3) == 3

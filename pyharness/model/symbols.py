@@ -461,7 +461,7 @@ class Symbol(Recorded):
             return partial(_NAMED[name], self)
         # numpy.mean works for objects without an attribute `dtype`.
         if name.startswith("_") or name == "dtype":
-            raise AttributeError(name)
+            raise AttributeError(f"a Symbol has no {name}")
         raise self.recorder.refusal(f"{name} of the state")
 
 

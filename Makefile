@@ -47,9 +47,8 @@ mutate: .venv/ready-to-test
 cross-check: .venv/ready-to-test
 	@FC=$(FC) $(BIN)/python -m tests.cross $(ARGS)
 
-# For all processors, as `pip wheel .`; the editable build is for this one.
-wheel: .venv/ready
-	@FC=$(FC) $(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
+wheel:
+	@.ci/setup "$(PYTHON)" "$(FC)" wheel
 	@ls dist/*.whl
 
 edition: .venv/ready-to-test

@@ -3,7 +3,8 @@
 #define TAPE_H
 
 #include <stdint.h>
-#ifdef __AVX__
+/* Of immintrin.h two instructions are needed; to read it would take as long as to compile the rest. */
+#if defined(__AVX512DQ__) && defined(__clang__)
 #include <immintrin.h>
 #endif
 
@@ -27,10 +28,12 @@ typedef long long reg_bits __attribute__((vector_size(8 * IN_REGISTER)));
 /* Return whether a comparison holds for any number of a register. */
 static inline int any(reg_bits mask)
 {
-#if defined(__AVX512DQ__)
+#if defined(__AVX512DQ__) && defined(__clang__)
   return _mm512_movepi64_mask((__m512i)mask) != 0;
+#elif defined(__AVX512DQ__)
+  return __builtin_ia32_cvtq2mask512(mask) != 0;
 #elif defined(__AVX__) && !defined(__AVX512F__)
-  return _mm256_movemask_pd((__m256d)mask) != 0;
+  return __builtin_ia32_movmskpd256((reg)mask) != 0;
 #else
   long long found = 0;
   for (int i = 0; i < IN_REGISTER; i++) found |= mask[i];
@@ -41,10 +44,12 @@ static inline int any(reg_bits mask)
 /* Return the larger number in each lane; the second if one is NaN. */
 static inline reg larger(reg a, reg b)
 {
-#if defined(__AVX512F__)
+#if defined(__AVX512DQ__) && defined(__clang__)
   return (reg)_mm512_max_pd((__m512d)a, (__m512d)b);
-#elif defined(__AVX__)
-  return (reg)_mm256_max_pd((__m256d)a, (__m256d)b);
+#elif defined(__AVX512DQ__)
+  return __builtin_ia32_maxpd512_mask(a, b, a, -1, 4);
+#elif defined(__AVX__) && !defined(__AVX512F__)
+  return __builtin_ia32_maxpd256(a, b);
 #else
   const reg_bits is_larger = a > b;
   return (reg)(((reg_bits)a & is_larger) | ((reg_bits)b & ~is_larger));

@@ -119,7 +119,10 @@ def many_steps() -> Iterator[str]:
 
 
 def attitude_sums() -> Iterator[str]:
-    """Yield the procedures of the attitude for each number of terms, and those that call them."""
+    """Yield the procedures of the attitude for each number of terms, and those that call them.
+
+    More terms are computed from those before, which are in memory.
+    """
     kinds = (
         ("expand_attitude", "s, w0, h, u", attitude_terms, (
             "type(slots_t), intent(in) :: s", "real(dp), intent(in) :: w0(SLOTS, 3), h(SLOTS)",
@@ -133,14 +136,12 @@ def attitude_sums() -> Iterator[str]:
         yield f"pure subroutine {name}(order, m, {given})"
         yield "  integer, intent(in) :: order, m"
         yield from (f"  {line}" for line in declared)
-        yield "  select case (order)"
-        for order in ATTITUDE_ORDERS:
-            yield f"  case ({order})"
-            yield f"    call {name}_{order}(m, {given})"
-        yield "  end select"
+        for before, order in itertools.pairwise((0, *ATTITUDE_ORDERS)):
+            is_due = f"order > {before}" if statements is attitude_terms else f"order == {order}"
+            yield f"  if ({is_due}) call {name}_{order}(m, {given})"
         yield f"end subroutine {name}"
-        for order in ATTITUDE_ORDERS:
-            lines = list(statements(order))
+        for before, order in itertools.pairwise((0, *ATTITUDE_ORDERS)):
+            lines = list(statements(before, order))
             names = sorted({line.split(" = ")[0] for line in lines if _is_local(line)})
             yield ""
             yield f"pure subroutine {name}_{order}(m, {given})"
@@ -158,15 +159,21 @@ def attitude_sums() -> Iterator[str]:
         yield ""
 
 
-def attitude_terms(order: int) -> Iterator[str]:
-    """Yield the statements for one lane: the terms a, b, c, d of the attitude's four numbers."""
+def attitude_terms(before: int, order: int) -> Iterator[str]:
+    """Yield the statements for one lane: terms a, b, c, d of the attitude's four numbers.
+
+    The first `before` terms are known.
+    """
     yield "f = 0.5_dp*h(i)"
     for axis, x in enumerate("xyz", 1):
         yield f"{x}0 = w0(i, {axis})"
         yield from (f"{x}{k} = s%torque(i, {axis}, {k})" for k in range(1, order))
-    yield from ("b1 = f*x0", "c1 = f*y0", "d1 = f*z0", "u(i, 1, 1) = 0.0_dp")
-    yield from (f"u(i, {place}, 1) = {u}1" for place, u in enumerate("bcd", 2))
-    for k in range(2, order + 1):
+    if before == 0:
+        yield from ("b1 = f*x0", "c1 = f*y0", "d1 = f*z0", "u(i, 1, 1) = 0.0_dp")
+        yield from (f"u(i, {place}, 1) = {u}1" for place, u in enumerate("bcd", 2))
+    for k in range(1, before + 1):
+        yield from (f"{u}{k} = u(i, {n}, {k})" for n, u in enumerate("abcd", 1) if u > "a" or k > 1)
+    for k in range(max(before, 1) + 1, order + 1):
         for place, (u, x, products) in enumerate((
             ("a", "", "-bx -cy -dz"), ("b", "x", "+ax +cz -dy"),
             ("c", "y", "+ay +dx -bz"), ("d", "z", "+az +by -cx"),
@@ -183,7 +190,7 @@ def attitude_terms(order: int) -> Iterator[str]:
             yield f"u(i, {place}, {k}) = {u}{k}"
 
 
-def attitude_sum(order: int) -> Iterator[str]:
+def attitude_sum(_: int, order: int) -> Iterator[str]:
     """Yield the statements for one lane: the sums of two series, and powers of the distances."""
     for place, step, at, power in (
         ("from", "previous", "ahead", "old"), ("to", "latest", "back", "new"),

@@ -1,6 +1,8 @@
 """Jobs in environments of their own: `make wheel`, then `nox -f .ci/noxfile.py -s NAME`."""
 
 import os
+import platform
+import re
 import shutil
 import subprocess
 import sys
@@ -10,6 +12,7 @@ from pathlib import Path
 import nox
 
 ROOT = Path(__file__).parent.parent
+INSTALL = ROOT / "docs/how-to/install.md"
 FACTS = nox.project.load_toml(ROOT / "pyproject.toml")
 PYTHONS = nox.project.python_versions(FACTS)
 METHODS = ("dop853", "rk45", "lsoda", "radau", "auto", "taylor", "reference")
@@ -90,6 +93,9 @@ def release(session: nox.Session) -> None:
         place = session.create_tmp()
         session.run("auditwheel", "repair", "--wheel-dir", place, the("whl"))
         (repaired,) = Path(place).glob("*.whl")
+        stated = re.findall(r"`(manylinux_\w+)` on x86-64", INSTALL.read_text())
+        if platform.machine() == "x86_64" and stated[0] not in repaired.name:
+            session.error(f"{INSTALL} says {stated[0]}, and the wheel is {repaired.name}")
         # A library that was copied into the wheel would need a licence there.
         if any(".libs/" in name for name in zipfile.ZipFile(repaired).namelist()):
             session.error("the wheel needs libraries that no system has by itself")

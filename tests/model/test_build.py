@@ -236,6 +236,22 @@ def test_a_build_without_a_fortran_compiler_says_so_in_one_line(tmp_path: Path) 
     assert "apt-get install gfortran" in line
 
 
+@pytest.mark.campaign
+@pytest.mark.external
+def test_a_build_for_free_threads_is_refused_in_one_line(tmp_path: Path) -> None:
+    """With a Python that says what a free-threaded one would say of itself."""
+    (tmp_path / "sitecustomize.py").write_text(
+        "import sysconfig; sysconfig.get_config_vars()['Py_GIL_DISABLED'] = 1\n"
+    )
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    environment = os.environ | {"PATH": path, "PYTHONPATH": str(tmp_path)}
+    done = _run("meson", "setup", tmp_path / "build", ROOT, cwd=tmp_path, env=environment)
+    assert done.returncode == 1
+    (line,) = (each for each in done.stdout.splitlines() if "ERROR" in each)
+    assert line.endswith("free-threaded Python is not tested here: take the one with a global "
+                         "interpreter lock")  # fmt: skip
+
+
 @pytest.mark.external
 @pytest.mark.skipif(not (ROOT / ".ci/setup").exists(), reason="needs a checkout")
 @pytest.mark.parametrize(

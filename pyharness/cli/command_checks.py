@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any
 
 from pyharness.checks.check import Selection, selected
+from pyharness.checks.integrators.coverage import Tried, with_coverage
 from pyharness.checks.integrators.judging import judge_integrator, replay_command
 from pyharness.checks.integrators.problem import DRAWS, Problem, problems
 from pyharness.checks.integrators.protocol import refuse_integrator
@@ -18,6 +19,7 @@ from pyharness.checks.scenes.random_scenes import MODERATE as KINDS
 from pyharness.cli import options as shared
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS
+from pyharness.model.report import Report
 from pyharness.model.scene_file import case_numbers
 
 _OF_THE_CHECKS = ("only", "external", "update", "record")
@@ -134,8 +136,12 @@ def _integrator_self_test(
 
     command = options.integrator
     title = [f"{command}: faults planted in its requests and answers"]
-    outcomes, refuse = self_test(command, chosen, due), partial(refuse_port, command)
-    return show_self_test(options, outcomes, len(PLANTS), title, again, refuse, integrator=command)
+    tried: list[Tried] = []
+    outcomes, refuse = self_test(command, chosen, tried, due), partial(refuse_port, command)
+    return show_self_test(
+        options, outcomes, len(PLANTS), title, again, refuse,
+        lambda report: with_coverage(report, tried), integrator=command,
+    )  # fmt: skip
 
 
 def show_self_test(
@@ -145,11 +151,12 @@ def show_self_test(
     title: Sequence[str],
     again: str,
     refuse: Callable[[], None] = lambda: None,
+    completed: Callable[[Report], Report] = lambda report: report,
     **extra: Any,
 ) -> int:
     """Write the report of a self-test; return 1 if an outcome failed, else 0.
 
-    `refuse` is called if the control failed.
+    `refuse` is called if the control failed; `completed` adds to the report.
     """
     found = []
     for each in outcomes:
@@ -157,5 +164,5 @@ def show_self_test(
         shared.progress(len(found), count + 1, each.check.id)
     if not found[0].passed:
         refuse()
-    report = self_test_report(title, found, again, **extra)
+    report = completed(self_test_report(title, found, again, **extra))
     return shared.show(report, options, failed=not all(each.passed for each in found))

@@ -134,5 +134,6 @@ class Report(NamedTuple):
     data: Table | None = None  # for CSV, which has all digits
     page: Sequence[Section] | None = None  # for Markdown; if None, `data` is written
     cases: Sequence[Case] = ()  # for JUnit
+    properties: Mapping[str, str] = {}  # for JUnit, by name
     # By name, functions that draw the pictures; None if the subcommand has no picture.
     pictures: Mapping[str, Callable[[], Picture]] | None = None

@@ -137,7 +137,8 @@ def _markdown_section(section: Section) -> str:
 def markdown_table(cells: Sequence[Sequence[str]]) -> str:
     head, *rows = cells
     lines = [head, ["---"] * len(head), *rows]
-    return "".join("| " + " | ".join(line) + " |\n" for line in lines)
+    escaped = ([cell.replace("|", r"\|") for cell in line] for line in lines)
+    return "".join("| " + " | ".join(line) + " |\n" for line in escaped)
 
 
 def json_text(record: dict[str, Any], indent: int | None = None) -> str:
@@ -170,6 +171,10 @@ def _junit(report: Report) -> str:
     if known:
         texts["time"] = f"{sum(known):.6f}"
     suite = xml.Element("testsuite", {"name": report.title} | texts)
+    if report.properties:
+        parent = xml.SubElement(suite, "properties")
+        for name, value in report.properties.items():
+            xml.SubElement(parent, "property", {"name": name, "value": value})
     for kind, id, why, replay, seconds in report.cases:
         named = {"classname": f"{report.title}.{kind}", "name": id}
         took = {} if seconds is None else {"time": f"{seconds:.6f}"}

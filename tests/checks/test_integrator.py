@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from jsonschema import Draft202012Validator
 
 from pyharness.checks.check import Name
 from pyharness.checks.integrators.faults import FAULTS, motions, true_motion
@@ -26,39 +25,17 @@ from pyharness.cli.main import main
 from pyharness.model.attitude import angle_between
 from tests.campaigns import integrator_campaign as campaign
 from tests.campaigns.integrator_campaign import METHODS, Drawn, drawn, is_right, right, solve_of
-from tests.json_reference import schema_of
+from tests.checks.integrators import (
+    FOLDER,
+    RK4,
+    ROOT,
+    Capture,
+    command_of,
+    edited,
+    json_of,
+    written,
+)  # fmt: skip
 from tests.ports import documented_command
-
-Capture = pytest.CaptureFixture[str]
-ROOT = Path(__file__).parent.parent.parent
-FOLDER = ROOT / "docs/how-to/integrator"
-RK4 = FOLDER / "rk4.py"
-
-
-def command_of(path: Path) -> str:
-    return shlex.join([sys.executable, str(path)])
-
-
-def written(folder: Path, text: str) -> str:
-    """Return the command of an integrator with this source."""
-    (folder / "written.py").write_text(text)
-    return command_of(folder / "written.py")
-
-
-def edited(folder: Path, *changes: tuple[str, str]) -> str:
-    """Return the command of a copy of the example with other texts."""
-    text = RK4.read_text()
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new)
-    return written(folder, text)
-
-
-def _json(capsys: Capture, command: str, *words: str, status: int = 0) -> Any:
-    assert main(["verify", "--integrator", command, *words, "--format", "json"]) == status
-    record = json.loads(capsys.readouterr().out)
-    Draft202012Validator(schema_of("verify")).validate(record)
-    return record
 
 
 def _faults(record: Any) -> set[str]:
@@ -80,7 +57,7 @@ def test_the_first_of_checks_made_together_has_their_time() -> None:
 
 @pytest.mark.campaign
 def test_a_right_integrator_has_its_order_and_no_fault(capsys: Capture) -> None:
-    record = _json(capsys, command_of(RK4), "--order", "4", "--seed", "right", "--draws", "1")
+    record = json_of(capsys, command_of(RK4), "--order", "4", "--seed", "right", "--draws", "1")
     assert record["findings"] == []
     names = [each["problem"] for each in record["convergence"][::2]]
     assert names == [f"{kind}-0" for kind in MODERATE]
@@ -100,12 +77,12 @@ def test_a_right_integrator_has_its_order_and_no_fault(capsys: Capture) -> None:
 @pytest.mark.campaign
 def test_a_higher_order_than_it_has_is_refused(capsys: Capture) -> None:
     words = ("--order", "5", "--cell", "free-0", "--seed", "a b")
-    record = _json(capsys, command_of(RK4), *words, status=1)
+    record = json_of(capsys, command_of(RK4), *words, status=1)
     failed = [check for check in record["checks"] if not check["passed"]]
     assert [check["id"] for check in failed] == [
         "integrator/omega/free-0/order", "integrator/attitude/free-0/order",
     ]  # fmt: skip
-    again = _json(capsys, *shlex.split(failed[0]["replay"])[5:], status=1)["checks"]
+    again = json_of(capsys, *shlex.split(failed[0]["replay"])[5:], status=1)["checks"]
     notes = [check["note"] for check in again if not check["passed"]]
     assert notes == [check["note"] for check in failed]
 
@@ -149,10 +126,10 @@ def test_a_mistake_in_the_source_is_named(
     remark = fault in FIRST_ORDER
     # Without a scene without torque, the long motion is left out.
     words = (command, "--seed", "mistake", "--cell")
-    record = _json(capsys, *words, "constant-0,wave-0", status=int(not remark))
+    record = json_of(capsys, *words, "constant-0,wave-0", status=int(not remark))
     assert _faults(record) == {fault}
     if remark:
-        _json(capsys, *words, "wave-0", "--order", "4", status=1)
+        json_of(capsys, *words, "wave-0", "--order", "4", status=1)
 
 
 PROGRAM = """
@@ -180,18 +157,18 @@ def test_the_program_of_the_thesis_is_an_integrator(
 ) -> None:
     command = written(tmp_path, PROGRAM.replace("LABEL", label))
     words = (command, "--order", order, "--draws", "1", "--seed", "1982")
-    record = _json(capsys, *words, status=int(label == "original"))
+    record = json_of(capsys, *words, status=int(label == "original"))
     assert _faults(record) == ({"thesis-runge-kutta"} if label == "original" else set())
 
 
 @pytest.mark.campaign
 def test_a_first_order_splitting_is_named_and_may_refuse_torques(capsys: Capture) -> None:
     command = command_of(Path(__file__).with_name("splitting.py"))
-    record = _json(capsys, command, "--seed", "s", "--draws", "1")
+    record = json_of(capsys, command, "--seed", "s", "--draws", "1")
     assert _faults(record) == {"first-order-splitting"}
     checks = {check["id"]: check for check in record["checks"]}
     assert checks["integrator/constant-0"]["note"] == "refused: a torque"
-    assert _json(capsys, command, "--seed", "s", "--draws", "1", "--order", "2", status=1)
+    assert json_of(capsys, command, "--seed", "s", "--draws", "1", "--order", "2", status=1)
 
 
 def test_rounding_errors_are_not_named_first_order() -> None:
@@ -208,13 +185,13 @@ def test_two_faults_at_once_are_named(tmp_path: Path, capsys: Capture) -> None:
         tmp_path, ("(i2 - i3)", "(i3 - i2)"), ("(i3 - i1)", "(i1 - i3)"),
         ("(i1 - i2)", "(i2 - i1)"), ("[y[3:] for", "[[y[3], -y[4], -y[5], -y[6]] for"),
     )  # fmt: skip
-    record = _json(capsys, command, "--draws", "1", "--seed", "two", status=1)
+    record = json_of(capsys, command, "--draws", "1", "--seed", "two", status=1)
     assert _faults(record) == {"gyroscopic-sign", "quaternion-transposed"}
 
 
 @pytest.mark.campaign
 def test_every_planted_fault_is_named() -> None:
-    found = list(self_test(command_of(RK4), problems("plants", 1)))
+    found = list(self_test(command_of(RK4), problems("plants", 1), []))
     assert [each.name for each in found] == [CONTROL, *(plant.name for plant in PLANTS)]
     for each in found:
         assert each.has_effect
@@ -325,7 +302,7 @@ def test_an_invalid_answer_is_a_line(
     body: str, message: str, tmp_path: Path, capsys: Capture
 ) -> None:
     command = written(tmp_path, f"import json, math, sys\nfor line in sys.stdin:\n    {body}\n")
-    record = _json(capsys, command, "--draws", "1", status=1)
+    record = json_of(capsys, command, "--draws", "1", status=1)
     (check,) = record["checks"]
     assert check["id"] == "integrator/free-0"
     assert message in check["note"]
@@ -337,7 +314,7 @@ def test_an_integrator_that_refuses_everything_does_not_pass(
 ) -> None:
     body = 'for _ in open(0):\n    print(\'{"refused": "never"}\', flush=True)\n'
     command = written(tmp_path, body)
-    record = _json(capsys, command, "--draws", "1", status=1)
+    record = json_of(capsys, command, "--draws", "1", status=1)
     (failed,) = [check for check in record["checks"] if not check["passed"]]
     assert failed["note"] == "the integrator refused every scene"
     assert main(["verify", "--integrator", command, "--self-test", "--draws", "1"]) == 1
@@ -352,7 +329,7 @@ def test_a_port_is_sent_to_its_option(more: list[str], capsys: Capture) -> None:
 
 def test_numbers_that_are_not_finite_are_an_error(tmp_path: Path, capsys: Capture) -> None:
     command = edited(tmp_path, ("[y[:3] for y in rows]", '[[float("nan")] * 3 for _ in rows]'))
-    record = _json(capsys, command, "--cell", "free-0", "--seed", "n", status=1)
+    record = json_of(capsys, command, "--cell", "free-0", "--seed", "n", status=1)
     assert record["convergence"][0]["errors"] == [None] * LEVELS
     failed = {check["id"] for check in record["checks"] if not check["passed"]}
     assert "integrator/omega/free-0/order" in failed
@@ -366,7 +343,7 @@ def test_an_integrator_that_forgets_its_request_is_noticed(tmp_path: Path, capsy
          "    row[0] = float(row[0]) + COUNT * 1e-15\n"
          "    print(json.dumps(answer), flush=True)"),
     )  # fmt: skip
-    record = _json(capsys, command, "--cell", "free-0", "--seed", "r", status=1)
+    record = json_of(capsys, command, "--cell", "free-0", "--seed", "r", status=1)
     checks = {check["id"]: check for check in record["checks"]}
     assert checks["integrator/repeated/free-0"]["value"] == 1.0
 
@@ -380,10 +357,10 @@ def test_single_precision_and_no_attitude(tmp_path: Path, capsys: Capture) -> No
     )
     named = ("json.dumps(answer)", 'json.dumps({**answer, "precision": "binary32"})')
     words = ("--draws", "1", "--seed", "single", "--order", "4")
-    record = _json(capsys, edited(tmp_path, single, named), *words)
+    record = json_of(capsys, edited(tmp_path, single, named), *words)
     assert {each["part"] for each in record["convergence"]} == {"omega"}
     # In binary64 the same errors are those of a method that ceases to converge.
-    _json(capsys, edited(tmp_path, single), *words, status=1)
+    json_of(capsys, edited(tmp_path, single), *words, status=1)
 
 
 @pytest.mark.campaign
@@ -476,7 +453,7 @@ def test_a_request_has_what_the_guide_says() -> None:
 @pytest.mark.parametrize(("words", "order"), [("RK45 fixed", 5), ("DOP853 fixed", 8), ("LSODA", 1)])
 def test_integrators_of_scipy_have_their_orders(words: str, order: int, capsys: Capture) -> None:
     command = f"{command_of(FOLDER / 'scipy_ivp.py')} {words}"
-    record = _json(capsys, command, "--draws", "1", "--seed", "scipy", "--order", str(order))
+    record = json_of(capsys, command, "--draws", "1", "--seed", "scipy", "--order", str(order))
     assert record["findings"] == []
     assert any(each["order"] is not None for each in record["convergence"])
 
@@ -492,5 +469,5 @@ def test_other_integrators(package: str, words: str, faults: set[str], capsys: C
     pytest.importorskip(package)
     name, *rest = words.split()
     command = shlex.join([sys.executable, str(FOLDER / name), *rest])
-    record = _json(capsys, command, "--draws", "1", "--seed", "others")
+    record = json_of(capsys, command, "--draws", "1", "--seed", "others")
     assert _faults(record) == faults

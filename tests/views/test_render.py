@@ -9,7 +9,7 @@ import pytest
 
 from pyharness.model import report
 from pyharness.model.report import Column, Field, Line, Report, Section, Table, digits, short, words
-from pyharness.views.render import render
+from pyharness.views.render import csv_text, render
 
 NAME = "a-name-with-hyphens"
 COLUMNS = [
@@ -106,3 +106,24 @@ def test_wide_table_has_parts_or_wrapped_values() -> None:
     rows = [line.split() for line in others[-1].splitlines()]
     assert "".join(row[1 if len(row) == 3 else 0] for row in rows[1:-1]) == value
     assert (rows[1][0], rows[1][2], rows[-1]) == ("1", "3", ["2", "x", "4"])
+
+
+def test_a_bar_in_a_cell_is_no_column_of_markdown() -> None:
+    table = Table([*words("quantity"), Column("|x|")], [["|L|, relative", 1]])
+    text = render(Report("t", [[table]], dict, page=[[table]]), "markdown")
+    head, _, row = text.splitlines()
+    assert head == r"| quantity | \|x\| |"
+    assert row == r"| \|L\|, relative | 1 |"
+
+
+def test_properties_are_in_junit() -> None:
+    report = REPORT._replace(properties={"covered": "|omega| < 2 rad/s"})
+    first, *_ = xml.fromstring(render(report, "junit").encode())
+    assert (first.tag, first[0].attrib) == (
+        "properties", {"name": "covered", "value": "|omega| < 2 rad/s"}
+    )  # fmt: skip
+
+
+def test_a_table_with_two_equal_heads_is_no_csv() -> None:
+    with pytest.raises(AssertionError):
+        csv_text(Table([Column("error"), Column("error")], [[1.0, 2.0]]))

@@ -16,6 +16,8 @@ import numpy as np
 
 from pyharness.checks.check import Check, Name
 from pyharness.checks.compare.orders import ORDER_SLACK
+from pyharness.checks.integrators.coverage import Tried
+from pyharness.checks.integrators.faults import true_motion
 from pyharness.checks.integrators.problem import (
     CHANGE,
     LEVELS,
@@ -71,6 +73,7 @@ class Verdict:
     again: Callable[[str], str] = lambda name: ""  # returns the command to repeat a scene's checks
     checks: list[Check] = field(default_factory=list)
     judged: list[Judged] = field(default_factory=list)
+    tried: list[Tried] = field(default_factory=list)
     drift: Drift | None = None
     findings: list[Finding] = field(default_factory=list)
     begin: float = field(default_factory=time.perf_counter)  # start (s) of the next checks
@@ -165,6 +168,8 @@ def judge_problem(ask: Ask, problem: Problem, due: float, found: Verdict) -> Non
         raise PortError("only some of the answers in a scene have an attitude")
     by_tolerance = finest.control == "tolerance"
     settings = [*map(problem.tolerance if by_tolerance else problem.step_size, range(LEVELS))]
+    truth = problem.truth.omega
+    found.tried.append(Tried(problem.scene, problem.times, truth, settings, finest))
     floor = problem.floor(finest.rounding)
     parts = []
     errors = zip(*(problem.errors(motion) for motion in answers), strict=True)
@@ -252,6 +257,9 @@ def _judge_long(ask: Ask, found: Verdict) -> None:
         told = Name("integrator", "long").described(None, f"refused: {motion.refusal}")
         found.add(problem.name, told)
         return
+    setting = (problem.tolerance if motion.control == "tolerance" else problem.step_size)(level)
+    truth = true_motion(problem.scene, times).omega
+    found.tried.append(Tried(problem.scene, times, truth, [setting], motion))
     found.drift = drift_of(problem.scene, times, motion)
     checks = [Name("integrator", "finite", "long").bounded(motion.lost, 0.0, _FINITE)]
     change = Name("integrator", "conserved", "long")

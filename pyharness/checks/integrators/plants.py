@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from pyharness.checks.integrators.coverage import Tried
 from pyharness.checks.integrators.faults import FAULTS, State
 from pyharness.checks.integrators.judging import Verdict, judge_problem
 from pyharness.checks.integrators.problem import Problem
@@ -175,10 +176,12 @@ def with_plant(ask: Ask, plant: IntegratorPlant, scene: Scene) -> Ask:
     return asked_with_fault
 
 
-def self_test(command: str, chosen: Sequence[Problem], due: float = 1.0) -> Iterator[Outcome]:
+def self_test(
+    command: str, chosen: Sequence[Problem], tried: list[Tried], due: float = 1.0
+) -> Iterator[Outcome]:
     """Yield the outcome without a fault (the control), then with each planted fault.
 
-    After an invalid answer the control fails.
+    The control's motions are appended to `tried`. After an invalid answer the control fails.
     """
 
     def judge(plant: IntegratorPlant | None = None) -> tuple[Verdict, list[str], int]:
@@ -194,6 +197,7 @@ def self_test(command: str, chosen: Sequence[Problem], due: float = 1.0) -> Iter
         with PortProcess(command, PATIENCE, "--integrator") as process:
             ask = asking_of(process)
             right, names, failed = judge()
+            tried += right.tried
             if not right.judged:
                 raise PortError("the integrator refused every scene")
             yield control(failed + len(names), _note(names))

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pyharness.checks.integrators.coverage import with_coverage
 from pyharness.checks.integrators.judging import Verdict
 from pyharness.checks.integrators.problem import PARTS, growth_power
 from pyharness.checks.report import checks_report, listed_singly, references, summary_page, verdict
@@ -63,7 +64,8 @@ def integrator_report(found: Verdict, seed: str) -> Report:
         "verify", found.checks, text, page, integrator=found.command, seed=seed,
         findings=list(map(asdict, found.findings)), convergence=convergence,
     )  # fmt: skip
-    return report._replace(pictures={"integrator": lambda: integrator_picture(found)})
+    report = report._replace(pictures={"integrator": lambda: integrator_picture(found)})
+    return with_coverage(report, found.tried)
 
 
 def _orders(found: Verdict) -> Section:

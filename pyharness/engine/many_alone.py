@@ -196,7 +196,7 @@ def prepare_details(
     if isinstance(scene, Scene):
         rows = checked_copies(arrays)
         if only_one({name: arrays[name] for name in BODIES}):  # the arrays give other bodies
-            scene = replace(scene, changing=None, inertia=None, moments=_ONES)
+            scene = replace(scene, changing=None, inertia=None, coefficients=None, moments=_ONES)
         first, scene_of = scene, partial(scene_of_row, scene, rows)
         for i in range(max(map(len, rows.values()), default=0)):
             with suppress(InputError, IndexError):  # until a body is valid

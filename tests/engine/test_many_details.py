@@ -47,6 +47,27 @@ def small(t: Any, omega: Any) -> Any:
     return omega[0] ** 2 - 0.04
 
 
+BODIES: dict[str, Any] = {
+    "moments": (4.0, 3.0, 2.0), "coefficients": (0.3, -0.5, 0.2), "inertia": MATRIX,
+    "changing": ChangingMoments([[4.0, 0.1], [3.0], [2.0]]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("torque", [LAW, damping(0.1)], ids=["law", "damping"])
+@pytest.mark.parametrize("given", ["moments", "coefficients", "inertia"])
+@pytest.mark.parametrize("body", BODIES)
+def test_an_array_replaces_any_body_of_the_scene(body: str, given: str, torque: Any) -> None:
+    scene = Scene("old", TOP.omega, torque=torque, **{body: BODIES[body]})
+    other = Scene("new", TOP.omega, torque=torque, **{given: BODIES[given]})
+    asked: dict[str, Any] = {"events": small, "sensitivities": ["omega", given]}
+    found = MANY(scene, [2.0], **{given: BODIES[given]}, **asked)
+    wanted: Any = solve(other, 2.0, **asked)
+    assert found.refusals == {}
+    assert found.t_events[0][0] == pytest.approx(wanted.t_events[0], rel=1e-9)
+    for name, slopes in wanted.sensitivities.items():
+        assert found.sensitivities[name][0] == pytest.approx(slopes[0], rel=1e-8, abs=1e-10)
+
+
 @pytest.mark.sampled
 @pytest.mark.parametrize("name", CASES)
 def test_details_are_those_of_single_calls(name: str) -> None:

@@ -112,7 +112,7 @@ def solve_many(
         are solved side by side.
     states : dict of arrays, shape (n,), or of float
         Initial values of the scene's own states (`Scene.states`), by name; the default is the
-        scene's values. Bodies with own states are solved one by one, without `events`,
+        scene's values. Bodies with own states are solved one by one, without `compiled`, `events`,
         `sensitivities` and `out`.
     method : str
         A name in `pyharness.engine.solver.PREPARED`. `auto` uses a closed form if there is one,

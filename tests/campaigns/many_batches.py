@@ -165,7 +165,8 @@ def draw(source: Random, kind: str) -> Batch:
     if kind.startswith("states") and source.random() < 0.5:
         starts["x"], own["x"] = several(-0.5, 0.5)
     arguments = {
-        **given, **ends, "parameters": parameters, "tolerance": 10.0 ** source.uniform(-11.0, -4.0),
+        **given, **ends, "parameters": parameters, "effort": 0.05,
+        "tolerance": 10.0 ** source.uniform(-11.0, -4.0),
         "method": source.choice(("auto",) * 6 + ("taylor",) * 3 + ("gauss-4",)),
         "estimates": source.random() < 0.5, "threads": source.choice((1, 2)),
     }  # fmt: skip

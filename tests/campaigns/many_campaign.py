@@ -29,7 +29,7 @@ _REFUSALS = {
     "method": "method gauss-4 has no prepared solver for .*; allowed: auto, taylor, .*",
     "parameters of wheels": "parameters: '[abc]'; allowed: .*: none here",
     "derivatives of a method": "sensitivities: the method is gauss-4; allowed: .*",
-    "derivatives with states": "sensitivities: the scene has states of its own; allowed: solve",
+    "with states": "(sensitivities|compiled): the scene has states of its own; allowed: solve",
 }
 
 
@@ -87,10 +87,10 @@ def _times_of(batch: Batch, i: int) -> Any:
 
 
 def _alone(batch: Batch, i: int, times: Any) -> tuple[str, Trajectory | None, Scene | None]:
-    arguments = batch.arguments
+    given = {name: batch.arguments[name] for name in ("method", "tolerance", "effort")}
     try:
         scene = batch.alone(i)
-        one = solve(scene, times, arguments["method"], arguments["tolerance"])
+        one = solve(scene, times, **given)
     except TimedError:
         return "gave up", None, None
     except InputError:
@@ -120,8 +120,8 @@ def _judge(
 
 
 def _judge_slopes(tally: driver.Tally, batch: Batch, found: Ensemble, i: int) -> None:
-    arguments, refusals = batch.arguments, found.refusals or {}
-    given = {name: arguments[name] for name in ("method", "tolerance", "sensitivities")}
+    refusals, names = found.refusals or {}, ("method", "tolerance", "effort", "sensitivities")
+    given = {name: batch.arguments[name] for name in names}
     try:
         slopes = solve(batch.alone(i), _times_of(batch, i), **given).sensitivities
     except InputError as refusal:

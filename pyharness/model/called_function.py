@@ -5,7 +5,6 @@ nor arrays of floats, such as those of numpy.zeros. Where a call with symbols fa
 with these functions replaced. Calls from other threads or without symbols reach the originals.
 """
 
-import gc
 import math
 import re
 import sys
@@ -211,23 +210,29 @@ def _places(frames: Sequence[FrameType]) -> Iterator[_Place]:
 
 def _places_in_functions(frames: Sequence[FrameType]) -> Iterator[_Place]:
     """Yield the variables of closures, and default arguments, of the functions in a traceback."""
-    for each in gc.get_referrers(*(frame.f_code for frame in frames)):
-        if isinstance(each, FunctionType):
-            yield from (_Place(cell, "cell_contents") for cell in each.__closure__ or ())
-            yield _Place(each, "__defaults__")
-            yield from (_Place(each.__kwdefaults__, name) for name in each.__kwdefaults__ or ())
+    codes, seen = {frame.f_code for frame in frames}, set()
+    rest = [x for frame in frames for x in frame.f_locals.values()]
+    while rest:
+        each = rest.pop()
+        if type(each) is partial:
+            rest += [each.func, *each.args, *each.keywords.values()]
+        if not isinstance(each, FunctionType):
+            each = getattr(each, "__func__", getattr(type(each), "__call__", None))  # noqa: B004
+        if not isinstance(each, FunctionType) or each.__code__ not in codes or each in seen:
+            continue
+        seen.add(each)
+        places = [_Place(cell, "cell_contents") for cell in each.__closure__ or ()]
+        places += [_Place(each.__kwdefaults__, name) for name in each.__kwdefaults__ or ()]
+        rest += [*(x.value for x in places), *(each.__defaults__ or ())]
+        rest += [each.__globals__.get(name) for name in each.__code__.co_names]
+        yield from (*places, _Place(each, "__defaults__"))
 
 
 def _new_places(error: BaseException, known: Container[tuple[int, str]]) -> list[_Place]:
     """Return places that refer to replaceable functions, for the functions in a traceback."""
-    frames = [frame for frame, _ in walk_tb(error.__traceback__) if _is_user_code(frame)]
-    for search in (_places, _places_in_functions):
-        found = [
-            each for each in search(frames) if each.key not in known and _is_replaceable(each.value)
-        ]
-        if found:
-            return found
-    return []
+    frames = [frame for frame, _ in walk_tb(error.__traceback__)]
+    found = (*_places([*filter(_is_user_code, frames)]), *_places_in_functions(frames))
+    return [each for each in found if each.key not in known and _is_replaceable(each.value)]
 
 
 def called_once(

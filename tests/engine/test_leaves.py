@@ -20,13 +20,15 @@ from pyharness import Scene, TorqueLaw, prepare, solve, solve_many, torques
 from pyharness.checks.scenes.state_scenes import READY, draw, draw_ready
 from pyharness.engine import leaf_cache
 from pyharness.engine.lane_leaves import whole_source
-from pyharness.engine.leaf_text import structure
+from pyharness.engine.leaf_text import rule_of, structure
 from pyharness.engine.recorded import kernel_tape, listing, system_of, taylor_step
 from pyharness.model.arithmetic import REFUSED
 from pyharness.model.codes import Statuses
 from pyharness.model.constant_body import with_constant_body
 from pyharness.model.extension import extension
 from pyharness.model.principal import principal
+from pyharness.model.recurrences import OPERATIONS, WAVE
+from pyharness.model.symbols import SYMBOLS
 from pyharness.truth.reference import reference
 from tests.instruction_sets import CHOSEN, levels_here
 
@@ -36,10 +38,15 @@ MOMENTS = (1.0, 1.2, 1.5)
 def every_function(t: Any, w: Any) -> Any:
     """Return a torque with every operation that has leaves."""
     x = 0.3 * w[0] + 0.1 * t
+    small, large = 0.1 * x, 2.0 + x * x
+    others = [
+        function(large if kind in ("acosh", "cbrt") or "log" in kind else small)
+        for kind, function in SYMBOLS.elementary.items()
+    ]
     return [
         np.exp(-x) * np.sin(2.0 * x) - w[0] / (2.0 + w[1] * w[1]),
         np.sqrt(1.0 + x * x) * np.log(2.0 + x * x) + np.tanh(w[1]) * np.cos(0.7 * t),
-        np.arctan(w[2]) + 0.2 * np.arcsin(0.1 * x) - w[2] * np.sqrt(w @ w) + np.cos(2.0 * w[2]),
+        np.sum(others) - w[2] * np.sqrt(w @ w) + np.cos(2.0 * w[2]),
     ]
 
 
@@ -104,6 +111,13 @@ def test_terms_are_those_of_the_interpreter(number: int) -> None:
     assert (compiled != 0.0).sum() > 10
 
 
+def test_every_operation_is_compared() -> None:
+    operations = listing(system_of(with_constant_body(scenes(0)))).operations
+    compared = [rule_of(each) for each in operations if each[0] in OPERATIONS]
+    assert all(rule in compared for rule in OPERATIONS.values())
+    assert {kind for kind, *_ in operations} >= OPERATIONS.keys() - {WAVE}
+
+
 ROUNDED = {
     "products": lambda t, w: 3.0 + 2.0 * w[::-1] * w - 5.0 * w * w * w,
     "quotients": lambda t, w: 9.0 / (1.0 + w[::-1] * w[::-1]) - 5.0 * w,
@@ -111,6 +125,7 @@ ROUNDED = {
     "exponentials": lambda t, w: 5.0 * np.exp(-w[::-1]) - 2.0 * w,
     "tangents": lambda t, w: 5.0 * np.tanh(w[::-1]) - 2.0 * w - 5.0 * np.arctan(w - 1.0),
     "sines": lambda t, w: 5.0 * np.sin(w[::-1]) - 2.0 * w + 5.0 * np.cos(w),
+    "functions": lambda t, w: 5.0 * np.expm1(-w[::-1]) - 2.0 * w - 3.0 * np.arccosh(2.0 + w * w),
     "waves": lambda t, w: 9.0 * np.sin(50.0 * t) * w[::-1] + np.cos(40.0 * t) - 2.0 * w,
 }
 

@@ -23,8 +23,8 @@ def level_of_processor() -> int:
 
 
 def levels_here() -> list[int]:
-    """Return the levels that are compiled, and that this processor has."""
-    compiled = [LEVELS.index(name) for name in _build.INSTRUCTION_SETS]
+    """Return the levels that are compiled, and that this processor has, in order."""
+    compiled = sorted(LEVELS.index(name) for name in _build.INSTRUCTION_SETS)
     return [level for level in compiled if level <= level_of_processor()]
 
 

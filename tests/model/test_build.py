@@ -51,7 +51,8 @@ def test_hot_kernels_are_built_for_this_processor_or_for_all() -> None:
     on_x86 = platform.machine().lower() in ("x86_64", "amd64")
     has_levels = on_x86 and _build.COMPILER == "gcc"
     native = LEVELS[level_of_processor() if has_levels else 0]
-    assert _build.INSTRUCTION_SETS in ((native,), LEVELS if has_levels else LEVELS[:1])
+    built = sorted(_build.INSTRUCTION_SETS, key=LEVELS.index)
+    assert built in ([native], [*LEVELS] if has_levels else ["plain"])
 
 
 def test_a_build_for_another_processor_is_refused(

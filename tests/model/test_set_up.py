@@ -1,4 +1,4 @@
-"""What installers see of the build: metadata without compiling, and its progress."""
+"""The build as installers see it: metadata without compiling, and progress."""
 
 import os
 import re

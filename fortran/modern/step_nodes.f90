@@ -30,7 +30,7 @@ module step_nodes
   end type nodes_t
 
   ! Largest error of a polynomial through the nodes, in tolerances; and most parts of a step.
-  real(dp), parameter :: LARGEST_ERROR = 0.01_dp, MOST_PARTS = 32.0_dp
+  real(dp), parameter :: LARGEST_ERROR = 0.01_dp, MOST_PARTS = 16.0_dp
 
   public :: AT_ONCE, divide_step, nodes_of, powers_of, sum_at_nodes
 

@@ -239,7 +239,8 @@ contains
                     found%error)
       if (solution%status /= COMPLETE) exit
       if (associated(solution%nodes)) then
-        call add_nodes(x, s, e, factor, t_next(1), request%tolerance, solution, found%error)
+        call add_nodes(x, s, e, factor, change(:x%n), t_next(1), request%tolerance, solution, &
+                       found%error)
       end if
       call add_noise((noise*factor*s%h)**2, e)
       is_compared = .false.

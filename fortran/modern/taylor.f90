@@ -165,7 +165,6 @@ contains
     end if
     error = error + (max(outcome%error, min(outcome%least, UNSURE*request%tolerance)) + blurred)
     solution%error = error
-    solution%error = solution%error + solution%between
     solution%growth = growth
     solution%spent = spent
     if (solution%status == COMPLETE .and. blurred > UNSURE*request%tolerance) then

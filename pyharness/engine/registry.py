@@ -96,12 +96,10 @@ def _from(room: str, name: str, *arguments: str | int) -> Integrator:
 
 
 def _scipy(scipy: str, title: str, source: str) -> Method:
-    # RK45 and Radau have interpolants that are less accurate than their steps.
-    gives_steps = scipy in ("DOP853", "LSODA")
     source, solve = f"scipy.integrate.solve_ivp; {source}", scipy_method(scipy)
     return Method(
         scipy.lower(), title, source, FINEST[scipy], solve, _SCIPY_DEFAULT, scipy=scipy,
-        gives_steps=gives_steps, attitude=True, state_torque=True,
+        gives_steps=True, attitude=True, state_torque=True,
     )  # fmt: skip
 
 

@@ -1,10 +1,10 @@
 """A campaign of random scenes, whose dense output and events are compared with true rows.
 
 The command is ``python -m tests.campaigns.continuous_campaign COUNT SEED [FIRST]``. Torques are
-polynomials of time of up to degree 30, their products with waves, laws, recorded functions and
-switches. `sol` at 300 times, and the values of event functions at their roots and between them, are
-compared with quadratures, or else with rows of a tolerance of 1e-14. The limit of an error is the
-tolerance plus 8e-15 K, where the error amplification K is below 1e6.
+polynomials of time of degrees up to 30, their products with waves, laws, recorded functions and
+switches. `sol` at 300 times, and event functions at and between their roots, are compared with
+quadratures if rates depend on time alone, else with rows of a tolerance of 1e-14. The limit of an
+error is the tolerance plus 8e-15 K, where the error amplification K is below 1e6.
 """
 
 import math
@@ -20,53 +20,87 @@ from pyharness import InputError, Scene, solve
 from pyharness.checks.scenes.random_scenes import draw as draw_law
 from pyharness.checks.scenes.state_scenes import SUDDEN, draw, draw_ready
 from pyharness.model.array_type import Array
-from pyharness.model.attitude import angle_between
 from tests.campaigns import driver
 from tests.campaigns.switched_scenes import controlled
 
 MODULE = "tests.campaigns.continuous_campaign"
-TIMES = 300
-MOST_GROWTH = 1e6
+TIMES, _GRID = 300, 900  # random times, and equidistant ones between which roots are counted
+KINDS = (
+    "axis",
+    "axis",
+    "axes",
+    "axes",
+    "own",
+    "own",
+    "law",
+    "state",
+    "sudden",
+    "ready",
+    "switched",
+)
 MOST_DEGREE = 30
+MOST_GROWTH = 1e6
 _FINEST = 1e-14
 _FLOOR = 8e-15  # error of the true rows, over the error amplification
-KINDS = ("axis", "axis", "axes", "axes", "own", "own", "law", "state", "sudden", "ready", "switched")
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
 
-# A function of time, which may be a symbol.
+# A function of time, which may be a symbol; and a function of the unknowns, (m, ...).
 OfTime = Callable[[Any], Any]
+OfState = Callable[[Any], Any]
 
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """A random scene, its first and last time (s), and the rates of its unknowns if of time."""
+    """A random scene, and its first and last time (s)."""
 
     scene: Scene
     ends: tuple[float, float]
-    rates: Callable[[Array], Any] | None = None  # of omega and own states, (m, n)
+    turning: bool = False  # with attitude
     methods: tuple[str, ...] = ("auto", "taylor")
-    turning: bool = False
+    rates: Callable[[Array], Any] | None = (
+        None  # of the unknowns, (m, n), if they are of time alone
+    )
+
+    @property
+    def times(self) -> list[float]:
+        """The ends that are not 0."""
+        return [time for time in self.ends if time]
+
+    def truth(self, times: Array) -> Array:
+        """Return the true unknowns at n ascending times (s), (m, n)."""
+        if self.rates is None:
+            found = solve(self.scene, times, "taylor", _FINEST, attitude=self.turning)
+            if not found.has_all_rows:
+                raise InputError("the solution ends early")
+            return found.y
+        start = np.array([*self.scene.omega, *(each.start for each in self.scene.states)])
+        edges = np.unique([*times, 0.0])
+        half = 0.5 * np.diff(edges)
+        inner = (edges[:-1] + half)[:, None] + half[:, None] * _NODES
+        rates = np.array(self.rates(inner.ravel())).reshape(len(start), *inner.shape)
+        parts, zero = rates @ _WEIGHTS * half, int(np.searchsorted(edges, 0.0))
+        before = -np.cumsum(parts[:, :zero][:, ::-1], axis=1)[:, ::-1]
+        changes = [before, np.zeros((len(start), 1)), np.cumsum(parts[:, zero:], axis=1)]
+        found = start[:, None] + np.concatenate(changes, axis=1)
+        return np.asarray(found[:, np.searchsorted(edges, times)])
 
 
 def polynomial(source: Random, length: float) -> OfTime:
-    """Return a random polynomial of time, about 1 at `length` (s)."""
+    """Return a random polynomial of time, of the size 1 until `length` (s)."""
     degree = source.randrange(MOST_DEGREE + 1)
-    kind = source.randrange(3)
-    if kind == 0:
+    if source.random() < 0.3:
         return lambda t: (t / length) ** degree
     shift = source.choice((0.0, 0.0, source.uniform(-0.5, 0.5)))
-    factors = [source.uniform(-1.0, 1.0) for _ in range(degree + 1)]
-    if kind == 1:
-        factors = [x * (source.random() < 0.2) for x in factors[:-1]] + [1.0]
+    density = source.choice((0.2, 1.0))
+    factors = [source.uniform(-1.0, 1.0) * (source.random() < density) for _ in range(degree)]
 
-    def horner(t: Any) -> Any:
-        x = t / length - shift
-        found = factors[-1] + 0.0 * x
-        for factor in factors[-2::-1]:
-            found = found * x + factor
-        return found
+    def found(t: Any) -> Any:
+        x, total = t / length - shift, 1.0
+        for factor in factors:
+            total = total * x + factor
+        return total + 0.0 * t
 
-    return horner
+    return found
 
 
 def of_time(source: Random, length: float) -> OfTime:
@@ -74,62 +108,51 @@ def of_time(source: Random, length: float) -> OfTime:
     plain = polynomial(source, length)
     if source.random() < 0.6:
         return plain
-    f, phase = 10.0 ** source.uniform(-1.0, 1.3) / length, source.uniform(0.0, 6.0)
-    return lambda t: plain(t) * np.sin(f * t + phase)
+    rate, phase = 10.0 ** source.uniform(-1.0, 1.3) / length, source.uniform(0.0, 6.0)
+    return lambda t: plain(t) * np.sin(rate * t + phase)
 
 
 def timed(source: Random, kind: str) -> Drawn:
-    """Return a body under torques of time, about one axis or several, with own states or not."""
+    """Return a body under torques of time about one axis or all, or with own states."""
     length = 10.0 ** source.uniform(-1.0, 1.0)
     if kind != "own" and source.random() < 0.1:
         length = math.ldexp(length, source.choice((-320, 320, 460)))
-    ends = source.choice(((0.0, length), (0.0, length), (-length, 0.0), (-0.7 * length, length)))
+    ends = source.choice(((0.0, length), (-length, 0.0), (-0.7 * length, length)))
     moments = [source.uniform(1.0, 1.9) for _ in range(3)]
     axis, about = source.randrange(3), range(3)
     pushes: list[OfTime] = [of_time(source, length) for _ in about]
     sizes = [10.0 ** source.uniform(-2.0, 1.0) / length for _ in about]
-    if kind == "axis":
+    is_single = kind == "axis" or (kind == "own" and source.random() < 0.7)
+    if is_single:
         sizes = [size * (i == axis) for i, size in enumerate(sizes)]
     rest = source.random() < 0.4
     omega = [0.0 if rest else source.uniform(-1.0, 1.0) * size for size in sizes]
-    own = {f"x{i}": of_time(source, length) for i in range(source.randrange(1, 3))}
-    starts = {name: source.choice((0.0, source.uniform(-1.0, 1.0))) for name in own}
-    mixing = source.choice((0.0, 0.0, source.uniform(-1.0, 1.0)))
-    damping = source.choice((0.0, source.uniform(0.0, 1.0))) if kind == "axes" else 0.0
+    own = [of_time(source, length) for _ in range(source.randrange(1, 3) * (kind == "own"))]
+    starts = [source.choice((0.0, source.uniform(-1.0, 1.0))) for _ in own]
+    mixing = 0.0 if is_single else source.uniform(-1.0, 1.0)
+
+    def accelerations(t: Any, w: Any) -> list[Any]:
+        return [sizes[i] / length * pushes[i](t) - 0.1 * mixing / length * w[i] for i in about]
 
     def torque(t: Any, w: Any) -> Any:
-        return [
-            moments[i] * sizes[i] / length * pushes[i](t) - damping / length * w[i] for i in about
-        ]
+        return [moment * each for moment, each in zip(moments, accelerations(t, w), strict=True)]
 
     def with_states(t: Any, w: Any, states: Any) -> Any:
-        rates = {
-            name: push(t) / length + mixing * states[name] * w[axis] * t / length
-            for name, push in own.items()
-        }
-        return torque(t, w), rates
-
-    states = starts if kind == "own" else {}
-    if kind == "own" and source.random() < 0.7:
-        sizes, omega, mixing = [size * (i == axis) for i, size in enumerate(sizes)], [0.0] * 3, 0.0
-    body: dict[str, Any] = {"moments": moments}
-    if kind == "axes" and source.random() < 0.3:
-        body = {"inertia": _matrix(moments, source)}
-    scene = Scene(kind, omega, torque=with_states if states else torque, states=states, **body)
+        mixed = mixing * w[axis] * t / length
+        return torque(t, w), {x: own[int(x[1])](t) / length + mixed * states[x] for x in states}
 
     def rates(times: Array) -> Any:
-        nothing = np.zeros_like(times)
-        found = [sizes[i] / length * pushes[i](times) + nothing for i in about]
-        return [*found, *(own[name](times) / length + nothing for name in states)]
+        nothing = np.zeros((3, len(times)))
+        found = [*accelerations(times, nothing), *(each(times) / length for each in own)]
+        return [each + nothing[0] for each in found]
 
-    is_of_time = np.count_nonzero([*sizes, *omega]) <= 2 and mixing == damping == 0.0
-    return Drawn(scene, ends, rates if is_of_time and "moments" in body else None)
-
-
-def _matrix(moments: list[float], source: Random) -> Array:
-    axes = np.linalg.qr(np.array([[source.gauss(0.0, 1.0) for _ in range(3)] for _ in range(3)]))[0]
-    found = axes @ np.diag(moments) @ axes.T
-    return np.asarray(0.5 * (found + found.T))
+    body: dict[str, Any] = {"moments": moments}
+    if kind == "axes" and source.random() < 0.3:
+        axes, _ = np.linalg.qr([[source.gauss(0.0, 1.0) for _ in about] for _ in about])
+        body = {"inertia": axes @ np.diag(moments) @ axes.T}
+    body |= {"torque": with_states, "states": {f"x{i}": x for i, x in enumerate(starts)}}
+    scene = Scene(kind, omega, **(body if own else body | {"torque": torque}))
+    return Drawn(scene, ends, rates=rates if is_single else None)
 
 
 def drawn(source: Random, seed: str, number: int) -> Drawn:
@@ -137,117 +160,39 @@ def drawn(source: Random, seed: str, number: int) -> Drawn:
     kind = KINDS[number % len(KINDS)]
     if kind in ("axis", "axes", "own"):
         return timed(source, kind)
-    if kind == "switched":
-        body = controlled(source)[1]
-        scene, end, turning = body.scene(), body.end, body.turning
-    elif kind == "law":
+    turning, methods = source.random() < 0.3, ("auto", "taylor")
+    if kind == "law":
         scene, end = draw_law(f"continuous {seed}", number).scene, source.uniform(-20.0, 20.0)
-        turning = source.random() < 0.3
+        methods += () if turning else ("gauss-4", "gauss-6")
+    elif kind == "switched":
+        body = controlled(source)[1]
+        scene, end = body.scene(), body.end
+    elif kind == "ready":
+        scene, end = draw_ready(source)
     else:
-        names = {"sudden": lambda: draw(source, (source.choice(SUDDEN),)), "ready": lambda: draw_ready(source)}
-        scene, end = names.get(kind, lambda: draw(source))()
-        turning = scene.torque.needs_attitude or source.random() < 0.3
-    methods = ("auto", "taylor")
-    if kind == "law" and not turning:
-        methods = "auto", "taylor", "taylor", "gauss-4", "gauss-6"
-    return Drawn(scene, (min(0.0, end), max(0.0, end)), None, methods, turning)
+        scene, end = draw(source, (source.choice(SUDDEN),)) if kind == "sudden" else draw(source)
+    turning = turning or scene.torque.needs_attitude
+    return Drawn(scene, (min(0.0, end), max(0.0, end)), turning, methods)
 
 
-class Truth:
-    """The true unknowns of a scene at any times."""
-
-    def __init__(self, given: Drawn) -> None:
-        self.given = given
-
-    def __call__(self, times: Array) -> Array:
-        """Return the unknowns at ascending times (s), (m, n)."""
-        scene = self.given.scene
-        if self.given.rates is None:
-            found = solve(scene, times, "taylor", _FINEST, attitude=self.given.turning)
-            if not found.has_all_rows:
-                raise InputError("the solution ends early")
-            return found.y
-        start = [*scene.omega, *(each.start for each in scene.states)]
-        both = np.unique([*times, 0.0])
-        half, middle = 0.5 * np.diff(both), 0.5 * (both[1:] + both[:-1])
-        inner = middle[:, None] + half[:, None] * _NODES
-        rates = np.array(self.given.rates(inner.ravel())).reshape(len(start), *inner.shape)
-        sums = np.cumsum((rates @ _WEIGHTS) * half, axis=1)
-        sums = np.concatenate([np.zeros((len(start), 1)), sums], axis=1)
-        sums -= sums[:, [np.searchsorted(both, 0.0)]]
-        return np.array(start)[:, None] + sums[:, np.searchsorted(both, times)]
-
-
-def function_of(source: Random, states: Array) -> Callable[[Array], Array]:
-    """Return a random function of the unknowns, (m, ...), that has roots within their ranges."""
-    m = len(states)
+def function_of(source: Random, states: Array) -> OfState:
+    """Return an unknown minus a level in its range, or the product of two."""
     low, high = states.min(axis=1), states.max(axis=1)
-
-    def level(i: int) -> float:
-        return float(low[i] + source.uniform(0.02, 0.98) * (high[i] - low[i]))
-
-    moving = [i for i in range(m) if high[i] > low[i]] or [0]
+    moving = np.flatnonzero(high > low).tolist() or [0]
     i, j = source.choice(moving), source.choice(moving)
-    a, b = level(i), level(j)
+    a, b = (low[k] + source.uniform(0.02, 0.98) * (high[k] - low[k]) for k in (i, j))
     if source.random() < 0.6:
         return lambda y: y[i] - a
     return lambda y: (y[i] - a) * (y[j] - b)
 
 
-def try_scene(tally: driver.Tally) -> None:
-    """Compare the dense output and the events of a random scene.
-
-    A scene is left out if its solution ends early or is sensitive.
-    """
-    source = Random(f"continuous {tally.seed} {tally.number}")
-    given = drawn(source, tally.seed, tally.number)
-    kind, scene = KINDS[tally.number % len(KINDS)], given.scene
-    method, tolerance = source.choice(given.methods), 10.0 ** source.uniform(-13.0, -3.0)
-    low, high = given.ends
-    inner = sorted(source.uniform(low, high) for _ in range(TIMES))
-    times = np.unique([low, *inner, *np.linspace(low, high, 900), 0.0, high])
-    truth = Truth(given)
-    tally.counts["left out"] += 1
-    try:
-        states = truth(times)
-        functions = [function_of(source, states) for _ in range(2)]
-        found: Any = solve(
-            scene, [x for x in (low, high) if x], method, tolerance, attitude=given.turning,
-            dense_output=True, events=[_event(each, given) for each in functions],
-        )  # fmt: skip
-        growth = solve(scene, [x for x in (low, high) if x], tolerance=1e-9, attitude=given.turning).growth
-    except InputError:
-        return
-    if found.ended != "complete" or not growth or growth > MOST_GROWTH:
-        return
-    tally.counts["left out"] -= 1
-    allowed = tolerance + _FLOOR * growth
-    more = f", {method}, tolerance {tolerance:.2g}, K {growth:.2g}, claim {found.error}"
-    sizes = sizes_of(times, states, scene)
-    for values, limit, name in (
-        (found.sol(times), allowed, "sol"),
-        (found.sol(times), (found.error or math.inf) + _FLOOR * growth, "claim of sol"),
-    ):
-        apart = np.abs(values - states)
-        error = float(np.max(apart / sizes, initial=0.0))
-        if name == "sol":
-            tally.judge(f"{kind}: {name}", error, limit, more)
-        else:
-            tally.counts[f"{name} exceeded"] += error > limit
-            tally.counts[f"{name} exceeded 10 times"] += error > 10.0 * limit
-    for function, roots in zip(functions, found.t_events, strict=True):
-        judge_roots(tally, kind, truth, function, np.sort(roots), (times, states, allowed * sizes), more)
-
-
-def _event(function: Callable[[Any], Any], given: Drawn) -> Callable[..., Any]:
-    names = [each.name for each in given.scene.states]
-    if given.turning and names:
-        return lambda t, w, q, x: function([*w, *q, *(x[name] for name in names)])
+def event(function: OfState, given: Drawn) -> Callable[..., Any]:
+    """Return the event of a function of all unknowns."""
+    if not given.scene.states:
+        return (lambda t, w, q: function([*w, *q])) if given.turning else lambda t, w: function(w)
     if given.turning:
-        return lambda t, w, q: function([*w, *q])
-    if names:
-        return lambda t, w, x: function([*w, *(x[name] for name in names)])
-    return lambda t, w: function(w)
+        return lambda t, w, q, states: function([*w, *q, *states.values()])
+    return lambda t, w, states: function([*w, *states.values()])
 
 
 def sizes_of(times: Array, states: Array, scene: Scene) -> Array:
@@ -264,49 +209,82 @@ def sizes_of(times: Array, states: Array, scene: Scene) -> Array:
     return np.where(sizes > 0.0, sizes, 1.0)
 
 
+def margin(function: OfState, states: Array, errors: Array) -> Array:
+    """Return the largest changes of a function by errors of the unknowns, (n,)."""
+    moved = [
+        np.where(np.arange(len(states))[:, None] == i, errors, 0.0) for i in range(len(states))
+    ]
+    changes = [np.abs(function(states + each) - function(states)) for each in moved]
+    return np.asarray(np.sum(changes, axis=0) + sys.float_info.min)
+
+
+def try_scene(tally: driver.Tally) -> None:
+    """Compare the dense output and the events of a random scene.
+
+    A scene is left out if its solution ends early or is sensitive.
+    """
+    source = Random(f"continuous {tally.seed} {tally.number}")
+    given, kind = drawn(source, tally.seed, tally.number), KINDS[tally.number % len(KINDS)]
+    scene, (low, high) = given.scene, given.ends
+    method, tolerance = source.choice(given.methods), 10.0 ** source.uniform(-13.0, -3.0)
+    inner = [source.uniform(low, high) for _ in range(TIMES)]
+    times = np.unique([low, 0.0, high, *inner, *np.linspace(low, high, _GRID)])
+    tally.counts["left out"] += 1
+    try:
+        states = given.truth(times)
+        functions = [function_of(source, states) for _ in range(2)]
+        found: Any = solve(
+            scene, given.times, method, tolerance, attitude=given.turning, dense_output=True,
+            events=[event(each, given) for each in functions],
+        )  # fmt: skip
+        growth = solve(scene, given.times, tolerance=1e-9, attitude=given.turning).growth
+    except InputError:
+        return
+    if found.ended != "complete" or not growth or growth > MOST_GROWTH:
+        return
+    tally.counts["left out"] -= 1
+    sizes, floor = sizes_of(times, states, scene), _FLOOR * growth
+    more = f", {method}, tolerance {tolerance:.2g}, K {growth:.2g}, claim {found.error}"
+    error = float((np.abs(found.sol(times) - states) / sizes).max())
+    tally.judge(f"{kind}: sol", error, tolerance + floor, more)
+    if found.error is not None:
+        tally.counts["claims below a tenth of the error"] += error > 10.0 * found.error + floor
+    rows = times, states, (tolerance + floor) * sizes
+    for function, roots in zip(functions, found.t_events, strict=True):
+        judge_roots(tally, (f"{kind}: root", more), given, function, np.sort(roots), rows)
+
+
 def judge_roots(
-    tally: driver.Tally, kind: str, truth: Truth, function: Callable[[Array], Array], roots: Array,
-    given: tuple[Array, Array, Array], more: str,
+    tally: driver.Tally, names: tuple[str, str], given: Drawn, function: OfState, roots: Array,
+    rows: tuple[Array, Array, Array],
 ) -> None:  # fmt: skip
-    """Compare roots with the true values of the function at and between them."""
-    times, states, errors = given
+    """Compare roots with the function at and between them, at the true unknowns of `rows`."""
+    times, states, errors = rows
+    (name, more), values = names, function(states)
+    limits = margin(function, states, errors)
     tally.counts["roots"] += len(roots)
-    between = 0.5 * (roots[1:] + roots[:-1])
-    every = np.unique(np.concatenate([roots, between]))
-    at, near = states, errors
-    if len(every):
-        at = truth(every)
-        near = np.array([np.interp(every, times, each) for each in errors])
-        spread = 4.0 * np.spacing(np.abs(every)) * np.abs(np.gradient(states, times, axis=1)).max(axis=1)[:, None]
-        values, limits = function(at), margin(function, at, near + spread)
-        which = np.searchsorted(every, roots)
-        ratios = np.abs(values[which]) / limits[which]
-        for root, ratio in zip(roots, ratios, strict=True):
-            tally.judge(f"{kind}: root", float(ratio), 1.0, f", root {float(root)!r}{more}")
-        times, values = np.append(times, every), np.append(function(states), values)
-        limits = np.append(margin(function, states, errors), limits)
-    else:
-        values, limits = function(states), margin(function, states, errors)
-    is_clear = np.abs(values) > 2.0 * limits
-    order = np.argsort(times[is_clear])
-    clear, signs = times[is_clear][order], np.sign(values[is_clear][order])
+    if len(roots):
+        every = np.unique([*roots, *(0.5 * (roots[1:] + roots[:-1]))])
+        at = given.truth(every)
+        # Times are rounded.
+        rates = np.abs(np.diff(states, axis=1) / np.diff(times)).max(axis=1)
+        near = [np.interp(every, times, each) for each in errors]
+        near += 4.0 * np.spacing(np.abs(every)) * rates[:, None]
+        times, values = np.append(times, every), np.append(values, function(at))
+        limits = np.append(limits, margin(function, at, np.array(near)))
+        for k, root in enumerate(np.searchsorted(every, roots) - len(every)):
+            error = float(abs(values[root]))
+            tally.judge(name, error, float(limits[root]), f", t = {float(roots[k])!r} s{more}")
+    order = np.argsort(times)
+    order = order[np.abs(values[order]) > 2.0 * limits[order]]
+    clear, signs = times[order], np.sign(values[order])
     counts = np.diff(np.searchsorted(roots, clear))
     changes = signs[1:] != signs[:-1]
     for k in np.flatnonzero(changes & (counts % 2 == 0)):
-        tally.fault(f"{kind}: {counts[k]} roots from {float(clear[k])!r} to {float(clear[k + 1])!r} s{more}")
-    # A root without sign change is a touch, or one of a pair.
-    tally.counts["touches or pairs"] += int((~changes & (counts > 0)).sum())
-
-
-def margin(function: Callable[[Array], Array], states: Array, errors: Array) -> Array:
-    """Return the largest changes of a function by errors of the unknowns."""
-    values = function(states)
-    found = np.zeros_like(values)
-    for i in range(len(states)):
-        moved = states.copy()
-        moved[i] += errors[i]
-        found += np.abs(function(moved) - values)
-    return found + sys.float_info.min
+        ends = f"from {float(clear[k])!r} to {float(clear[k + 1])!r} s"
+        tally.fault(f"{name}: {counts[k]} roots {ends}, where the sign changes{more}")
+    # Pairs of roots, and extrema near 0.
+    tally.counts["roots without a change of the sign"] += int(counts[~changes].sum())
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -81,8 +81,8 @@ class Drawn:
         parts, zero = rates @ _WEIGHTS * half, int(np.searchsorted(edges, 0.0))
         before = -np.cumsum(parts[:, :zero][:, ::-1], axis=1)[:, ::-1]
         changes = [before, np.zeros((len(start), 1)), np.cumsum(parts[:, zero:], axis=1)]
-        found = start[:, None] + np.concatenate(changes, axis=1)
-        return np.asarray(found[:, np.searchsorted(edges, times)])
+        states = start[:, None] + np.concatenate(changes, axis=1)
+        return np.asarray(states[:, np.searchsorted(edges, times)])
 
 
 def polynomial(source: Random, length: float) -> OfTime:
@@ -160,7 +160,8 @@ def drawn(source: Random, seed: str, number: int) -> Drawn:
     kind = KINDS[number % len(KINDS)]
     if kind in ("axis", "axes", "own"):
         return timed(source, kind)
-    turning, methods = source.random() < 0.3, ("auto", "taylor")
+    turning = source.random() < 0.3
+    methods: tuple[str, ...] = ("auto", "taylor")
     if kind == "law":
         scene, end = draw_law(f"continuous {seed}", number).scene, source.uniform(-20.0, 20.0)
         methods += () if turning else ("gauss-4", "gauss-6")
@@ -268,10 +269,10 @@ def judge_roots(
         at = given.truth(every)
         # Times are rounded.
         rates = np.abs(np.diff(states, axis=1) / np.diff(times)).max(axis=1)
-        near = [np.interp(every, times, each) for each in errors]
+        near = np.array([np.interp(every, times, each) for each in errors])
         near += 4.0 * np.spacing(np.abs(every)) * rates[:, None]
         times, values = np.append(times, every), np.append(values, function(at))
-        limits = np.append(limits, margin(function, at, np.array(near)))
+        limits = np.append(limits, margin(function, at, near))
         for k, root in enumerate(np.searchsorted(every, roots) - len(every)):
             error = float(abs(values[root]))
             tally.judge(name, error, float(limits[root]), f", t = {float(roots[k])!r} s{more}")
@@ -280,7 +281,7 @@ def judge_roots(
     clear, signs = times[order], np.sign(values[order])
     counts = np.diff(np.searchsorted(roots, clear))
     changes = signs[1:] != signs[:-1]
-    for k in np.flatnonzero(changes & (counts % 2 == 0)):
+    for k in np.flatnonzero(changes & (counts % 2 == 0)).tolist():
         ends = f"from {float(clear[k])!r} to {float(clear[k + 1])!r} s"
         tally.fault(f"{name}: {counts[k]} roots {ends}, where the sign changes{more}")
     # Pairs of roots, and extrema near 0.

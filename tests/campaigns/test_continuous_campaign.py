@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import Scene
+from pyharness import Scene, solve
 from pyharness.model.dense_output import Pieces
 from tests.campaigns import continuous_campaign, driver
 from tests.campaigns.continuous_campaign import KINDS, MODULE, Drawn, drawn, main, try_scene
@@ -48,10 +48,10 @@ def test_polynomials_have_all_degrees() -> None:
 def test_a_wrong_result_is_reported(
     fault: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    right, solve = Pieces.__call__, continuous_campaign.solve
+    right = Pieces.__call__
 
     def wrong(*args: Any, **keywords: Any) -> Any:
-        found = solve(*args, **keywords)
+        found: Any = solve(*args, **keywords)
         for k, roots in enumerate(found.t_events or ()):
             roots = roots + 0.01 if fault == "root" else roots[:-1] if fault == "lost" else roots
             found.t_events[k] = np.append(roots, roots) if fault == "twice" else roots

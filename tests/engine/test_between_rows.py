@@ -39,7 +39,7 @@ def power(degree: int) -> Scene:
 @pytest.mark.parametrize("degree", [16, 17, 21, 25, 28, 30])
 def test_a_step_of_any_degree_is_read_between_its_ends(degree: int, tolerance: float) -> None:
     """Polynomials through 17 nodes leave out degrees above 16."""
-    ends = [-0.8, 1.0]
+    ends = (-0.8, 1.0)
     found = solve(power(degree), ends, tolerance=tolerance, attitude=True, dense_output=True)
     plain = solve(power(degree), ends, tolerance=tolerance, attitude=True)
     assert found.y.tolist() == plain.y.tolist()
@@ -114,7 +114,7 @@ def test_divided_steps_end_at_switches_and_breaks(torque: Any, exact: Any, side:
         times = np.sort(side * np.linspace(0.0, 1.0, 201))
         found = solve(scene, side, tolerance=1e-11, dense_output=True)
         wanted = 0.1 + exact(side * times)
-        assert np.abs(sol_of(found)(times)[2] - wanted).max() <= 1.2e-11
+        assert np.abs(sol_of(found)(times)[2] - wanted).max() <= 1e-11 * wanted.max() + 1e-15
 
 
 def _tent(t: Any) -> Any:
@@ -127,7 +127,7 @@ def _tent(t: Any) -> Any:
 @pytest.mark.parametrize("kind", ["time", "state", "clip"])
 def test_dense_output_under_an_opaque_torque_that_jumps(method: str, kind: str) -> None:
     """Omega1 rises by 1 rad/s2 from 0.3 s on, gradually or not; or half as fast from 0.5 rad/s."""
-    torques_and_rates = {
+    torques_and_omegas: dict[str, Any] = {
         "time": (lambda t, w: [1.0 if t > 0.3 else 0.0, 0.0, 0.0], lambda t: max(0.0, t - 0.3)),
         "state": (
             lambda t, w: [1.0 if w[0] < 0.5 else 0.5, 0.0, 0.0],
@@ -138,7 +138,7 @@ def test_dense_output_under_an_opaque_torque_that_jumps(method: str, kind: str) 
             lambda t: max(0.0, t - 0.35) if t > 0.4 else 5.0 * max(0.0, t - 0.3) ** 2,
         ),
     }
-    function, exact = torques_and_rates[kind]
+    function, exact = torques_and_omegas[kind]
     scene = Scene("s", (0.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=opaque(function))
     found = solve(scene, 2.0, method, 1e-6, dense_output=True)
     times = np.linspace(0.0, 2.0, 201)

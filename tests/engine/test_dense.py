@@ -328,23 +328,3 @@ def test_steps_are_those_of_the_integration_and_have_its_rows(
     assert pytest.approx(found.omega, rel=0.0, abs=2e-13) == rows[:3].T
     if found.attitude is not None:
         assert pytest.approx(found.attitude, rel=0.0, abs=2e-13) == rows[3:].T
-
-
-@pytest.mark.parametrize("end", [4.0, -1.5])
-def test_an_opaque_torque_is_solved_once_for_rows_events_and_dense_output(end: float) -> None:
-    calls = 0
-
-    def brake(time: float, omega: Any) -> Any:
-        nonlocal calls
-        calls += 1
-        push = math.sin(3.0 * time)
-        return [min(0.5, max(-0.5, push - 0.8 * w)) for w in omega.tolist()]
-
-    scene = Scene("brake", (1.0, 0.2, -0.7), moments=(1.0, 2.0, 2.5), torque=opaque(brake))
-    found = solve(scene, end, tolerance=1e-4, dense_output=True, events=lambda t, w: w[2])
-    assert calls <= found.evaluations + 2
-    times = np.linspace(0.0, end, 101)[1:]
-    truth = solve(scene, times, "dop853", 1e-6)
-    assert largest_error(sol_of(found), truth) <= 1e-4
-    assert found.t_events is not None
-    assert len(found.t_events[0]) == np.sum(np.diff(np.sign(truth.omega[:, 2])) != 0.0)

@@ -37,6 +37,7 @@ module problem
     real(dp), pointer, contiguous :: tolerances(:) !! allowed errors of the unknowns in the step
     !! whether a step ends a few rounding errors beyond a switch, or beyond a break before t_end
     logical :: is_beyond = .false.
+    logical :: may_be_long = .true. !! whether a step needs no series where none converges
   end type step_request_t
 
   type, public :: step_t

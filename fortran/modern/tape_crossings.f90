@@ -13,7 +13,7 @@ module tape_crossings
   real(dp), parameter :: TOGETHER = 2.0_dp**(-50) ! relative difference of roots that count as one
   integer, parameter :: MOST_CUTS = 100
 
-  public :: next_crossing, resolve_switches
+  public :: before_crossings, next_crossing, resolve_switches
 
 contains
 
@@ -47,6 +47,29 @@ contains
       end do
     end do
   end subroutine resolve_switches
+
+  logical function before_crossings(switches, s, factor)
+    !! Return whether an operand whose terms are finite crosses a level after the beginning of a
+    !! step, and shorten the step to the first crossing.
+    type(switches_t), intent(in) :: switches
+    type(series_t), intent(in) :: s
+    real(dp), intent(inout) :: factor
+    real(dp) :: terms(0:LAST_TERM), root, touch
+    integer :: i, level
+
+    before_crossings = .false.
+    do i = 1, switches%n
+      if (.not. switches%is_live(i)) cycle
+      do level = LOWER, UPPER
+        terms = terms_from(i, level, switches, s)
+        if (terms(0) == 0.0_dp .or. .not. switches%is_floor(i) .and. level == UPPER) cycle
+        call first_root(sign(1.0_dp, terms(0))*terms, s%order - 1, factor, 0.0_dp, root, touch)
+        if (.not. root < factor) cycle
+        factor = root
+        before_crossings = .true.
+      end do
+    end do
+  end function before_crossings
 
   pure subroutine next_crossing(nearly, switches, s, factor, verdict)
     !! Find the first level that an operand crosses in a step, and shorten the step to it.

@@ -31,7 +31,7 @@ module tape_error
   end type error_t
 
   public :: add_noise, begin_block, begin_error, cross_error, estimate_truncation, fitting_lanes, &
-            matrix_of, perturb, set_lanes, take_error
+            keep_lanes, matrix_of, perturb, set_lanes, take_change, take_error
 
 contains
 
@@ -232,6 +232,33 @@ contains
     end if
     e%lanes(1, :x%n, 1) = e%lanes(1, :x%n, 1) - e%left
   end subroutine take_error
+
+  subroutine keep_lanes(e)
+    !! Let the error and the perturbations be constant in a step.
+    type(error_t), intent(inout) :: e
+
+    e%last_terms(:e%n_blocks) = 0
+    e%left = 0.0_dp
+  end subroutine keep_lanes
+
+  subroutine take_change(derivatives, e)
+    !! Advance the error and the perturbations by the derivatives of the change of the unknowns.
+    real(dp), intent(in) :: derivatives(:, :) !! element (i, j) is that of change i by unknown j
+    type(error_t), intent(inout) :: e
+    real(dp) :: changes(SIDE_BY_SIDE, size(e%left))
+    integer :: block, i, j, n
+
+    n = size(e%left)
+    do block = 1, e%n_blocks
+      changes = 0.0_dp
+      do j = 1, n
+        do i = 1, n
+          changes(:, i) = changes(:, i) + derivatives(i, j)*e%lanes(:, j, block)
+        end do
+      end do
+      e%lanes(:, :n, block) = e%lanes(:, :n, block) + changes
+    end do
+  end subroutine take_change
 
   subroutine cross_error(gradient, slope, jump, e)
     !! Change the error and the perturbations where the rates jump. A perturbation changes the time

@@ -4,21 +4,23 @@ module tape_march
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
   use problem, only: request_t, solution_t
-  use statuses, only: COMPLETE, OVERFLOW, SLIDING
+  use statuses, only: COMPLETE, OVERFLOW, SLIDING, STALLED
   use step_limit, only: check_steps, limit_of, step_limit_t
-  use tape, only: next_break, tape_t
+  use tape, only: FIRST_UNKNOWN, next_break, tape_t
   use tape_crossings, only: CROSSES, IS_CHANGED, next_crossing, resolve_switches, SLIDES, STAYS
   use tape_error, only: add_noise, begin_block, begin_error, cross_error, error_t, &
-                        estimate_truncation, fitting_lanes, matrix_of, perturb, set_lanes, &
-                        take_error
+                        estimate_truncation, fitting_lanes, keep_lanes, matrix_of, perturb, &
+                        set_lanes, take_change, take_error
   use tape_growth, only: begin, close_block, count_step, find_growth, transitions_t
   use tape_live, only: keep_live, settle
   use tape_plan, only: converge, fitting, LEAST_LOCAL_TOLERANCE, local_tolerance_of, &
                        MOST_TRIES, order_for
+  use tape_runge_kutta, only: guess_sizes, has_singular_points, is_near_singular, long_step_t, &
+                              LONGER_THAN_SERIES, longest_without_terms, step_over
   use tape_rows, only: add_nodes, add_row, add_rows, evaluate
   use tape_series, only: derivatives_at, expand, noise_of, PADDED, series_t, slot_gradient, &
                          sum_terms
-  use tape_state, only: begin_state, keep_guesses, LEAST_OWN, LEAST_SCALE, reach, &
+  use tape_state, only: begin_state, keep_guesses, keep_sizes, LEAST_OWN, LEAST_SCALE, reach, &
                         set_first_terms, state_t, weigh
   use tape_steady, only: find_varying, near_zero, resolving
   use tape_switches, only: follow, jump_at, operand_error, switches_t
@@ -41,6 +43,14 @@ module tape_march
   ! Relative distance from a switch that an error may bridge; at least, of rounding errors.
   real(dp), parameter :: NEAR = 1e-13_dp, MOST_NEAR = 1e-5_dp
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53) ! unit of rounding errors
+  integer, parameter :: MOST_GUESSES = 3    ! of the omega that a body at rest reaches, by series
+  ! Longest step near a singular point, over the longest step so far, instead of which a longer one
+  ! is tried; least part after a failure; and part of it that is expected for most of the time.
+  real(dp), parameter :: OF_LONG_STEP = 0.03_dp ! part of the local tolerance, because its sign is unknown
+  real(dp), parameter :: NEARLY_AS_LONG = 0.5_dp, LEAST_PART = 1e-4_dp
+  real(dp), parameter :: LEAST_EXPECTED_PART = 1.0_dp/16.0_dp
+  ! Largest omega over the first, unless omega becomes infinite.
+  real(dp), parameter :: UNBOUNDED = 1e6_dp
   real(dp), parameter :: LARGEST_JUMP = 1e100_dp ! whose square is finite
 
   ! One integration of a request.
@@ -101,6 +111,14 @@ contains
     real(dp) :: rates(tape%n_unknowns)        ! at the end of the step
     real(dp) :: whole_step                    ! s: h without switches
     real(dp) :: nearly                        ! relative distance from a switch: a touch
+    logical :: has_singular ! whether an operation has a point without a Taylor series
+    logical :: is_long                        ! whether the step is not one of the series
+    type(long_step_t) :: long_step
+    real(dp) :: next_try    ! step of a series from which on a longer step is tried, s
+    logical :: was_singular ! whether the last step began where no series converges
+    real(dp) :: long_error                    ! of the longer step that was tried, relative
+    real(dp) :: longest, least_expected       ! step so far, and step for most of the time, s
+    real(dp) :: first_scale                   ! of the first step
     integer :: i, n_before, order, tries
     integer :: varying(tape%n_slots), n_varying ! slots of `find_varying`
     integer :: verdict                        ! of `next_crossing`
@@ -133,7 +151,13 @@ contains
     has_values = .false.
     has_guess = .false.
     from_rest = .not. x%scale >= LEAST_SCALE
-    do
+    has_singular = has_singular_points(tape)
+    next_try = huge(next_try)
+    was_singular = .false.
+    longest = 0.0_dp
+    least_expected = 0.0_dp
+    first_scale = huge(first_scale)
+    integration: do
       call set_first_terms(x, s)
       if (switches%n > 0) call keep_live(tape, switches, s, live)
       call expand(live, x%t(2), has_values, s)
@@ -141,99 +165,102 @@ contains
       break_time = next_break(tape, x%t(1), t_end)
       to_stop = (break_time - x%t(1)) - x%t(2)
       call reach(from_rest, to_stop, s, x)
-      call weigh(t_end, to_stop, s, x)
-      factor = longest_step()
-      if (.not. factor > 0.0_dp) then
-        call shorten()
-        if (solution%status /= COMPLETE) exit
-        cycle
-      end if
-      if ((found%steps == 0 .or. from_rest .or. x%diverges) .and. tries < MOST_TRIES) then
-        ! The omega that a body at rest is about to reach is a guess too, and so is the size of an
-        ! own state, whose series may diverge.
-        if (factor < merge(GUESSED, merge(SHORTER, MUCH_SHORTER, from_rest), x%diverges)) then
+      call weigh(t_end, to_stop, s, x, (ROUNDING/request%tolerance)*sqrt(e%noise))
+      is_long = .false.
+      find_step: block
+        factor = longest_step()
+        if (.not. factor > 0.0_dp) then
+          if (has_singular .and. (tries > 0 .or. was_singular)) call step_from_singular()
+          if (is_long) exit find_step
+          call shorten()
+          if (solution%status /= COMPLETE) exit integration
+          cycle integration
+        end if
+        if ((found%steps == 0 .or. from_rest .or. x%diverges) .and. tries < MOST_TRIES) then
+          ! The omega that a body at rest is about to reach is a guess too, and so is the size of an
+          ! own state, whose series may diverge.
+          if (factor < merge(GUESSED, merge(SHORTER, MUCH_SHORTER, from_rest), x%diverges)) then
+            call guess_again()
+            cycle integration
+          end if
+          if (.not. has_guess) then
+            has_guess = .true.
+            local_tolerance = share_of(t_end/(factor*s%h))
+            found%finest = local_tolerance <= LEAST_LOCAL_TOLERANCE
+            order = order_for(local_tolerance, s%powers, of_steps=.false.)
+            is_low = order > s%order
+            s%order = order
+            if (is_low .or. from_rest) cycle integration
+            factor = longest_step()
+          end if
+        end if
+        if (is_rejected) factor = min(1.0_dp, factor)
+        factor = to_end(factor)
+        call set_lanes(x, e, s)
+        call perturb(x, s, found%steps, rest, factor, e)
+        ! Perturbations may change faster than the motion, as about a steady rotation.
+        if (e%is_short) then
+          shortened = fitting_lanes(x, s, e, factor)
+          factor = factor*shortened
+          if (is_resolved .and. shortened < MUCH_LESS) then
+            ! The polynomials of the Jacobian are those of a much longer step.
+            call perturb(x, s, found%steps, rest, factor, e)
+            if (e%is_short) factor = factor*fitting_lanes(x, s, e, factor)
+          end if
+        end if
+        call converge(live, s%order, smallest_size(), s%a, s%powers, factor)
+        if (x%is_reaching .and. factor < GUESSED .and. factor > 0.0_dp .and. tries < MOST_TRIES) then
+          ! The guess of the scale is that of a longer step.
+          call guess_again()
+          cycle integration
+        end if
+        if (switches%n > 0) call resolve_switches(nearly, switches, s, factor)
+        if (.not. factor > 0.0_dp) then
+          call shorten()
+          if (solution%status /= COMPLETE) exit integration
+          cycle integration
+        end if
+        if (has_singular .and. abs(factor*s%h) <= min(next_try, NEARLY_AS_LONG*longest)) then
+          if (is_near_singular(live, s%order, s%a, factor)) call step_beyond_singular()
+          if (is_long) exit find_step
+        end if
+        arrives = abs(factor*s%h) >= abs(to_stop)*(1.0_dp - epsilon(s%h))
+        call set_end()
+        if (switches%n > 0) then
+          whole_step = factor*s%h
+          call next_crossing(nearly, switches, s, factor, verdict)
+          if (verdict == SLIDES) then
+            found%switches_at = x%t(1)
+            found%switch = switches%sliding
+            solution%status = SLIDING
+            exit integration
+          end if
+          if (verdict == IS_CHANGED) then
+            tries = tries + 1
+            if (tries <= MOST_TRIES) cycle integration
+            solution%status = STALLED
+            exit integration
+          end if
+          if (verdict == CROSSES) call end_at_switch()
+        end if
+        call noise_of(s, noise)
+        if (.not. is_continued_to_switch()) then
+          is_rejected = .true.
           tries = tries + 1
-          s%h = factor*s%h
-          cycle
+          if (tries > MOST_TRIES) then
+            solution%status = STALLED
+            exit integration
+          end if
+          ! In a shorter step a guess would be smaller, and rounding errors relatively larger.
+          if (x%is_guessed) call keep_guesses(x)
+          s%h = 0.5_dp*factor*s%h
+          cycle integration
         end if
-        if (.not. has_guess) then
-          has_guess = .true.
-          local_tolerance = share_of(t_end/(factor*s%h))
-          found%finest = local_tolerance <= LEAST_LOCAL_TOLERANCE
-          order = order_for(local_tolerance, s%powers, of_steps=.false.)
-          is_low = order > s%order
-          s%order = order
-          if (is_low .or. from_rest) cycle
-          factor = longest_step()
-        end if
-      end if
-      if (is_rejected) factor = min(1.0_dp, factor)
-      factor = to_end(factor)
-      call set_lanes(x, e, s)
-      call perturb(x, s, found%steps, rest, factor, e)
-      ! Perturbations may change faster than the motion, as about a steady rotation.
-      if (e%is_short) then
-        shortened = fitting_lanes(x, s, e, factor)
-        factor = factor*shortened
-        if (is_resolved .and. shortened < MUCH_LESS) then
-          ! The polynomials of the Jacobian are those of a much longer step.
-          call perturb(x, s, found%steps, rest, factor, e)
-          if (e%is_short) factor = factor*fitting_lanes(x, s, e, factor)
-        end if
-      end if
-      call converge(live, s%order, max(x%scale, LEAST_SCALE), s%a, s%powers, factor)
-      if (x%is_reaching .and. factor < GUESSED .and. factor > 0.0_dp .and. tries < MOST_TRIES) then
-        ! The guess of the scale is that of a longer step.
-        tries = tries + 1
-        s%h = factor*s%h
-        cycle
-      end if
-      if (switches%n > 0) call resolve_switches(nearly, switches, s, factor)
-      if (.not. factor > 0.0_dp) then
-        call shorten()
-        if (solution%status /= COMPLETE) exit
-        cycle
-      end if
-      arrives = abs(factor*s%h) >= abs(to_stop)*(1.0_dp - epsilon(s%h))
-      if (arrives) factor = to_stop/s%h
-      at_end = arrives .and. .not. abs(break_time) < abs(t_end)
-      if (arrives) then
-        t_next = [break_time, 0.0_dp]
-      else
-        call two_sum(x%t(1), factor*s%h + x%t(2), t_next(1), t_next(2))
-      end if
-      if (switches%n > 0) then
-        whole_step = factor*s%h
-        call next_crossing(nearly, switches, s, factor, verdict)
-        if (verdict == SLIDES) then
-          found%switches_at = x%t(1)
-          found%switch = switches%sliding
-          solution%status = SLIDING
-          exit
-        end if
-        if (verdict == IS_CHANGED) then
-          tries = tries + 1
-          if (tries <= MOST_TRIES) cycle
-          solution%status = OVERFLOW
-          exit
-        end if
-        if (verdict == CROSSES) call end_at_switch()
-      end if
-      call noise_of(s, noise)
-      if (.not. is_continued_to_switch()) then
-        is_rejected = .true.
-        tries = tries + 1
-        if (tries > MOST_TRIES) then
-          solution%status = OVERFLOW
-          exit
-        end if
-        ! In a shorter step a guess would be smaller, and rounding errors relatively larger.
-        if (x%is_guessed) call keep_guesses(x)
-        s%h = 0.5_dp*factor*s%h
-        cycle
-      end if
+        was_singular = .false.
+      end block find_step
       tries = 0
       is_rejected = .false.
+      if (found%steps == 0) first_scale = x%scale
       n_before = solution%n_rows
       call add_rows(x, s, e, factor, request, size(request%times) - merge(1, 0, at_end), solution, &
                     found%error)
@@ -242,14 +269,28 @@ contains
         call add_nodes(x, s, e, factor, change(:x%n), t_next(1), request%tolerance, solution, &
                        found%error)
       end if
-      call add_noise((noise*factor*s%h)**2, e)
+      if (is_long) then
+        call add_noise((long_step%error(:x%n)/ROUNDING)**2, e)
+      else
+        call add_noise((noise*factor*s%h)**2, e)
+      end if
       is_compared = .false.
-      if (switches%n > 0) call check_touches()
+      if (switches%n > 0 .and. .not. is_long) call check_touches()
       do i = 1, x%n
         call two_sum((x%y(i)), change(i) + x%y_low(i), x%y(i), x%y_low(i))
       end do
-      call take_error(x, s, factor, e)
-      if (switches%n > 0) call cross()
+      if (is_long) then
+        call take_change(long_step%derivatives, e)
+        if (long_step%slides > 0) then
+          found%switches_at = x%t(1)
+          found%switch = long_step%slides
+          solution%status = SLIDING
+          exit
+        end if
+      else
+        call take_error(x, s, factor, e)
+        if (switches%n > 0) call cross()
+      end if
       found%steps = found%steps + 1
       if (.not. maxval(abs(x%y)) <= huge(s%h)) then
         solution%status = OVERFLOW
@@ -265,7 +306,7 @@ contains
       end if
       ! The steps shrink to nothing before a singularity.
       if (abs(factor*s%h) <= spacing(x%t(1)) .and. .not. arrives .and. verdict /= CROSSES) then
-        solution%status = OVERFLOW
+        solution%status = merge(STALLED, OVERFLOW, x%scale <= UNBOUNDED*first_scale)
         exit
       end if
       call count_step(solution%n_rows > n_before, transitions, is_full)
@@ -274,17 +315,19 @@ contains
         call begin_block(e)
       end if
       x%t = t_next
-      has_values = size(tape%table_starts) == 1 .and. verdict == STAYS .and. .not. is_compared
+      has_values = size(tape%table_starts) == 1 .and. verdict == STAYS &
+                   .and. .not. (is_compared .or. is_long)
       from_rest = .not. x%scale >= LEAST_SCALE
       rest = (t_end - x%t(1)) - x%t(2)
       s%h = factor*s%h
+      longest = max(longest, abs(s%h))
       if (verdict == CROSSES) s%h = whole_step
       if (abs(s%h) > abs(rest)) s%h = rest
       if (has_guess) call share_tolerance()
-      call check_steps(found%steps, x%t(1), rest, arrives .or. verdict == CROSSES, limit, &
-                       found%ahead, solution%status)
+      call check_steps(found%steps, x%t(1), rest, arrives .or. verdict == CROSSES .or. is_long, &
+                       limit, found%ahead, solution%status)
       if (solution%status /= COMPLETE) exit
-    end do
+    end do integration
     call weigh(t_end, to_stop, s, x)
     where (x%weights > 0.0_dp)
       sizes = 1.0_dp/x%weights
@@ -327,17 +370,115 @@ contains
       !! Divide the tolerance anew, because the steps may become shorter or longer.
       real(dp) :: share
 
-      share = share_of(real(found%steps, dp) + rest/s%h)
+      ! Steps near a singular point are short for a while only.
+      share = share_of(real(found%steps, dp) + abs(rest)/max(abs(s%h), least_expected))
       if (share < MUCH_LESS*local_tolerance .or. MUCH_LESS*share > local_tolerance) then
         s%order = order_for(share, s%powers, of_steps=.false.)
       end if
       local_tolerance = share
     end subroutine share_tolerance
 
+    subroutine step_from_singular()
+      !! Begin with a longer step than the series allows, where its terms are not finite.
+      real(dp) :: first
+
+      first = longest_without_terms(live, s%order, x%t(1), switches, s)
+      if (abs(first) > abs(to_stop)) first = to_stop
+      call take_long_step(first, 0.0_dp)
+      was_singular = is_long
+    end subroutine step_from_singular
+
+    subroutine step_beyond_singular()
+      !! Take a longer step than the series allows, whose steps become shorter.
+      real(dp) :: h
+
+      h = factor*s%h
+      call take_long_step(sign(min(abs(to_stop), LONGER_THAN_SERIES*abs(h)), h), abs(h))
+      if (is_long) then
+        next_try = huge(next_try)
+      else
+        next_try = abs(h)*max(LEAST_PART, sqrt(min(1.0_dp, OF_LONG_STEP*local_tolerance/long_error)))
+      end if
+    end subroutine step_beyond_singular
+
+    subroutine take_long_step(first, least)
+      !! Take a step that needs no series, if it is accurate enough.
+      real(dp), intent(in) :: first !! s, the longest that is tried
+      real(dp), intent(in) :: least !! length of the shortest, s
+
+      least_expected = max(longest, abs(first))*LEAST_EXPECTED_PART
+      call guess_unknown_sizes(first)
+      if (.not. has_guess) then
+        has_guess = .true.
+        local_tolerance = share_of(abs(t_end)/least_expected)
+        s%order = order_for(local_tolerance, s%powers, of_steps=.false.)
+      end if
+      call step_over(tape, x%t, x%y + x%y_low, first, least, x%weights, &
+                     max(OF_LONG_STEP*local_tolerance, 8.0_dp*ROUNDING), .true., switches, s, live, long_step, &
+                     long_error)
+      is_long = long_step%h /= 0.0_dp
+      if (.not. is_long) return
+      s%h = long_step%h
+      factor = 1.0_dp
+      verdict = STAYS
+      change(:x%n) = long_step%change(:x%n)
+      s%a(1:, FIRST_UNKNOWN:FIRST_UNKNOWN - 1 + x%n) = 0.0_dp
+      s%a(1:4, FIRST_UNKNOWN:FIRST_UNKNOWN - 1 + x%n) = long_step%terms(:, :x%n)
+      call set_lanes(x, e, s)
+      call keep_lanes(e)
+      ! The length was rounded.
+      arrives = abs(to_stop - s%h) <= 2.0_dp*spacing(break_time)
+      call set_end()
+    end subroutine take_long_step
+
+    subroutine guess_unknown_sizes(first)
+      !! Guess the sizes of unknowns that begin at 0.
+      real(dp), intent(in) :: first !! s
+      real(dp) :: reached(x%n)
+
+      if (.not. from_rest .and. all(x%own_sizes(x%first_own:) > 0.0_dp)) return
+      call guess_sizes(tape, x%t, x%y, first, switches, s, live, reached)
+      call keep_sizes(reached, from_rest, x)
+      from_rest = .not. x%scale >= LEAST_SCALE
+      call weigh(t_end, to_stop, s, x)
+    end subroutine guess_unknown_sizes
+
+    subroutine guess_again()
+      !! Try a shorter step, from whose series the sizes of unknowns that begin at 0 are guessed. From
+      !! rest under a high power, the guesses would shrink with the steps: they need no series.
+      real(dp) :: reached(x%n)
+
+      tries = tries + 1
+      s%h = factor*s%h
+      if (tries /= MOST_GUESSES .or. .not. (from_rest .or. x%is_guessed)) return
+      call guess_sizes(tape, x%t, x%y, to_stop, switches, s, live, reached)
+      call keep_sizes(reached, from_rest, x)
+      from_rest = .not. x%scale >= LEAST_SCALE
+    end subroutine guess_again
+
+    pure real(dp) function smallest_size()
+      !! Return the size of the smallest unknown that matters to powers.
+      smallest_size = x%scale
+      if (x%scale >= LEAST_SCALE) return
+      smallest_size = LEAST_SCALE
+      if (any(x%weights > 0.0_dp)) smallest_size = max(LEAST_SCALE, 1.0_dp/maxval(x%weights))
+    end function smallest_size
+
+    subroutine set_end()
+      !! Set the end of the step, and whether it is the last.
+      at_end = arrives .and. .not. abs(break_time) < abs(t_end)
+      if (arrives) then
+        factor = to_stop/s%h
+        t_next = [break_time, 0.0_dp]
+      else
+        call two_sum(x%t(1), factor*s%h + x%t(2), t_next(1), t_next(2))
+      end if
+    end subroutine set_end
+
     subroutine shorten()
       !! Try a shorter step, because the terms are not finite.
       tries = tries + 1
-      if (tries > MOST_TRIES) solution%status = OVERFLOW
+      if (tries > MOST_TRIES) solution%status = STALLED
       s%a(1:, :) = 0.0_dp
       s%h = 0.0625_dp*s%h
     end subroutine shorten
@@ -389,13 +530,7 @@ contains
     subroutine end_at_switch()
       !! Let the step end where a switch changes, or with the breakpoint that is there.
       arrives = abs(factor*s%h) >= abs(to_stop)*(1.0_dp - 4.0_dp*epsilon(factor))
-      at_end = arrives .and. .not. abs(break_time) < abs(t_end)
-      if (arrives) then
-        factor = to_stop/s%h
-        t_next = [break_time, 0.0_dp]
-      else
-        call two_sum(x%t(1), factor*s%h + x%t(2), t_next(1), t_next(2))
-      end if
+      call set_end()
     end subroutine end_at_switch
 
     logical function is_continued_to_switch()

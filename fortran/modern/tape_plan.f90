@@ -53,7 +53,7 @@ contains
     end do
   end function fitting
 
-  subroutine converge(tape, order, smallest, a, powers, factor)
+  subroutine converge(tape, order, smallest, a, powers, factor, is_singular)
     !! Reduce the factor on the step so that the series of every operation converges. The last terms
     !! of the unknowns alone do not show it: an exponential may be so small at the beginning of a
     !! step that it changes no digit, and large a little later. Its argument therefore changes by at
@@ -67,10 +67,11 @@ contains
     real(dp), intent(in) :: a(0:LAST_TERM, tape%n_slots)
     type(powers_t), intent(inout) :: powers
     real(dp), intent(inout) :: factor
+    logical, intent(in), optional :: is_singular !! whether a zero is at the beginning of the step
     real(dp) :: most
     integer :: n
 
-    call resolve(tape, order, smallest, a, powers, factor)
+    if (.not. present(is_singular)) call resolve(tape, order, smallest, a, powers, factor)
     do n = 1, tape%n_operations
       associate (first => tape%operations(2, n), second => tape%operations(3, n))
         select case (tape%operations(1, n))
@@ -85,8 +86,10 @@ contains
           ! The derivative decreases as exp(-2 abs(x)).
           factor = limited(first, max(0.25_dp*order, abs(a(0, first)) - 0.5_dp*INVISIBLE), factor)
         case (QUOTIENT)
+          if (present(is_singular)) cycle
           factor = limited(second, WITHIN_CIRCLE*abs(a(0, second)), factor)
         case (SQUARE_ROOT)
+          if (present(is_singular)) cycle
           factor = limited(first, WITHIN_CIRCLE*a(0, first), factor)
         case default
           cycle

@@ -5,7 +5,7 @@ module tape_solve
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
   use problem, only: request_t, solution_t
-  use statuses, only: COMPLETE, GAVE_UP, SENSITIVE, SLIDING
+  use statuses, only: COMPLETE, GAVE_UP, SENSITIVE, SLIDING, STALLED
   use tape, only: COARSEST, FIRST_UNKNOWN, tape_t
   use tape_march, only: attempt_t, march, outcome_t
   use tape_series, only: allocate_series, series_t, SIDE_BY_SIDE
@@ -23,6 +23,7 @@ module tape_solve
   real(dp), parameter :: DOUBTED = 256.0_dp ! amplification that halves the trust in an estimate
   real(dp), parameter :: PLANNED_GROWTH = 2e3_dp
   real(dp), parameter :: SAFETY = 10.0_dp
+  real(dp), parameter :: FINER = 1e-3_dp  ! factor on the tolerance where no step was short enough
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
   ! The pair of poles that is fitted to the last terms may be that of a part of the motion.
   real(dp), parameter :: FITTED = 2.5_dp
@@ -36,7 +37,7 @@ contains
 
   subroutine solve_tape(tape_at, request_at, solution_at) bind(c, name="solve_tape_level")
     !! Compute the solution at the requested times, which have one sign and are ordered away from 0.
-    !! The status is COMPLETE, OVERFLOW, GAVE_UP, INTERRUPTED or SENSITIVE.
+    !! The status is COMPLETE, OVERFLOW, STALLED, GAVE_UP, INTERRUPTED, SENSITIVE or SLIDING.
     ! Addresses of a tape_t, a request_t and a solution_t, passed through C.
     type(c_ptr), intent(in), value :: tape_at, request_at, solution_at
     type(tape_t), pointer :: given
@@ -93,6 +94,11 @@ contains
       call march(tape, request, attitude, attempt, s, switches, solution, outcome)
       spent = spent + real(outcome%steps, dp)
       if (.not. outcome%error <= NO_DIGIT) outcome%error = NO_DIGIT
+      if (solution%status == STALLED .and. attempt%tolerance > FINER*request%tolerance) then
+        ! With a finer local tolerance the step may end before it becomes too long.
+        attempt%tolerance = FINER*attempt%tolerance
+        cycle
+      end if
       if (solution%status /= COMPLETE .or. outcome%finest) exit
       again = outcome%growth > planned
       ! Where perturbations grow, a few steps cause most of the error; their estimates may be wrong

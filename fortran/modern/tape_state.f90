@@ -30,7 +30,7 @@ module tape_state
     logical :: diverges            ! whether the known terms of a guess do
   end type state_t
 
-  public :: begin_state, keep_guesses, reach, rotate, set_first_terms, weigh
+  public :: begin_state, keep_guesses, keep_sizes, reach, rotate, set_first_terms, weigh
 
 contains
 
@@ -92,13 +92,14 @@ contains
     end do
   end subroutine reach
 
-  subroutine weigh(t_end, to_stop, s, x)
+  subroutine weigh(t_end, to_stop, s, x, least)
     !! Make errors of omega relative to the scale, errors of the quaternion angles, and errors of
     !! own states relative to their sizes, or to the sizes that they are about to reach.
     real(dp), intent(in) :: t_end
     real(dp), intent(in) :: to_stop !! time to the next breakpoint, s
     type(series_t), intent(in) :: s
     type(state_t), intent(inout) :: x
+    real(dp), intent(in), optional :: least(:) !! sizes that are not rounding errors
     real(dp) :: own_size
     integer :: i
 
@@ -116,6 +117,7 @@ contains
         x%is_guessed = x%is_guessed .or. own_size > 0.0_dp
         x%diverges = x%diverges .or. has_large_terms(s, to_stop, i, i, own_size)
       end if
+      if (present(least) .and. own_size > 0.0_dp) own_size = max(own_size, least(i))
       x%weights(i) = 0.0_dp
       if (own_size > 0.0_dp) x%weights(i) = 1.0_dp/max(own_size, LEAST_OWN)
     end do
@@ -130,6 +132,19 @@ contains
       if (x%weights(i) > 0.0_dp) x%own_sizes(i) = max(x%own_sizes(i), 1.0_dp/x%weights(i))
     end do
   end subroutine keep_guesses
+
+  subroutine keep_sizes(sizes, from_rest, x)
+    !! Set the scale from rest, and the unknown sizes of own states.
+    real(dp), intent(in) :: sizes(:) !! of all unknowns
+    logical, intent(in) :: from_rest
+    type(state_t), intent(inout) :: x
+    integer :: i
+
+    if (from_rest) x%scale = maxval(sizes(:3))
+    do i = x%first_own, x%n
+      if (.not. x%own_sizes(i) > 0.0_dp) x%own_sizes(i) = sizes(i)
+    end do
+  end subroutine keep_sizes
 
   pure real(dp) function largest_terms(s, to_stop, first, last, first_term, last_term)
     !! Return the largest of some terms of unknowns for a step that ends at the next breakpoint.

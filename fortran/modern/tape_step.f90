@@ -9,6 +9,8 @@ module tape_step
   use tape_live, only: keep_live, settle
   use tape_plan, only: converge, fitting, LONGER, MOST_TRIES, order_for
   use tape_roots, only: size_of
+  use tape_runge_kutta, only: has_singular_points, is_near_singular, long_step_t, &
+                              LONGER_THAN_SERIES, longest_without_terms, step_over
   use tape_series, only: allocate_series, derivatives_at, expand, noise_of, series_t
   use tape_switches, only: change, find_switches, operand_error, switches_t, update
   implicit none(type, external)
@@ -66,6 +68,8 @@ contains
     integer :: failed, i, verdict
     logical :: is_rejected ! whether a longer step was rejected
     logical :: is_settled, is_moved ! results of the switches
+    logical :: is_allowed  ! whether a step may be longer than that of a series
+    type(long_step_t) :: long_step
 
     step%status = OVERFLOW
     step%expansions = 0
@@ -77,6 +81,7 @@ contains
     step%stop = next_break(tape, request%t, request%t_end)
     longest = step%stop - request%t
     s%h = sign(min(request%trial, abs(longest)), longest)
+    is_allowed = request%may_be_long .and. has_singular_points(tape)
     is_rejected = .false.
     is_settled = .false.
     verdict = STAYS
@@ -103,12 +108,22 @@ contains
       factor = fitting(tape, s%order, LOCAL_TOLERANCE, 1.0_dp/tolerances, s%a)
       if (.not. factor > 0.0_dp) then
         ! The terms are not finite.
+        if (is_allowed) then
+          call take_long_step(longest_without_terms(live, s%order, request%t, switches, s), 0.0_dp)
+          if (step%status /= OVERFLOW) return
+        end if
         s%h = 0.0625_dp*s%h
         cycle
       end if
       if (is_rejected) factor = min(1.0_dp, factor)
       factor = min(factor, longest/s%h)
       call converge(live, s%order, minval(tolerances), s%a, s%powers, factor)
+      if (is_allowed .and. factor > 0.0_dp) then
+        if (is_near_singular(live, s%order, s%a, factor)) then
+          call take_long_step(LONGER_THAN_SERIES*factor*s%h, abs(factor*s%h))
+          if (step%status /= OVERFLOW) return
+        end if
+      end if
       if (switches%n > 0) then
         if (.not. (is_rejected .or. factor < LONGER) .and. step%expansions < MOST_LONGER) then
           ! The last step may have ended at a switch. In so short a step a state that is on a level,
@@ -148,10 +163,7 @@ contains
       if (step%is_switched .and. request%is_beyond) call end_after(step_beyond())
       call set_terms()
       if (is_continued()) then
-        step%status = COMPLETE
-        if (request%is_beyond .and. step%t == step%stop .and. step%stop /= request%t_end) then
-          call end_beyond()
-        end if
+        call complete_step()
         return
       end if
       s%h = 0.5_dp*step%h
@@ -159,6 +171,35 @@ contains
     end do
 
   contains
+
+    subroutine complete_step()
+      step%status = COMPLETE
+      if (request%is_beyond .and. step%t == step%stop .and. step%stop /= request%t_end) then
+        call end_beyond()
+      end if
+    end subroutine complete_step
+
+    subroutine take_long_step(first, least)
+      !! Take a step that needs no series, if it is accurate enough.
+      real(dp), intent(in) :: first !! s, the longest that is tried
+      real(dp), intent(in) :: least !! length of the shortest, s
+      real(dp) :: error
+
+      call step_over(tape, [request%t, 0.0_dp], request%state, &
+                     sign(min(abs(first), abs(longest)), longest), least, 1.0_dp/tolerances, &
+                     LOCAL_TOLERANCE, .false., switches, s, live, long_step, error)
+      if (.not. abs(long_step%h) > 0.0_dp) return
+      step%status = SLIDING
+      if (long_step%slides > 0) return
+      s%h = long_step%h
+      s%a(1:, FIRST_UNKNOWN:FIRST_UNKNOWN + tape%n_unknowns - 1) = 0.0_dp
+      s%a(1:4, FIRST_UNKNOWN:FIRST_UNKNOWN + tape%n_unknowns - 1) &
+        = long_step%terms(:, :tape%n_unknowns)
+      step%is_switched = .false.
+      call end_after(s%h)
+      call set_terms()
+      call complete_step()
+    end subroutine take_long_step
 
     subroutine end_after(h)
       !! Set the length of the step and the time at its end, which is rounded; the state belongs to

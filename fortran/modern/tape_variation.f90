@@ -144,6 +144,7 @@ contains
         tolerances(:3) = local_tolerance*scale
         tolerances(4:) = 0.5_dp*local_tolerance
         step_request%t = t
+        step_request%may_be_long = .false.
         step_request%t_end = t_end
         step_request%trial = trial
         step_request%relative = local_tolerance

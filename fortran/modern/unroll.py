@@ -39,6 +39,7 @@ MODULES = (
     "tape_switches",
     "tape_crossings",
     "tape_live",
+    "tape_runge_kutta",
     "tape_state",
     "tape_error",
     "tape_rows",

@@ -78,7 +78,7 @@ def trajectory_of(
     attitudes: Array | None = None,
     **more: Any,
 ) -> Trajectory:
-    ended = ENDS[status] if ENDS[status] in (*WITH_ALL_ROWS, "sliding") else "overflow"
+    ended = ENDS[status] if ENDS[status] in (*WITH_ALL_ROWS, "sliding", "stalled") else "overflow"
     if ended in WITH_ALL_ROWS:
         for name, value in (("error", error), ("growth", growth)):
             if value is not None and value >= 0.0:

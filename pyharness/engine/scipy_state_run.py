@@ -130,6 +130,7 @@ class StateRun(Run):
         first = self._rates(time, low.tolist())
         high = low + _AHEAD * abs(self.end) * first
         second = self._rates(time, high.tolist())
+        whole = float(np.abs(second - first).max())
         for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
             found = self._rates(time, middle.tolist())
@@ -137,8 +138,8 @@ class StateRun(Run):
                 high, second = middle, found
             else:
                 low, first = middle, found
-        jump = float(np.abs(second - first).max())
-        return jump > 0.1 * float(np.abs([first, second]).max())
+        # A continuous torque, such as a root near 0, changes less and less.
+        return float(np.abs(second - first).max()) > 0.1 * whole
 
     def check_undefined(self) -> None:
         if self._undefined is not None:

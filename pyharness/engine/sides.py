@@ -9,7 +9,7 @@ from pyharness.engine.steps import joined_steps
 from pyharness.model.trajectory import Trajectory
 
 _ROWS = ("time", "recorded_time", "omega")
-_WORST_FIRST = ("singular", "sliding", "overflow", "unchecked", "sensitive", "complete")
+_WORST_FIRST = ("singular", "stalled", "sliding", "overflow", "unchecked", "sensitive", "complete")
 
 
 def row_names(found: Trajectory) -> tuple[str, ...]:

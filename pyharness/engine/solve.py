@@ -215,7 +215,7 @@ class _Call(NamedTuple):
             integrate(chosen, scene, each, tolerance, self.effort, *more) for each in sides if each
         ]
         parts = [
-            with_reason(scene, part, each[-1]) if part.ended == "overflow" else part
+            with_reason(scene, part, each[-1]) if part.ended in ("overflow", "stalled") else part
             for part, each in zip(parts, filter(None, sides), strict=True)
         ]
         if below:

@@ -13,6 +13,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
 
 _MOST_STEPS = 200_000
+_STALLED = "no step is short enough for the tolerance; use another tolerance or method"
 
 
 def steps_to(
@@ -40,7 +41,10 @@ def step_lengths(
 
 
 def with_reason(scene: Scene, found: Trajectory, end: float) -> Trajectory:
-    """Return `found`, which ends early; its ending is ``singular`` if the torque is undefined."""
+    """Return `found`, which ends early, with its reason.
+
+    The ending is ``singular`` if the torque is undefined, ``overflow`` if it becomes infinite.
+    """
     if not is_recorded(scene):
         return found
     try:
@@ -50,6 +54,8 @@ def with_reason(scene: Scene, found: Trajectory, end: float) -> Trajectory:
     except SingularError as error:
         if error.what:
             return replace(found, ended="singular", reason=str(error))
+        return replace(found, ended="overflow")
     except InputError:
-        pass
-    return found
+        return found
+    # The method needs a Taylor series where the stepper needs none.
+    return replace(found, ended="stalled", reason=_STALLED)

@@ -1,5 +1,6 @@
 """Integration step by step, while the user changes torque or state."""
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
@@ -24,6 +25,7 @@ from pyharness.model.values import boolean, finite, number, three_floats, tolera
 
 FINEST = 1e-14  # smallest tolerance of a step
 _DEFAULT = 1e-9
+_MOST_GUESSES = 8  # of the omega or state that a step from rest reaches
 _MOST, _LOOK = 1e8, 100_000  # most steps of `until`, and steps between its forecasts
 
 
@@ -230,7 +232,7 @@ class Stepper:
             rates = np.abs(self._rates()[self._n : -3])
             guess = rates * min(abs(end - self._time), self._trial, 1.0 / scale)
             sizes = np.where(own_sizes > 0.0, own_sizes, np.where(rates > 0.0, guess, math.inf))
-        while True:
+        for tries in itertools.count():
             tolerances = np.full(len(self._state), math.inf)
             tolerances[:3] = self._tolerance * scale
             tolerances[3 : self._n] = 0.5 * self._tolerance
@@ -246,7 +248,9 @@ class Stepper:
             reached = float(np.abs(taken.state[:3]).max())
             own = np.abs(taken.state[self._n : -3])
             is_far = (own_sizes == 0.0) & (own > 0.0) & (own < 0.5 * sizes)
-            if (self._largest > 0.0 or not 0.0 < reached < 0.5 * scale) and not is_far.any():
+            is_guessed = self._largest > 0.0 or not 0.0 < reached < 0.5 * scale
+            # Near a root of time, the guesses would shrink with the steps.
+            if (is_guessed and not is_far.any()) or tries == _MOST_GUESSES:
                 return taken
             if self._largest == 0.0 and reached > 0.0:
                 scale = min(scale, reached)

@@ -17,6 +17,7 @@ class Statuses:
     UNCHECKED = 7  # all rows are present; SciPy may have stepped over a short change of the torque
     SINGULAR = 8  # the torque is undefined at the last time, but torque and omega are not infinite
     SLIDING = 9  # a switch of the torque would change back and forth without end
+    STALLED = 10  # no step is short enough, but omega does not become infinite
 
 
 class Methods:

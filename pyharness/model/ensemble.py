@@ -31,7 +31,8 @@ class Ensemble(BatchResult):
         How each computation ended: 0 `complete`, 2 `overflow` (omega or the torque becomes infinite
         or undefined), 3 `refused` (the method does not apply), 4 `gave up` (work limit exceeded, or
         no correct digit of the phase left), 6 `sensitive` (amplified rounding errors exceed the
-        tolerance), 9 `sliding` (a switch of the torque would change back and forth without end).
+        tolerance), 9 `sliding` (a switch of the torque would change back and forth without end),
+        10 `stalled` (no step is short enough for the tolerance).
     attitude : ndarray, shape (n, 4), or None
         Unit quaternions from body to space, scalar first. This attribute and the following ones are
         None if they were not requested.

@@ -142,6 +142,7 @@ def ending(trajectory: Trajectory) -> str:
         "overflow": "overflow: the rows end before the first omega that is not finite",
         "singular": f"singular: {trajectory.reason}",
         "sliding": f"sliding: {trajectory.reason}",
+        "stalled": f"stalled: {trajectory.reason}",
         "unchecked": "unchecked: a short change of the torque may have been passed",
         "event": "ended by a terminal event",
         "sensitive": (

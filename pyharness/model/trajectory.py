@@ -19,7 +19,7 @@ from pyharness.model.report import counted, short
 ROUNDING = 2.0**-53
 # The endings (`Trajectory.ended`) with all requested rows.
 WITH_ALL_ROWS = ("complete", "sensitive", "unchecked")
-ENDINGS = (*WITH_ALL_ROWS, "stopped", "overflow", "singular", "sliding", "event")
+ENDINGS = (*WITH_ALL_ROWS, "stopped", "overflow", "singular", "sliding", "stalled", "event")
 _RESULTS = [ENDS.index(ending) for ending in WITH_ALL_ROWS]
 STOP_VARIABLES = ("U1", "U2", "U3", "V1", "V2", "V3", "U", "UV")
 _WIDTH, _LINES = 100, 10
@@ -112,8 +112,8 @@ class Trajectory(Conversions):
         With all rows: "complete", "sensitive" (amplified errors may exceed the tolerance), or
         "unchecked" (SciPy may have stepped over a short change of the torque). Early endings:
         "overflow", "stopped" (by the Lipschitz test of the Runge-Kutta program), "singular" (the
-        torque is undefined), "sliding" (the torque would jump back and forth without end), or
-        "event" (at a terminal event).
+        torque is undefined), "sliding" (the torque would jump back and forth without end),
+        "stalled" (no step is short enough for the tolerance), or "event" (at a terminal event).
     stop : Stop or None
         Where the Lipschitz test ended the run.
     ier : ndarray of int, shape (n,), or None
@@ -215,7 +215,7 @@ class Trajectory(Conversions):
             )
         if self.ended == "event":
             return "A terminal event ended the integration; the rows end before it or at it."
-        if self.ended in ("overflow", "singular", "sliding"):
+        if self.ended in ("overflow", "singular", "sliding", "stalled"):
             last = f"the last row is at t = {self.time[-1]:g} s" if len(self.time) else "no row"
             reason = self.reason or "omega or the torque became infinite or NaN"
             return f"{reason[0].upper()}{reason[1:]}; {last}."

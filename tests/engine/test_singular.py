@@ -36,8 +36,14 @@ UNDEFINED = {
 @pytest.mark.parametrize("method", ["auto", "dop853", "reference"])
 @pytest.mark.parametrize("name", UNDEFINED)
 def test_undefined_torque_ends_with_operation_time_and_advice(name: str, method: str) -> None:
-    if method == "dop853" and name in ("root at the start", "arccosine", "sign"):
-        return  # it passes the first, and does not pass the second
+    if name in ("root at the start", "arccosine"):
+        # A step without a series passes them; the reference has none.
+        found = solve(_scene(UNDEFINED[name][0]), [0.25, 1.0], method, 1e-6)
+        assert found.ended == "stalled" or method != "reference"
+        assert found.success == (method != "reference")
+        return
+    if method == "dop853" and name == "sign":
+        return  # it does not pass the jump
     torque, words, rows = UNDEFINED[name]
     found: Any = solve(_scene(torque), [0.25, 1.0], method, 1e-6)
     assert (found.ended, len(found.time), found.success) == ("singular", rows, False)
@@ -82,10 +88,7 @@ def test_stepper_refuses_it_in_one_line() -> None:
 
 def test_endings_are_shown_by_run(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     kink = _scene(lambda t, w: [np.sqrt((t - 0.5) ** 2), 0.0, 0.0])
-    for method, words in (
-        ("auto", "singular: the torque is not"),
-        ("dop853", "unchecked: a short"),
-    ):
+    for method, words in (("auto", "complete"), ("reference", "stalled: no step is short enough")):
         found = solve(kink, [0.25, 1.0], method, 1e-6)
         assert words in ending(found)
     path = tmp_path / "kink.toml"
@@ -95,5 +98,5 @@ def test_endings_are_shown_by_run(capsys: pytest.CaptureFixture[str], tmp_path: 
     )
     asked = ["run", "--scene", str(path), "--method", "dop853", "--times", "0.25,1"]
     assert main(asked) == 0
-    assert main([*asked, "--strict"]) == 1
+    assert main([*asked, "--strict"]) == 0
     capsys.readouterr()

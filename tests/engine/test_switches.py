@@ -620,11 +620,11 @@ def test_a_direction_is_guarded_at_rest() -> None:
         assert solve(scene, [2.0], method).omega.tolist() == [[0.0, 0.0, 0.0]]
 
 
-def test_a_branch_that_begins_at_its_singularity_is_named() -> None:
+def test_a_branch_may_begin_where_it_has_no_value() -> None:
     torque: Torque = lambda t, w: [np.where(t > 0, np.sin(t) / t, 1.0), 0.0, 0.0]  # noqa: E731
-    found = solve(Scene("", (1.0, 0.2, 0.3), moments=BRICK, torque=torque), [2.0])
-    assert found.ended == "singular"
-    assert "0/0" in str(found.reason)
+    found = solve(_ball(torque), [2.0])
+    assert found.ended == "complete"
+    assert found.omega[0, 0] == pytest.approx(0.3 + 1.6054129768026948)  # the sine integral of 2
 
 
 @pytest.mark.parametrize(("law", "end", "wanted"), [
@@ -767,20 +767,20 @@ def test_switches_that_coincide_by_construction_are_one(tolerance: float) -> Non
     assert np.abs(found.omega - truth.omega).max() < 3.0 * (tolerance + 1e-11)
 
 
-@pytest.mark.parametrize("omega", [(0.2, 0.1, 0.3), (0.2, 0.0, 0.0)])
-def test_broken_powers_at_zero_are_named_and_solved_by_scipy(omega: Any) -> None:
+@pytest.mark.parametrize(
+    "omega", [(0.2, 0.1, 0.3), pytest.param((0.2, 0.0, 0.0), marks=pytest.mark.campaign)]
+)
+def test_broken_powers_pass_zero(omega: Any) -> None:
     def law(t: Any, w: Any) -> Any:
         return 0.05 * np.cos(t) * np.array([1, 0, 0]) - 0.1 * np.abs(w) ** 1.3 * np.sign(w)
 
     scene = Scene("", omega, (3.0, 2.0, 1.0), torque=law)
     found = solve(scene, [1.0, 10.0])
-    assert found.ended == "singular"
-    assert "power of a number that becomes 0" in str(found.reason)
-    assert "(x**2 + e**2)**(p/2)" in str(found.reason)
+    assert found.ended == "complete"
     bare = solve(replace(scene, torque=opaque(law)), 10.0)
+    assert found.omega[-1:] == pytest.approx(bare.omega, abs=1e-6)
     for method in ("dop853", "lsoda"):
         other = solve(scene, 10.0, method)
-        assert other.ended == "unchecked"
         assert other.omega == pytest.approx(bare.omega, abs=1e-6)
     smooth = Scene(
         "", omega, (3.0, 2.0, 1.0),

@@ -1,0 +1,370 @@
+module tape_runge_kutta
+  !! Runge-Kutta steps of a tape over points where no Taylor series converges although the rates are
+  !! finite, such as those where the argument of a root becomes 0. The rates change so little in a
+  !! short step that its error, found by halving, is small enough.
+  use kinds, only: dp
+  use operations, only: LOGARITHM => LOG, QUOTIENT, SQUARE_ROOT => SQRT
+  use tape, only: tape_t
+  use tape_crossings, only: before_crossings
+  use tape_growth, only: MOST_UNKNOWNS
+  use tape_live, only: keep_live, settle
+  use tape_plan, only: converge
+  use tape_series, only: derivatives_at, series_t, slot_gradient
+  use tape_switches, only: switches_t
+  use tape_values, only: LAST_TERM
+  use two_words, only: two_sum
+  implicit none(type, external)
+  private
+
+  real(dp), parameter :: NEAR_ZERO = 0.125_dp ! change of an operand in a series' step, relative
+  real(dp), parameter, public :: LONGER_THAN_SERIES = 6.0_dp ! to beyond the singular point
+  real(dp), parameter :: SHORTER = 0.25_dp    ! factor on a step whose error is too large
+  integer, parameter :: MOST_TRIES = 60
+  integer, parameter :: LAST_TABLE_TERM = 3 ! of a cubic polynomial
+  real(dp), parameter :: SHORTEST = 4.0_dp    ! step, over the distance of neighbouring times
+  ! Error of the halved step over the difference that halving makes, if rates grow as 1/sqrt(t).
+  real(dp), parameter :: HALVED = 2.5_dp
+  integer, parameter :: PIECES = 4            ! of the halved step
+  ! Of the step in which the sizes of unknowns are guessed, which suffices if halving changes them
+  ! by at most this part.
+  integer, parameter :: MANY_PIECES = 64
+  real(dp), parameter :: ROUGHLY = 0.5_dp
+  ! Perturbations from which derivatives are computed, over the change in the step and over a size.
+  real(dp), parameter :: OF_CHANGE = 1e-3_dp, OF_SIZE = 1e-9_dp
+
+  type, public :: long_step_t
+    real(dp) :: h                       ! s
+    integer :: slides                   ! the switch that jumps back behind the step, or 0
+    real(dp) :: change(MOST_UNKNOWNS)
+    real(dp) :: error(MOST_UNKNOWNS)    ! bound of its error
+    real(dp) :: terms(4, MOST_UNKNOWNS) ! of the quartic with the change, rates and middle value
+    ! Derivatives of the change by the unknowns at the beginning: element (i, j) is that of change i.
+    real(dp) :: derivatives(MOST_UNKNOWNS, MOST_UNKNOWNS)
+  end type long_step_t
+
+  public :: guess_sizes, has_singular_points, is_near_singular, longest_without_terms, step_over
+
+contains
+
+  pure logical function has_singular_points(tape)
+    !! Return whether an operation has no Taylor series where its operand is 0.
+    type(tape_t), intent(in) :: tape
+    integer :: n
+
+    has_singular_points = .false.
+    do n = 1, tape%n_operations
+      has_singular_points = has_singular_points .or. singular_operand(tape, n) > 0
+    end do
+  end function has_singular_points
+
+  pure integer function singular_operand(tape, n)
+    !! Return the operand at whose 0 an operation has no Taylor series, or 0.
+    type(tape_t), intent(in) :: tape
+    integer, intent(in) :: n !! number of the operation
+
+    select case (tape%operations(1, n))
+    case (SQUARE_ROOT, LOGARITHM)
+      singular_operand = tape%operations(2, n)
+    case (QUOTIENT)
+      singular_operand = tape%operations(3, n)
+    case default
+      singular_operand = 0
+    end select
+  end function singular_operand
+
+  pure logical function is_near_singular(tape, order, a, factor)
+    !! Return whether such an operand changes much in the step, as it does shortly before its zero.
+    type(tape_t), intent(in) :: tape
+    integer, intent(in) :: order
+    real(dp), intent(in) :: a(0:LAST_TERM, tape%n_slots)
+    real(dp), intent(in) :: factor !! on the step of the series
+    real(dp) :: change
+    integer :: k, n, operand
+
+    is_near_singular = .false.
+    do n = 1, tape%n_operations
+      operand = singular_operand(tape, n)
+      if (operand == 0) cycle
+      change = 0.0_dp
+      do k = order - 1, 1, -1
+        change = factor*(change + abs(a(k, operand)))
+      end do
+      if (change > NEAR_ZERO*abs(a(0, operand))) then
+        is_near_singular = .true.
+        return
+      end if
+    end do
+  end function is_near_singular
+
+  subroutine step_over(tape, t, y, first, least, weights, allowed, with_derivatives, switches, s, &
+                       live, step, error)
+    !! Take a step, the longest from `first` to `least` whose error is small enough. Terms 0 of all slots and
+    !! the switches become those at its end; without such a step, they remain.
+    type(tape_t), intent(in) :: tape
+    real(dp), intent(in) :: t(2)       !! time and its rounding error, s
+    real(dp), intent(in) :: y(:)       !! unknowns
+    real(dp), intent(in) :: first      !! step that is tried first, s
+    real(dp), intent(in) :: least      !! length of the shortest step, s
+    real(dp), intent(in) :: weights(:) !! make the unknowns comparable
+    real(dp), intent(in) :: allowed    !! error
+    logical, intent(in) :: with_derivatives
+    type(switches_t), intent(inout), target :: switches
+    type(series_t), intent(inout) :: s
+    type(tape_t), intent(inout) :: live
+    type(long_step_t), intent(inout) :: step !! whose length is 0 if no step is accurate enough
+    real(dp), intent(out) :: error     !! of the step, or of the step that was tried first
+    real(dp), dimension(size(y)) :: rates, coarse, fine, middle, end_rates, largest
+    real(dp), dimension(switches%n) :: results, operands ! of the switches at the beginning
+    real(dp) :: terms(0:LAST_TABLE_TERM, tape%n_slots)
+    integer :: on_level(switches%n)
+    logical :: is_new(switches%n)
+    real(dp) :: tried
+    integer :: tries
+
+    step%h = 0.0_dp
+    error = huge(error)
+    call keep_slots(switches, s, terms, on_level, is_new)
+    call rates_at(tape, t, y, first, switches, s, live, rates)
+    if (.not. all(abs(rates) <= huge(first))) then
+      call restore_slots(tape, terms, on_level, is_new, switches, s, live)
+      return
+    end if
+    if (switches%n > 0) then
+      results = s%a(0, switches%slots)
+      operands = s%a(0, switches%operands)
+    end if
+    tried = first
+    do tries = 1, MOST_TRIES
+      ! Times are rounded.
+      tried = (t(1) + tried) - t(1)
+      if (.not. abs(tried) >= max(least, SHORTEST*spacing(t(1)))) exit
+      call integrate(tape, t, y, tried, PIECES/2, rates, switches, s, live, coarse, middle, largest)
+      call integrate(tape, t, y, tried, PIECES, rates, switches, s, live, fine, middle, largest)
+      step%error(:size(y)) = HALVED*abs(fine - coarse)
+      ! NaN must not be lost in the maximum.
+      error = huge(error)
+      if (all(abs(fine) <= huge(error))) error = maxval(weights*step%error(:size(y)))
+      if (error <= allowed) then
+        call end_step()
+        if (step%h /= 0.0_dp) return
+      end if
+      tried = SHORTER*tried
+    end do
+    call restore_slots(tape, terms, on_level, is_new, switches, s, live)
+
+  contains
+
+    subroutine end_step()
+      !! Set the switches at the end, and the derivatives of the change.
+      real(dp) :: gradient(size(y)), slope, before ! in the step, and at its beginning
+      integer :: i, j
+
+      call set_end()
+      if (.not. all(abs(end_rates) <= huge(error))) return
+      step%h = tried
+      step%slides = 0
+      step%change(:size(y)) = fine
+      call interpolate()
+      do i = 1, switches%n
+        if (switches%is_live(i) .and. s%a(0, switches%slots(i)) /= results(i)) exit
+      end do
+      if (i > switches%n .and. with_derivatives) then
+        call differentiate()
+        call set_end()
+      end if
+      if (i > switches%n) return
+      ! A perturbation changes the time of the jump of the rates, if there is one.
+      call slot_gradient(s%arrays, switches%operands(i), gradient)
+      slope = (s%a(0, switches%operands(i)) - operands(i))/tried
+      before = slope - dot_product(gradient, fine/tried - rates)
+      if (dot_product(gradient, end_rates)*sign(1.0_dp, slope) < -NEAR_ZERO*abs(slope)) then
+        step%slides = i
+      end if
+      do j = 1, size(y)
+        associate (derivatives => step%derivatives(:size(y), j))
+          derivatives = (end_rates - rates)*(gradient(j)/before)
+          where (.not. abs(derivatives) <= huge(error)) derivatives = 0.0_dp
+        end associate
+      end do
+    end subroutine end_step
+
+    subroutine set_end()
+      call rates_at(tape, [t(1) + tried, t(2)], y + fine, tried, switches, s, live, end_rates)
+    end subroutine set_end
+
+    subroutine interpolate()
+      associate (terms => step%terms(:, :size(y)), p => tried*rates, q => tried*end_rates)
+        terms(1, :) = p
+        terms(2, :) = 16.0_dp*middle - 5.0_dp*fine - 4.0_dp*p + q
+        terms(3, :) = 14.0_dp*fine - 32.0_dp*middle + 5.0_dp*p - 3.0_dp*q
+        terms(4, :) = 16.0_dp*middle - 8.0_dp*fine - 2.0_dp*p + 2.0_dp*q
+      end associate
+    end subroutine interpolate
+
+    subroutine differentiate()
+      !! Compute the derivatives of the change.
+      real(dp), dimension(size(y)) :: perturbed, perturbed_change, unused, perturbed_rates
+      real(dp) :: perturbation
+      integer :: j
+
+      do j = 1, size(y)
+        step%derivatives(:size(y), j) = 0.0_dp
+        if (.not. weights(j) > 0.0_dp) cycle
+        perturbation = max(OF_CHANGE*abs(fine(j)), OF_SIZE*abs(y(j)), min(OF_SIZE, allowed)/weights(j))
+        perturbed = y
+        perturbed(j) = perturbed(j) + perturbation
+        call rates_at(tape, t, perturbed, tried, switches, s, live, perturbed_rates)
+        call integrate(tape, t, perturbed, tried, PIECES, perturbed_rates, switches, s, live, &
+                       perturbed_change, unused, largest)
+        if (all(abs(perturbed_change) <= huge(error))) then
+          step%derivatives(:size(y), j) = (perturbed_change - fine)/(perturbed(j) - y(j))
+        end if
+      end do
+    end subroutine differentiate
+
+  end subroutine step_over
+
+  real(dp) function longest_without_terms(live, order, t, switches, s)
+    !! Return the longest step (s) from a singular point that the terms of the other operations and
+    !! the switches allow: it ends shortly before a switch changes, or shortly after.
+    type(tape_t), intent(in) :: live
+    integer, intent(in) :: order
+    real(dp), intent(in) :: t
+    type(switches_t), intent(in) :: switches
+    type(series_t), intent(inout) :: s
+    real(dp) :: factor, rounded
+
+    factor = LONGER_THAN_SERIES
+    call converge(live, order, 0.0_dp, s%a, s%powers, factor, is_singular=.true.)
+    longest_without_terms = factor*s%h
+    if (switches%n == 0) return
+    rounded = 8.0_dp*SHORTEST*spacing(t)/abs(s%h)
+    if (before_crossings(switches, s, factor)) then
+      longest_without_terms = sign(merge(factor - rounded, factor + rounded, factor > 2.0_dp*rounded), &
+                                   s%h)*abs(s%h)
+    end if
+  end function longest_without_terms
+
+  subroutine guess_sizes(tape, t, y, longest, switches, s, live, sizes)
+    !! Guess the sizes that the unknowns reach in a step up to `longest`; 0 if no step is accurate.
+    type(tape_t), intent(in) :: tape
+    real(dp), intent(in) :: t(2), longest !! s
+    real(dp), intent(in) :: y(:)
+    type(switches_t), intent(inout), target :: switches
+    type(series_t), intent(inout) :: s
+    type(tape_t), intent(inout) :: live
+    real(dp), intent(out) :: sizes(:)
+    real(dp), dimension(size(y)) :: rates, coarse, fine, middle
+    real(dp) :: terms(0:LAST_TABLE_TERM, tape%n_slots), h
+    integer :: on_level(switches%n), tries
+    logical :: is_new(switches%n)
+
+    call keep_slots(switches, s, terms, on_level, is_new)
+    call rates_at(tape, t, y, longest, switches, s, live, rates)
+    h = longest
+    do tries = 1, MOST_TRIES
+      call integrate(tape, t, y, h, MANY_PIECES/2, rates, switches, s, live, coarse, middle, sizes)
+      call integrate(tape, t, y, h, MANY_PIECES, rates, switches, s, live, fine, middle, sizes)
+      ! NaN is not allowed.
+      if (all(abs(fine - coarse) <= ROUGHLY*sizes)) exit
+      h = SHORTER*h
+    end do
+    if (tries > MOST_TRIES) sizes = 0.0_dp
+    call restore_slots(tape, terms, on_level, is_new, switches, s, live)
+  end subroutine guess_sizes
+
+  subroutine keep_slots(switches, s, terms, on_level, is_new)
+    !! Copy the terms of slots that `rates_at` overwrites, and the switches.
+    type(switches_t), intent(in) :: switches
+    type(series_t), intent(in) :: s
+    real(dp), intent(out) :: terms(0:, :)
+    integer, intent(out) :: on_level(:)
+    logical, intent(out) :: is_new(:)
+
+    terms = s%a(:LAST_TABLE_TERM, :)
+    if (switches%n == 0) return
+    on_level = switches%on_level
+    is_new = switches%is_new
+  end subroutine keep_slots
+
+  subroutine restore_slots(tape, terms, on_level, is_new, switches, s, live)
+    type(tape_t), intent(in) :: tape
+    real(dp), intent(in) :: terms(0:, :)
+    integer, intent(in) :: on_level(:)
+    logical, intent(in) :: is_new(:)
+    type(switches_t), intent(inout), target :: switches
+    type(series_t), intent(inout) :: s
+    type(tape_t), intent(inout) :: live
+
+    s%a(:LAST_TABLE_TERM, :) = terms
+    if (switches%n == 0) return
+    call keep_live(tape, switches, s, live)
+    switches%on_level = on_level
+    switches%is_new = is_new
+  end subroutine restore_slots
+
+  subroutine integrate(tape, t, y, h, n, rates, switches, s, live, change, middle, largest)
+    !! Compute the changes of the unknowns in a step, and in half of it, by n pieces, an even number,
+    !! with the classical Runge-Kutta method; and the largest unknowns.
+    type(tape_t), intent(in) :: tape
+    real(dp), intent(in) :: t(2), h  !! s
+    real(dp), intent(in) :: y(:)
+    integer, intent(in) :: n
+    real(dp), intent(in) :: rates(:) !! at the beginning
+    type(switches_t), intent(inout), target :: switches
+    type(series_t), intent(inout) :: s
+    type(tape_t), intent(inout) :: live
+    real(dp), intent(out) :: change(:), middle(:), largest(:)
+    real(dp), dimension(size(y)) :: k1, k2, k3, k4
+    real(dp) :: piece
+    integer :: i
+
+    piece = h/n
+    change = 0.0_dp
+    largest = abs(y)
+    k1 = rates
+    do i = 1, n
+      if (i > 1) call rates_after((i - 1)*piece, change, k1)
+      call rates_after((i - 0.5_dp)*piece, change + 0.5_dp*piece*k1, k2)
+      call rates_after((i - 0.5_dp)*piece, change + 0.5_dp*piece*k2, k3)
+      call rates_after(i*piece, change + piece*k3, k4)
+      change = change + piece/6.0_dp*((k1 + k4) + 2.0_dp*(k2 + k3))
+      largest = max(largest, abs(y + change))
+      if (i == n/2) middle = change
+    end do
+
+  contains
+
+    subroutine rates_after(time, change_there, rates_there)
+      real(dp), intent(in) :: time
+      real(dp), intent(in) :: change_there(:)
+      real(dp), intent(out) :: rates_there(:)
+      real(dp) :: there(2)
+
+      call two_sum(t(1), time + t(2), there(1), there(2))
+      call rates_at(tape, there, y + change_there, h, switches, s, live, rates_there)
+    end subroutine rates_after
+
+  end subroutine integrate
+
+  subroutine rates_at(tape, t, y, h, switches, s, live, rates)
+    !! Compute the rates with the results of switches that belong to the unknowns.
+    type(tape_t), intent(in) :: tape
+    real(dp), intent(in) :: t(2), h  !! s
+    real(dp), intent(in) :: y(:)
+    type(switches_t), intent(inout), target :: switches
+    type(series_t), intent(inout) :: s
+    type(tape_t), intent(inout) :: live
+    real(dp), intent(out) :: rates(:)
+
+    if (switches%n == 0) then
+      call derivatives_at(tape, t, y, h, s, rates)
+      return
+    end if
+    switches%part = 0.0_dp
+    switches%on_level = 0
+    switches%crosses = 0
+    call settle(tape, t, y, h, switches, s, live, rates)
+  end subroutine rates_at
+
+end module tape_runge_kutta

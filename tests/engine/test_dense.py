@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import ChangingMoments, InputError, Scene, TorqueLaw, opaque, solve, torques
+from pyharness import ChangingMoments, InputError, Scene, TorqueLaw, solve, torques
 from pyharness.engine import dense, taylor
 from pyharness.engine.registry import FIXED_STEP
 from pyharness.events import crosses

@@ -44,11 +44,12 @@ module tape_march
   real(dp), parameter :: NEAR = 1e-13_dp, MOST_NEAR = 1e-5_dp
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53) ! unit of rounding errors
   integer, parameter :: MOST_GUESSES = 3    ! of the omega that a body at rest reaches, by series
-  ! Longest step near a singular point, over the longest step so far, instead of which a longer one
-  ! is tried; least part after a failure; and part of it that is expected for most of the time.
-  real(dp), parameter :: OF_LONG_STEP = 0.03_dp ! part of the local tolerance, because its sign is unknown
-  real(dp), parameter :: NEARLY_AS_LONG = 0.5_dp, LEAST_PART = 1e-4_dp
-  real(dp), parameter :: LEAST_EXPECTED_PART = 1.0_dp/16.0_dp
+  ! Error of a long step, whose sign is unknown, over the local tolerance, and at least.
+  real(dp), parameter :: OF_LONG_STEP = 0.03_dp, MOST_LONG_ROUNDING = 2.0_dp**(-50)
+  ! Part of the longest step so far below which a step near a singular point becomes a long one. It
+  ! is small, because a long step may miss a pulse. And its least factor after a failure.
+  real(dp), parameter :: SHRUNK = 1e-8_dp, LEAST_PART = 1e-4_dp
+  real(dp), parameter :: LEAST_EXPECTED_PART = 1.0_dp/16.0_dp ! for most of the time
   ! Largest omega over the first, unless omega becomes infinite.
   real(dp), parameter :: UNBOUNDED = 1e6_dp
   real(dp), parameter :: LARGEST_JUMP = 1e100_dp ! whose square is finite
@@ -116,7 +117,6 @@ contains
     type(long_step_t) :: long_step
     real(dp) :: next_try    ! step of a series from which on a longer step is tried, s
     logical :: was_singular ! whether the last step began where no series converges
-    real(dp) :: long_error                    ! of the longer step that was tried, relative
     real(dp) :: longest, least_expected       ! step so far, and step for most of the time, s
     real(dp) :: first_scale                   ! of the first step
     integer :: i, n_before, order, tries
@@ -129,7 +129,12 @@ contains
     solution%status = COMPLETE
     solution%n_rows = 0
     solution%n_steps = 0
-    if (switches%n > 0) s%a = 0.0_dp
+    if (switches%n > 0) then
+      s%a = 0.0_dp
+      switches%is_turned = .false.
+      switches%on_level = 0
+      switches%crosses = 0
+    end if
     call begin_state(tape, request, attitude, solution, memory(:, :4), x)
     call begin_error(x%n, memory(:, 5:), e)
     call begin(x%n, transitions)
@@ -220,7 +225,7 @@ contains
           if (solution%status /= COMPLETE) exit integration
           cycle integration
         end if
-        if (has_singular .and. abs(factor*s%h) <= min(next_try, NEARLY_AS_LONG*longest)) then
+        if (has_singular .and. abs(factor*s%h) <= min(next_try, SHRUNK*longest)) then
           if (is_near_singular(live, s%order, s%a, factor)) call step_beyond_singular()
           if (is_long) exit find_step
         end if
@@ -266,8 +271,7 @@ contains
                     found%error)
       if (solution%status /= COMPLETE) exit
       if (associated(solution%nodes)) then
-        call add_nodes(x, s, e, factor, change(:x%n), t_next(1), request%tolerance, solution, &
-                       found%error)
+        call add_nodes(x, s, e, factor, t_next(1), request%tolerance, solution, found%error)
       end if
       if (is_long) then
         call add_noise((long_step%error(:x%n)/ROUNDING)**2, e)
@@ -397,7 +401,7 @@ contains
       if (is_long) then
         next_try = huge(next_try)
       else
-        next_try = abs(h)*max(LEAST_PART, sqrt(min(1.0_dp, OF_LONG_STEP*local_tolerance/long_error)))
+        next_try = abs(h)*max(LEAST_PART, sqrt(min(1.0_dp, long_step%allowed/long_step%largest_error)))
       end if
     end subroutine step_beyond_singular
 
@@ -413,9 +417,11 @@ contains
         local_tolerance = share_of(abs(t_end)/least_expected)
         s%order = order_for(local_tolerance, s%powers, of_steps=.false.)
       end if
-      call step_over(tape, x%t, x%y + x%y_low, first, least, x%weights, &
-                     max(OF_LONG_STEP*local_tolerance, 8.0_dp*ROUNDING), .true., switches, s, live, long_step, &
-                     long_error)
+      long_step%first = first
+      long_step%least = least
+      long_step%allowed = max(OF_LONG_STEP*local_tolerance, MOST_LONG_ROUNDING)
+      long_step%with_derivatives = .true.
+      call step_over(tape, x%t, x%y + x%y_low, x%weights, switches, s, live, long_step)
       is_long = long_step%h /= 0.0_dp
       if (.not. is_long) return
       s%h = long_step%h

@@ -86,10 +86,10 @@ contains
           ! The derivative decreases as exp(-2 abs(x)).
           factor = limited(first, max(0.25_dp*order, abs(a(0, first)) - 0.5_dp*INVISIBLE), factor)
         case (QUOTIENT)
-          if (present(is_singular)) cycle
+          if (present(is_singular) .and. a(0, second) == 0.0_dp) cycle
           factor = limited(second, WITHIN_CIRCLE*abs(a(0, second)), factor)
         case (SQUARE_ROOT)
-          if (present(is_singular)) cycle
+          if (present(is_singular) .and. a(0, first) == 0.0_dp) cycle
           factor = limited(first, WITHIN_CIRCLE*a(0, first), factor)
         case default
           cycle

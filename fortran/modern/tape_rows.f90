@@ -104,13 +104,12 @@ contains
     solution%n_rows = row
   end subroutine add_row
 
-  subroutine add_nodes(x, s, e, factor, change, t_end, tolerance, solution, largest)
+  subroutine add_nodes(x, s, e, factor, t_end, tolerance, solution, largest)
     !! Compute the unknowns at the nodes of the step, divided as a polynomial between them requires.
     type(state_t), intent(in) :: x
     type(series_t), intent(in) :: s
     type(error_t), intent(in) :: e
     real(dp), intent(in) :: factor    !! the step over that of the series
-    real(dp), intent(in) :: change(:) !! of the unknowns in the step
     real(dp), intent(in) :: t_end     !! of the step, s
     real(dp), intent(in) :: tolerance !! of the results
     type(solution_t), intent(inout) :: solution
@@ -118,7 +117,11 @@ contains
     real(dp) :: sizes(AT_ONCE + 1:MOST_ORDER + 1), weights(x%n), power, error
     integer :: k, part, parts
 
-    weights = abs(x%y + change)
+    weights = 0.0_dp
+    do k = s%order, 1, -1
+      weights = factor*(weights + s%a(k, FIRST_UNKNOWN:FIRST_UNKNOWN - 1 + x%n))
+    end do
+    weights = abs(x%y + weights)
     weights(:3) = maxval(weights(:3))
     weights(4:x%first_own - 1) = 0.0_dp
     weights = x%weights/max(1.0_dp, x%weights*weights)

@@ -24,7 +24,7 @@ module tape_runge_kutta
   real(dp), parameter :: SHORTEST = 4.0_dp    ! step, over the distance of neighbouring times
   ! Error of the halved step over the difference that halving makes, if rates grow as 1/sqrt(t).
   real(dp), parameter :: HALVED = 2.5_dp
-  integer, parameter :: PIECES = 4            ! of the halved step
+  integer, parameter :: MOST_PIECES = 4       ! of the halved step
   ! Of the step in which the sizes of unknowns are guessed, which suffices if halving changes them
   ! by at most this part.
   integer, parameter :: MANY_PIECES = 64
@@ -32,8 +32,23 @@ module tape_runge_kutta
   ! Perturbations from which derivatives are computed, over the change in the step and over a size.
   real(dp), parameter :: OF_CHANGE = 1e-3_dp, OF_SIZE = 1e-9_dp
 
+  ! Changes in a step of n pieces, an even number.
+  type :: pieces_t
+    real(dp) :: h                                     ! s
+    integer :: n
+    real(dp), dimension(MOST_UNKNOWNS) :: rates       ! at the beginning
+    real(dp), dimension(MOST_UNKNOWNS) :: change, middle ! of the unknowns, and in half of the step
+    real(dp), dimension(MOST_UNKNOWNS) :: largest     ! unknowns
+  end type pieces_t
+
   type, public :: long_step_t
-    real(dp) :: h                       ! s
+    ! What is required.
+    real(dp) :: first, least            ! length that is tried first, and that of the shortest step, s
+    real(dp) :: allowed                 ! error
+    logical :: with_derivatives
+    ! What is computed.
+    real(dp) :: h                       ! s; 0 if no step is accurate enough
+    real(dp) :: largest_error           ! of the step, or of the last that was tried, relative
     integer :: slides                   ! the switch that jumps back behind the step, or 0
     real(dp) :: change(MOST_UNKNOWNS)
     real(dp) :: error(MOST_UNKNOWNS)    ! bound of its error
@@ -84,7 +99,8 @@ contains
     is_near_singular = .false.
     do n = 1, tape%n_operations
       operand = singular_operand(tape, n)
-      if (operand == 0) cycle
+      ! Near a pole, a long step might miss a pulse.
+      if (operand == 0 .or. tape%operations(1, n) == QUOTIENT) cycle
       change = 0.0_dp
       do k = order - 1, 1, -1
         change = factor*(change + abs(a(k, operand)))
@@ -96,24 +112,20 @@ contains
     end do
   end function is_near_singular
 
-  subroutine step_over(tape, t, y, first, least, weights, allowed, with_derivatives, switches, s, &
-                       live, step, error)
-    !! Take a step, the longest from `first` to `least` whose error is small enough. Terms 0 of all slots and
-    !! the switches become those at its end; without such a step, they remain.
+  subroutine step_over(tape, t, y, weights, switches, s, live, step)
+    !! Take a step, the longest whose error is small enough. Terms 0 of all slots and the switches
+    !! become those at its end; without such a step, they remain.
     type(tape_t), intent(in) :: tape
     real(dp), intent(in) :: t(2)       !! time and its rounding error, s
     real(dp), intent(in) :: y(:)       !! unknowns
-    real(dp), intent(in) :: first      !! step that is tried first, s
-    real(dp), intent(in) :: least      !! length of the shortest step, s
     real(dp), intent(in) :: weights(:) !! make the unknowns comparable
-    real(dp), intent(in) :: allowed    !! error
-    logical, intent(in) :: with_derivatives
     type(switches_t), intent(inout), target :: switches
     type(series_t), intent(inout) :: s
     type(tape_t), intent(inout) :: live
-    type(long_step_t), intent(inout) :: step !! whose length is 0 if no step is accurate enough
-    real(dp), intent(out) :: error     !! of the step, or of the step that was tried first
-    real(dp), dimension(size(y)) :: rates, coarse, fine, middle, end_rates, largest
+    type(long_step_t), intent(inout) :: step
+    real(dp), dimension(size(y)) :: rates, fine, end_rates
+    type(pieces_t) :: pieces
+    real(dp) :: coarse(size(y)), error
     real(dp), dimension(switches%n) :: results, operands ! of the switches at the beginning
     real(dp) :: terms(0:LAST_TABLE_TERM, tape%n_slots)
     integer :: on_level(switches%n)
@@ -122,10 +134,10 @@ contains
     integer :: tries
 
     step%h = 0.0_dp
-    error = huge(error)
+    step%largest_error = huge(error)
     call keep_slots(switches, s, terms, on_level, is_new)
-    call rates_at(tape, t, y, first, switches, s, live, rates)
-    if (.not. all(abs(rates) <= huge(first))) then
+    call rates_at(tape, t, y, step%first, switches, s, live, rates)
+    if (.not. all(abs(rates) <= huge(error))) then
       call restore_slots(tape, terms, on_level, is_new, switches, s, live)
       return
     end if
@@ -133,18 +145,25 @@ contains
       results = s%a(0, switches%slots)
       operands = s%a(0, switches%operands)
     end if
-    tried = first
+    tried = step%first
     do tries = 1, MOST_TRIES
       ! Times are rounded.
       tried = (t(1) + tried) - t(1)
-      if (.not. abs(tried) >= max(least, SHORTEST*spacing(t(1)))) exit
-      call integrate(tape, t, y, tried, PIECES/2, rates, switches, s, live, coarse, middle, largest)
-      call integrate(tape, t, y, tried, PIECES, rates, switches, s, live, fine, middle, largest)
+      if (.not. abs(tried) >= max(step%least, SHORTEST*spacing(t(1)))) exit
+      pieces%h = tried
+      pieces%rates(:size(y)) = rates
+      pieces%n = MOST_PIECES/2
+      call integrate(tape, t, y, switches, s, live, pieces)
+      coarse = pieces%change(:size(y))
+      pieces%n = MOST_PIECES
+      call integrate(tape, t, y, switches, s, live, pieces)
+      fine = pieces%change(:size(y))
       step%error(:size(y)) = HALVED*abs(fine - coarse)
       ! NaN must not be lost in the maximum.
       error = huge(error)
       if (all(abs(fine) <= huge(error))) error = maxval(weights*step%error(:size(y)))
-      if (error <= allowed) then
+      step%largest_error = error
+      if (error <= step%allowed) then
         call end_step()
         if (step%h /= 0.0_dp) return
       end if
@@ -168,7 +187,7 @@ contains
       do i = 1, switches%n
         if (switches%is_live(i) .and. s%a(0, switches%slots(i)) /= results(i)) exit
       end do
-      if (i > switches%n .and. with_derivatives) then
+      if (i > switches%n .and. step%with_derivatives) then
         call differentiate()
         call set_end()
       end if
@@ -193,7 +212,8 @@ contains
     end subroutine set_end
 
     subroutine interpolate()
-      associate (terms => step%terms(:, :size(y)), p => tried*rates, q => tried*end_rates)
+      associate (terms => step%terms(:, :size(y)), p => tried*rates, q => tried*end_rates, &
+                 middle => pieces%middle(:size(y)))
         terms(1, :) = p
         terms(2, :) = 16.0_dp*middle - 5.0_dp*fine - 4.0_dp*p + q
         terms(3, :) = 14.0_dp*fine - 32.0_dp*middle + 5.0_dp*p - 3.0_dp*q
@@ -203,22 +223,26 @@ contains
 
     subroutine differentiate()
       !! Compute the derivatives of the change.
-      real(dp), dimension(size(y)) :: perturbed, perturbed_change, unused, perturbed_rates
-      real(dp) :: perturbation
+      type(pieces_t) :: other
+      real(dp) :: perturbed(size(y)), perturbation
       integer :: j
 
+      other%h = tried
+      other%n = MOST_PIECES
       do j = 1, size(y)
         step%derivatives(:size(y), j) = 0.0_dp
         if (.not. weights(j) > 0.0_dp) cycle
-        perturbation = max(OF_CHANGE*abs(fine(j)), OF_SIZE*abs(y(j)), min(OF_SIZE, allowed)/weights(j))
+        perturbation = max(OF_CHANGE*abs(fine(j)), OF_SIZE*abs(y(j)), &
+                           min(OF_SIZE, step%allowed)/weights(j))
         perturbed = y
         perturbed(j) = perturbed(j) + perturbation
-        call rates_at(tape, t, perturbed, tried, switches, s, live, perturbed_rates)
-        call integrate(tape, t, perturbed, tried, PIECES, perturbed_rates, switches, s, live, &
-                       perturbed_change, unused, largest)
-        if (all(abs(perturbed_change) <= huge(error))) then
-          step%derivatives(:size(y), j) = (perturbed_change - fine)/(perturbed(j) - y(j))
-        end if
+        call rates_at(tape, t, perturbed, tried, switches, s, live, other%rates(:size(y)))
+        call integrate(tape, t, perturbed, switches, s, live, other)
+        associate (change => other%change(:size(y)))
+          if (all(abs(change) <= huge(error))) then
+            step%derivatives(:size(y), j) = (change - fine)/(perturbed(j) - y(j))
+          end if
+        end associate
       end do
     end subroutine differentiate
 
@@ -254,20 +278,24 @@ contains
     type(series_t), intent(inout) :: s
     type(tape_t), intent(inout) :: live
     real(dp), intent(out) :: sizes(:)
-    real(dp), dimension(size(y)) :: rates, coarse, fine, middle
-    real(dp) :: terms(0:LAST_TABLE_TERM, tape%n_slots), h
+    type(pieces_t) :: pieces
+    real(dp) :: terms(0:LAST_TABLE_TERM, tape%n_slots), coarse(size(y))
     integer :: on_level(switches%n), tries
     logical :: is_new(switches%n)
 
     call keep_slots(switches, s, terms, on_level, is_new)
-    call rates_at(tape, t, y, longest, switches, s, live, rates)
-    h = longest
+    pieces%h = longest
+    call rates_at(tape, t, y, longest, switches, s, live, pieces%rates(:size(y)))
     do tries = 1, MOST_TRIES
-      call integrate(tape, t, y, h, MANY_PIECES/2, rates, switches, s, live, coarse, middle, sizes)
-      call integrate(tape, t, y, h, MANY_PIECES, rates, switches, s, live, fine, middle, sizes)
+      pieces%n = MANY_PIECES/2
+      call integrate(tape, t, y, switches, s, live, pieces)
+      coarse = pieces%change(:size(y))
+      pieces%n = MANY_PIECES
+      call integrate(tape, t, y, switches, s, live, pieces)
+      sizes = pieces%largest(:size(y))
       ! NaN is not allowed.
-      if (all(abs(fine - coarse) <= ROUGHLY*sizes)) exit
-      h = SHORTER*h
+      if (all(abs(pieces%change(:size(y)) - coarse) <= ROUGHLY*sizes)) exit
+      pieces%h = SHORTER*pieces%h
     end do
     if (tries > MOST_TRIES) sizes = 0.0_dp
     call restore_slots(tape, terms, on_level, is_new, switches, s, live)
@@ -303,35 +331,34 @@ contains
     switches%is_new = is_new
   end subroutine restore_slots
 
-  subroutine integrate(tape, t, y, h, n, rates, switches, s, live, change, middle, largest)
-    !! Compute the changes of the unknowns in a step, and in half of it, by n pieces, an even number,
-    !! with the classical Runge-Kutta method; and the largest unknowns.
+  subroutine integrate(tape, t, y, switches, s, live, pieces)
+    !! Compute the changes in the pieces with the classical Runge-Kutta method.
     type(tape_t), intent(in) :: tape
-    real(dp), intent(in) :: t(2), h  !! s
+    real(dp), intent(in) :: t(2)     !! s
     real(dp), intent(in) :: y(:)
-    integer, intent(in) :: n
-    real(dp), intent(in) :: rates(:) !! at the beginning
     type(switches_t), intent(inout), target :: switches
     type(series_t), intent(inout) :: s
     type(tape_t), intent(inout) :: live
-    real(dp), intent(out) :: change(:), middle(:), largest(:)
+    type(pieces_t), intent(inout) :: pieces !! length, number and rates are inputs
     real(dp), dimension(size(y)) :: k1, k2, k3, k4
-    real(dp) :: piece
+    real(dp) :: h
     integer :: i
 
-    piece = h/n
-    change = 0.0_dp
-    largest = abs(y)
-    k1 = rates
-    do i = 1, n
-      if (i > 1) call rates_after((i - 1)*piece, change, k1)
-      call rates_after((i - 0.5_dp)*piece, change + 0.5_dp*piece*k1, k2)
-      call rates_after((i - 0.5_dp)*piece, change + 0.5_dp*piece*k2, k3)
-      call rates_after(i*piece, change + piece*k3, k4)
-      change = change + piece/6.0_dp*((k1 + k4) + 2.0_dp*(k2 + k3))
-      largest = max(largest, abs(y + change))
-      if (i == n/2) middle = change
-    end do
+    h = pieces%h/pieces%n
+    associate (change => pieces%change(:size(y)), largest => pieces%largest(:size(y)))
+      change = 0.0_dp
+      largest = abs(y)
+      k1 = pieces%rates(:size(y))
+      do i = 1, pieces%n
+        if (i > 1) call rates_after((i - 1)*h, change, k1)
+        call rates_after((i - 0.5_dp)*h, change + 0.5_dp*h*k1, k2)
+        call rates_after((i - 0.5_dp)*h, change + 0.5_dp*h*k2, k3)
+        call rates_after(i*h, change + h*k3, k4)
+        change = change + h/6.0_dp*((k1 + k4) + 2.0_dp*(k2 + k3))
+        largest = max(largest, abs(y + change))
+        if (i == pieces%n/2) pieces%middle(:size(y)) = change
+      end do
+    end associate
 
   contains
 

@@ -22,6 +22,7 @@ module tape_step
   ! in tolerances, and over the rounding errors.
   real(dp), parameter :: MOST_DEFECT = 1.0_dp
   real(dp), parameter :: MOST_ROUNDING = 1e3_dp
+  real(dp), parameter :: SHRUNK = 1e-8_dp ! length near a singular point, over the time
   integer, parameter :: MOST_LONGER = 12 ! expansions of a step that is too short
   ! Change of a switch's operand beyond its level, in rounding errors, and the longest time that it
   ! takes, over the tolerance and the step that was tried.
@@ -118,7 +119,7 @@ contains
       if (is_rejected) factor = min(1.0_dp, factor)
       factor = min(factor, longest/s%h)
       call converge(live, s%order, minval(tolerances), s%a, s%powers, factor)
-      if (is_allowed .and. factor > 0.0_dp) then
+      if (is_allowed .and. factor > 0.0_dp .and. abs(factor*s%h) <= SHRUNK*abs(request%t)) then
         if (is_near_singular(live, s%order, s%a, factor)) then
           call take_long_step(LONGER_THAN_SERIES*factor*s%h, abs(factor*s%h))
           if (step%status /= OVERFLOW) return
@@ -183,11 +184,13 @@ contains
       !! Take a step that needs no series, if it is accurate enough.
       real(dp), intent(in) :: first !! s, the longest that is tried
       real(dp), intent(in) :: least !! length of the shortest, s
-      real(dp) :: error
 
-      call step_over(tape, [request%t, 0.0_dp], request%state, &
-                     sign(min(abs(first), abs(longest)), longest), least, 1.0_dp/tolerances, &
-                     LOCAL_TOLERANCE, .false., switches, s, live, long_step, error)
+      long_step%first = sign(min(abs(first), abs(longest)), longest)
+      long_step%least = least
+      long_step%allowed = LOCAL_TOLERANCE
+      long_step%with_derivatives = .false.
+      call step_over(tape, [request%t, 0.0_dp], request%state, 1.0_dp/tolerances, switches, s, &
+                     live, long_step)
       if (.not. abs(long_step%h) > 0.0_dp) return
       step%status = SLIDING
       if (long_step%slides > 0) return

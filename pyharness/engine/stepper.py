@@ -1,6 +1,5 @@
 """Integration step by step, while the user changes torque or state."""
 
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
@@ -232,7 +231,8 @@ class Stepper:
             rates = np.abs(self._rates()[self._n : -3])
             guess = rates * min(abs(end - self._time), self._trial, 1.0 / scale)
             sizes = np.where(own_sizes > 0.0, own_sizes, np.where(rates > 0.0, guess, math.inf))
-        for tries in itertools.count():
+        guesses = 0
+        while True:
             tolerances = np.full(len(self._state), math.inf)
             tolerances[:3] = self._tolerance * scale
             tolerances[3 : self._n] = 0.5 * self._tolerance
@@ -250,8 +250,9 @@ class Stepper:
             is_far = (own_sizes == 0.0) & (own > 0.0) & (own < 0.5 * sizes)
             is_guessed = self._largest > 0.0 or not 0.0 < reached < 0.5 * scale
             # Near a root of time, the guesses would shrink with the steps.
-            if (is_guessed and not is_far.any()) or tries == _MOST_GUESSES:
+            if (is_guessed and not is_far.any()) or guesses == _MOST_GUESSES:
                 return taken
+            guesses += 1
             if self._largest == 0.0 and reached > 0.0:
                 scale = min(scale, reached)
             sizes, self._trial = np.where(is_far, own, sizes), abs(taken.h)

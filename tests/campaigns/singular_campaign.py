@@ -123,7 +123,8 @@ def smooth_motion(
     def rates(w: Array) -> Array:
         x, y, z = w
         a = np.array([(2.0 - 3.0) * y * z, (3.0 - 1.0) * z * x, (1.0 - 2.0) * x * y])
-        return (a - k * np.abs(w) ** p * np.sign(w)) / np.array(BRICK)
+        found: Array = (a - k * np.abs(w) ** p * np.sign(w)) / np.array(BRICK)
+        return found
 
     def entered(i: int, side: float) -> Any:
         def event(t: float, w: Array) -> float:
@@ -133,13 +134,14 @@ def smooth_motion(
         return event
 
     options: Any = {"method": "DOP853", "rtol": tolerance, "atol": 1e-3 * tolerance}
-    time, state = 0.0, np.array(start)
+    time = 0.0
+    state: Array = np.array(start)
     zones = [(i, side) for i in range(3) for side in (1.0, -1.0)]
     while time < end:
         inside = [i for i in range(3) if abs(state[i]) < near]
         if inside:
             raise ValueError("two rates are near 0, or one turns there")
-        found = solve_ivp(lambda t, w: rates(w), (time, end), state,
+        found: Any = solve_ivp(lambda t, w: rates(w), (time, end), state,
                           events=[entered(*zone) for zone in zones], **options)  # fmt: skip
         time, state = float(found.t[-1]), found.y[:, -1]
         if not time < end:
@@ -152,7 +154,8 @@ def smooth_motion(
                 w = y[1:].copy()
                 w[i] = sign * v**m
                 f = rates(w)
-                return np.array([1.0, *f]) * (sign * m * v ** (m - 1) / f[i])
+                change: Array = np.array([1.0, *f]) * (sign * m * v ** (m - 1) / f[i])
+                return change
 
             def at_end(v: float, y: Array) -> float:
                 return float(y[0] - end)
@@ -190,9 +193,9 @@ def try_scene(tally: driver.Tally) -> None:
     if family is crossing:
         tolerance = max(tolerance, 1e-8)
     try:
-        found = solve(case.scene, case.times, tolerance=tolerance, dense_output=True)
-    except InputError as error:
-        tally.fault(f"{family.__name__}: {error}")
+        found: Any = solve(case.scene, case.times, tolerance=tolerance, dense_output=True)
+    except InputError as refusal:
+        tally.fault(f"{family.__name__}: {refusal}")
         return
     more = f", tolerance {tolerance:.3g}"
     tally.counts[f"{family.__name__}: {found.ended}"] += 1

@@ -38,14 +38,14 @@ UNDEFINED = {
 def test_undefined_torque_ends_with_operation_time_and_advice(name: str, method: str) -> None:
     if name in ("root at the start", "arccosine"):
         # A step without a series passes them; the reference has none.
-        found = solve(_scene(UNDEFINED[name][0]), [0.25, 1.0], method, 1e-6)
+        found: Any = solve(_scene(UNDEFINED[name][0]), [0.25, 1.0], method, 1e-6)
         assert found.ended == "stalled" or method != "reference"
         assert found.success == (method != "reference")
         return
     if method == "dop853" and name == "sign":
         return  # it does not pass the jump
     torque, words, rows = UNDEFINED[name]
-    found: Any = solve(_scene(torque), [0.25, 1.0], method, 1e-6)
+    found = solve(_scene(torque), [0.25, 1.0], method, 1e-6)
     assert (found.ended, len(found.time), found.success) == ("singular", rows, False)
     assert words in found.reason
     assert "; write" in found.reason

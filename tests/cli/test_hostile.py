@@ -144,7 +144,7 @@ def test_output_layer_keeps_lines_and_letters(capsys: Capture) -> None:
     assert capsys.readouterr().err == ""
 
 
-@pytest.mark.parametrize("name", ["/proc/site", "x" * 255])
+@pytest.mark.parametrize("name", ["/proc/site", "x" * 256])
 def test_folder_that_can_not_be_made_is_refused_before_any_work(
     name: str, capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -201,7 +201,11 @@ def noise_of(
 def with_noise(
     g: EventFunction, solution: Solution, fits: Fits, needed: Index
 ) -> tuple[Fits, Roots]:
-    """Return `fits` with `noise` where `needed`, and roots at time 0 and both ends."""
+    """Return `fits` with `noise` where `needed`, and roots at time 0 and both ends.
+
+    A root at time 0 hides all roots beside it up to the time at which the function exceeds its
+    noise, such as the root at which an earlier integration ended.
+    """
     sizes, largest = fits.sizes, fits.sizes.max(initial=0.0)
     which = np.flatnonzero(needed | (sizes <= largest / MUCH) | (sizes == largest))
     ends, states = solution.at_ends
@@ -217,9 +221,13 @@ def with_noise(
         g, np.concatenate([times.ravel(), ends]), np.concatenate([inner, states])
     )
     fits.noise[which] = noise[:n].reshape(times.shape).max(axis=1)
-    # At an end, a value that exceeds its rounding error is no root.
-    is_root = np.abs(values[n:]) <= 4.0 * rounding[n:]
-    return fits, Roots.bare(ends[is_root], 0, 4.0 * rounding[n:][is_root])
+    # At an end, a value that exceeds its rounding error is no root. The state at time 0 may be the
+    # result of an earlier integration, and the function may have rounding errors of its own.
+    size = sizes[(fits.low == 0.0) | (fits.high == 0.0)].max(initial=0.0)
+    limit = np.where(ends == 0.0, noise[n:] + ROUNDING * size, 0.0)
+    limit = np.maximum(limit, 4.0 * rounding[n:])
+    is_root = np.abs(values[n:]) <= limit
+    return fits, Roots.bare(ends[is_root], 0, limit[is_root])
 
 
 def _sign_changes(times: Array, values: Array, first: Array) -> Roots:

@@ -35,21 +35,17 @@ class ZeroIntervals:
     def roots(self, counts_touches: bool) -> Roots:
         """Return as roots the times at which integration from time 0 first reaches each interval.
 
-        Without `counts_touches`, only sign changes away from time 0 count.
+        Without `counts_touches`, only sign changes count.
         """
         is_before = self.high < 0.0
-        is_first = (self.low <= 0.0) & ~is_before
-        time = np.where(is_before, self.high, np.maximum(self.low, 0.0))
-        lasting = np.where(self.high <= 0.0, self.low, self.high) - time
-        change = np.where(is_first, 0.0, np.where(is_before, self.after, -self.before))
-        is_root = is_first | (change != 0.0)
+        time = np.where(is_before, self.high, self.low)
+        change = np.where(is_before, self.after, -self.before)
+        # Integration starts in an interval that contains time 0.
+        is_root = (is_before | (self.low > 0.0)) & (change != 0.0)
         if not counts_touches:
-            is_root = ~is_first & (self.before * self.after < 0.0)
-        # An interval around time 0 is reached on both sides.
-        both = np.flatnonzero(is_root & is_first & (self.low < 0.0) & (self.high > 0.0))
-        time, change = (np.append(x[is_root], x[both]) for x in (time, change))
-        lasting = np.append(lasting[is_root], self.low[both])
-        return Roots.bare(time, change.astype(int), lasting=lasting)
+            is_root &= self.before * self.after < 0.0
+        lasting = np.where(is_before, self.low, self.high) - time
+        return Roots.bare(time, change.astype(int), lasting=lasting).only(is_root)
 
     def contain(self, g: EventFunction, solution: Solution, roots: Roots) -> Index:
         """Return which roots are in an interval, or separated from one only by zero values."""

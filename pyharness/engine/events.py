@@ -6,7 +6,9 @@ between nodes of tiny intervals are found.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -38,7 +40,10 @@ def event_roots(g: EventFunction, solution: Solution) -> Roots:
         if zeros is not None:
             roots = roots.only(~zeros.contain(g, solution, roots))
         if roots.time.size:
-            roots = _polished(g, solution, _merged(g, solution, roots))
+            roots = _merged(g, solution, roots)
+            # The root at the start remains there.
+            roots.change[roots.time == 0.0] = 0
+            roots = _polished(g, solution, roots)
         return roots if zeros is None else joined([roots, zeros.roots(g.event.counts_touches)])
 
 
@@ -69,14 +74,46 @@ def _polished(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
         better = np.abs(other) < np.abs(value)
         time, value = np.where(better, trial, time), np.where(better, other, value)
         slope = np.where(better, slope, math.inf)
-    return replace(roots, time=_bisected(g, solution, time, roots.change))
+    # Integration may continue from the state at a root, which must be beyond the sign change.
+    is_short = value * _after(time, roots.change) < 0.0
+    values, ends = partial(solution.values, g), solution.pieces.edges[[0, -1]]
+    time = _bisected(solution, values, ends, time, roots.change, is_short)
+    if solution.sol.states is not solution.pieces:
+        time = _beyond(g, solution, time, roots.change, roots.noise)
+    return replace(roots, time=time)
 
 
-def _bisected(g: EventFunction, solution: Solution, times: Array, changes: Index) -> Array:
-    """Return the times (s) of roots, with inexact sign changes refined by bisection."""
+def _after(times: Array, changes: Index) -> Index:
+    """Return the signs, after roots in the direction of integration, of a function that changes."""
+    return np.where(times < 0.0, -changes, changes)
+
+
+def _beyond(
+    g: EventFunction, solution: Solution, times: Array, changes: Index, noise: Array
+) -> Array:
+    """Return the times (s) of roots, those at which `sol` is before the sign change moved."""
+    values, ends = (
+        partial(solution.exact_values, g),
+        np.array([solution.sol.t_min, solution.sol.t_max]),
+    )
+    value = values(times)
+    # The start of an integration hides smaller values.
+    is_short = (value * _after(times, changes) < 0.0) & (np.abs(value) > noise)
+    return _bisected(solution, values, ends, times, np.where(is_short, changes, 0), is_short)
+
+
+def _bisected(
+    solution: Solution,
+    values: Callable[[Array], Array],
+    ends: Array,
+    times: Array,
+    changes: Index,
+    is_short: Index,
+) -> Array:
+    """Return the times (s) of roots, with inexact or short sign changes refined by bisection."""
     # Near a root of odd multiplicity above 1, polynomials are inexact, but signs are not.
     edges = solution.pieces.edges
-    bounds = np.concatenate([edges[:1], 0.5 * times[:-1] + 0.5 * times[1:], edges[-1:]])
+    bounds = np.concatenate([ends[:1], 0.5 * times[:-1] + 0.5 * times[1:], ends[1:]])
     piece = np.clip(np.searchsorted(edges, times) - 1, 0, len(edges) - 2)
     rounding = np.spacing(np.abs(times)) + np.spacing(edges[piece + 1] - edges[piece])
     found, width = times.copy(), _EXACT * rounding
@@ -87,9 +124,10 @@ def _bisected(g: EventFunction, solution: Solution, times: Array, changes: Index
         low[wide] = np.maximum(times[wide] - width[wide], bounds[wide])
         high[wide] = np.minimum(times[wide] + width[wide], bounds[wide + 1])
         ends = np.concatenate([low[wide], high[wide]])
-        before, after = solution.values(g, ends).reshape(2, -1) * changes[wide]
+        before, after = values(ends).reshape(2, -1) * changes[wide]
         has_change = (before < 0.0) & (after > 0.0)
-        open_ones.append(wide[has_change & (width[wide] > _EXACT * rounding[wide])])
+        is_exact = (width[wide] <= _EXACT * rounding[wide]) & ~is_short[wide]
+        open_ones.append(wide[has_change & ~is_exact])
         is_whole = (low[wide] == bounds[wide]) & (high[wide] == bounds[wide + 1])
         wide = wide[~(has_change | is_whole)]
         width[wide] *= _WIDER
@@ -99,8 +137,8 @@ def _bisected(g: EventFunction, solution: Solution, times: Array, changes: Index
         k, middle = (x[(middle > low[k]) & (middle < high[k])] for x in (k, middle))
         # The root of an interval of zeros is the end that integration from time 0 reaches first.
         is_before = times[k] < 0.0
-        values = solution.values(g, middle) * changes[k]
-        is_late = (values > 0.0) | ((values == 0.0) & ~is_before)
+        value = values(middle) * changes[k]
+        is_late = (value > 0.0) | ((value == 0.0) & ~is_before)
         low[k], high[k] = np.where(is_late, low[k], middle), np.where(is_late, middle, high[k])
         found[k] = np.where(is_before, low[k], high[k])
     return found
@@ -185,40 +223,41 @@ def _chosen(roots: Roots, group: Index, change: int, ends: tuple[float, ...]) ->
     return int(alike[len(alike) // 2])
 
 
-def side_events(g: EventFunction, solution: Solution, roots: Roots, side: int) -> Array:
-    """Return event times (s) after (`side` 1) or before (-1) time 0, in order away from 0."""
+def side_events(g: EventFunction, solution: Solution, roots: Roots, side: int) -> Roots:
+    """Return the events after (`side` 1) or before (-1) time 0, in order away from 0."""
     end = solution.pieces.edges[-1 if side > 0 else 0]
-    if side * end <= 0.0 or not roots.time.size:
-        return np.zeros(0)
-    roots = roots.only((side * roots.time >= 0.0) & (side * (roots.time + roots.lasting) >= 0.0))
-    time, change, lasting = (side * x[::side] for x in (roots.time, roots.change, roots.lasting))
-    # As in SciPy, a root at time 0 is a sign change from 0, and one at the end a change to 0.
-    is_end = (lasting == 0.0) & ((time == 0.0) | (time == side * end))
-    last, first = np.append(0.0, time + lasting), np.append(time, side * end)
+    # A root at time 0, where the integration starts, is no event.
+    roots = roots.only(side * roots.time > 0.0).only(slice(None, None, side))
+    time, change, lasting = (side * x for x in (roots.time, roots.change, roots.lasting))
+    # As in SciPy, a root at the end is a sign change to 0.
+    is_end = (lasting == 0.0) & (time == side * end)
+    last = np.append(0.0, time + lasting)
     for k in np.flatnonzero(is_end):
-        beside = first[k + 1] if time[k] == 0.0 else last[k]
-        value = solution.values(g, np.array([side * (0.5 * time[k] + 0.5 * beside)]))[0]
-        change[k] = np.sign(value) * (1 if time[k] == 0.0 else -1)
+        value = solution.values(g, np.array([side * (0.5 * time[k] + 0.5 * last[k])]))[0]
+        change[k] = -np.sign(value)
     accepted = (change == g.event.direction) | (g.event.direction == 0)
     if not g.event.counts_touches:
         accepted &= (change != 0) & ~is_end
-    found: Array = side * time[accepted]
-    return found
+    return roots.only(accepted)
 
 
 def _repeated(
-    g: EventFunction, solution: Solution, times: Array, side: int, period: float
+    g: EventFunction, solution: Solution, roots: Roots, side: int, period: float
 ) -> Array:
     """Return event times (s) on one side of 0, repeated periodically beyond the polynomials."""
     last, end = solution.pieces.edges[-1], solution.sol.t_max
     if side < 0:
         last, end = solution.pieces.edges[0], solution.sol.t_min
     if last == end or period == 0.0:
-        return times
-    found, kept = repeated(side * times, period, abs(end), g.name)
+        return roots.time
+    found, which, kept = repeated(side * roots.time, period, abs(end), g.name)
     found *= side
     found[kept:] = improved(g, found[kept:], solution.exact_values, period)
-    return np.clip(found, solution.sol.t_min, solution.sol.t_max)
+    found = np.clip(found, solution.sol.t_min, solution.sol.t_max)
+    if g.limit < math.inf:
+        roots = roots.only(which[::side])
+        found[::side] = _beyond(g, solution, found[::side], roots.change, roots.noise)
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,7 +300,6 @@ def found_events(
     found = no_events(len(functions), solution.pieces.values.shape[2])
     for k, both in enumerate(zip(*sides.values(), strict=True)):
         if any(map(len, both)):
-            # A root at time 0 may be in the lists of both sides.
-            found.times[k] = np.unique(np.concatenate(both))
+            found.times[k] = np.sort(np.concatenate(both))
             found.states[k] = solution.sol(found.times[k]).T
     return FoundEvents(found.times, found.states, -limits[-1], limits[1])

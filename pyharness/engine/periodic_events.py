@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pyharness.engine.event_functions import EventFunction
 from pyharness.model.array_type import Array
@@ -36,8 +37,10 @@ def _is_of_omega(g: EventFunction) -> bool:
     return tape.inputs.isdisjoint({TIME, *ATTITUDE})
 
 
-def repeated(times: Array, period: float, end: float, where: str) -> tuple[Array, int]:
-    """Return event times (s) until `end`, and how many precede the repeated period.
+def repeated(
+    times: Array, period: float, end: float, where: str
+) -> tuple[Array, NDArray[np.intp], int]:
+    """Return event times (s) until `end`, their originals, and how many precede the repetition.
 
     `times` are events of the first three periods.
     """
@@ -45,23 +48,23 @@ def repeated(times: Array, period: float, end: float, where: str) -> tuple[Array
     margin = _MARGIN * period
     inner = times[(times > period - margin) & (times <= 2.0 * period + margin)]
     if not inner.size:
-        # Time 0 may be an event that does not recur.
-        return times[times < period], len(times[times < period])
+        return times, np.arange(len(times)), len(times)
     # The repeated period begins in the largest gap, far from any event.
     phases = np.sort(inner % period)
     gaps = np.diff(phases, append=phases[0] + period)
     begin = period + phases[gaps.argmax()] + 0.5 * gaps.max()
     begin -= period if begin > 2.0 * period else 0.0
-    first = times[times <= begin]
-    one = times[(times > begin) & (times <= begin + period)]
+    first = np.flatnonzero(times <= begin)
+    one = np.flatnonzero((times > begin) & (times <= begin + period))
     count = np.floor((end - begin) / period) + 1.0
     if count * len(one) > _MOST_EVENTS:
         raise InputError(
             f"{where}: more than {_MOST_EVENTS} events; use a shorter time, or the attribute "
             "terminal"
         )
-    later = (one + period * np.arange(count)[:, None]).ravel()
-    return np.concatenate([first, later[later <= end]]), len(first)
+    later = (times[one] + period * np.arange(count)[:, None]).ravel()
+    found = np.concatenate([times[first], later[later <= end]])
+    return found, np.concatenate([first, np.tile(one, int(count))])[: len(found)], len(first)
 
 
 def improved(

@@ -100,7 +100,9 @@ def solve(
         Functions of (t, omega) or (t, omega, attitude), or events of `pyharness.events`. Their
         roots between 0 and `times` become `t_events`, and the states there `y_events`. A function
         may have the attributes `terminal` and `direction`, as in SciPy's `solve_ivp`; rows after a
-        terminal event are removed. Functions that accept arrays are called with arrays.
+        terminal event are removed. A root at time 0 is no event, nor is one before the function
+        first exceeds its error; so a run can continue from a state in `y_events`. Functions that
+        accept arrays are called with arrays.
     sensitivities : iterable of str
         Names of the parameters with respect to which omega and the quaternion are differentiated:
         `omega` (at time 0), `attitude` (small initial rotations about the body axes, rad),

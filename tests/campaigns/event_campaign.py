@@ -33,6 +33,10 @@ class Planted:
     changes: Any
     rounding: Array
 
+    def only(self, kept: Any) -> "Planted":
+        arrays = (each[kept] for each in (self.roots, self.changes, self.rounding))
+        return Planted(self.function, self.end, *arrays)
+
 
 def planted(kind: str, rng: np.random.Generator) -> Planted:
     """Return a random function of a kind in `KINDS`."""
@@ -71,7 +75,7 @@ def _within(
     function: Callable[..., Any], end: float, roots: Array, changes: Any, rounding: Array
 ) -> Planted:
     kept = (roots > 1e-9 * end) & (roots < end * (1.0 - 1e-9))
-    return Planted(function, end, roots[kept], changes[kept], rounding[kept])
+    return Planted(function, end, roots, changes, rounding).only(kept)
 
 
 def _product(end: float, at_edges: bool, rng: np.random.Generator) -> Planted:
@@ -148,6 +152,8 @@ def run(kind: str, seed: int, tally: Tally) -> None:
     found = solve(BODY, given.end, events=[given.function, rising])
     assert found.t_events is not None
     times, rises = found.t_events
+    # A root at the start is no event.
+    given = given.only(given.roots > 0.0)
     tally.roots += len(given.roots)
     tally.missed += max(0, len(given.roots) - len(times))
     tally.invented += max(0, len(times) - len(given.roots))
@@ -155,9 +161,8 @@ def run(kind: str, seed: int, tally: Tally) -> None:
     if len(times) != len(given.roots):
         tally.examples.append(what)
         return
-    inner = (given.roots > 0.0) & (given.roots < given.end)
-    expected = given.roots[inner & (given.changes == 1)]
-    got = rises[(rises > 0.0) & (rises < given.end)]
+    expected = given.roots[(given.roots < given.end) & (given.changes == 1)]
+    got = rises[rises < given.end]
     error = np.abs(times - given.roots)
     excess = np.max(np.maximum(error - given.rounding, 0.0) / given.end, initial=0.0)
     tally.largest = max(tally.largest, float(excess))

@@ -172,14 +172,11 @@ def test_roots_of_odd_multiplicity_are_as_exact_as_the_sign(end: float) -> None:
             assert found.tolist() == pytest.approx(expected, abs=2.0**-52 * abs(end))
 
 
-def test_function_that_is_0_everywhere_has_one_event_and_no_change_of_sign() -> None:
+def test_function_that_is_0_everywhere_has_no_event() -> None:
     spin = Scene("spin", omega=(0.0, 0.0, 2.0), moments=(1.0, 1.0, 3.0))
     for times in (9.0, -9.0, [-9.0, 9.0]):
-        for event in (crosses(1), crosses(3, 2.0)):
-            assert times_of(spin, times, event) == [0.0]
-        assert (
-            times_of(spin, times, crosses(1, direction=1)) == times_of(spin, times, flip(1)) == []
-        )
+        for event in (crosses(1), crosses(3, 2.0), crosses(1, direction=1), flip(1)):
+            assert times_of(spin, times, event) == []
 
 
 def test_a_kink_within_a_step_ends_an_interval_of_zeros() -> None:
@@ -201,7 +198,7 @@ def test_an_interval_of_zeros_is_one_event_wherever_the_integration_ends(directi
     scene = Scene("", (0.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=push)
     dead = 0.25  # of a function that is 0 about 0.5
     knots: list[tuple[Callable[..., Any], list[tuple[float, int]]]] = [
-        (lambda t, omega: omega[0], [(0.0, 0), (4.0, -1)]),
+        (lambda t, omega: omega[0], [(4.0, -1)]),
         (lambda t, omega: omega[0] - 1.0, [(2.0, 1)]),
         (lambda t, omega: (omega[0] - 1.0) ** 3, [(2.0, 1)]),
         (lambda t, omega: np.sign(np.round(2.0 * omega[0] - 1.0)), [(1.25, 1), (3.25, -1)]),
@@ -230,7 +227,7 @@ def test_a_body_at_rest_has_no_error_that_hides_a_small_value() -> None:
 def test_periodic_roots_after_an_interval_of_zeros_are_found() -> None:
     ball = Scene("", (0.0, 0.0, 1.0), moments=(1.0, 1.0, 1.0))
     found = times_of(ball, 6.5, lambda t, w: np.where(t < 1.0, 0.0, np.sin(np.pi * t)))
-    assert found == pytest.approx([0.0, 2.0, 3.0, 4.0, 5.0, 6.0], abs=1e-12)
+    assert found == pytest.approx([2.0, 3.0, 4.0, 5.0, 6.0], abs=1e-12)
     nutation = Scene("", (0.3, 2.0, 0.1), moments=(1.0, 2.0, 3.0))
     flips = times_of(nutation, 40.0, flip(2))
     jumps = times_of(nutation, 40.0, lambda t, w: np.where(t < flips[0], -1.0, w[1]))
@@ -325,7 +322,9 @@ def test_direction_and_ends_as_in_scipy(
 ) -> None:
     scene = Scene("ball", (1.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=damping(1.0))
     event = with_attributes(lambda t, omega: sign * (t - root * end), False, direction)
-    assert times_of(scene, end, event) == pytest.approx(scipy_events(scene, end, event), abs=1e-12)
+    # SciPy also reports a root at the start.
+    expected = scipy_events(scene, end, event) if root else []
+    assert times_of(scene, end, event) == pytest.approx(expected, abs=1e-12)
 
 
 @pytest.mark.parametrize("terminal", [True, 1, 2, 3])
@@ -349,9 +348,9 @@ def test_terminal_event_removes_what_follows(terminal: bool | int) -> None:
     assert found.sol.t_max == times[0][-1]
 
 
-def test_terminal_event_at_time_0_and_one_that_does_not_occur() -> None:
+def test_terminal_event_that_does_not_occur() -> None:
     found = solve(BODY, [0.0, 1.0], events=crosses(1, BODY.omega[0], terminal=True))
-    assert events_of(found)[0][0].tolist() == found.time.tolist() == [0.0]
+    assert (events_of(found)[0][0].size, found.time.tolist()) == (0, [0.0, 1.0])
     found = solve(BODY, [10.0, 30.0], events=with_attributes(lambda t, omega: omega[1], 9))
     assert (found.status, found.ended, len(found.time)) == (0, "complete", 2)
 

@@ -214,7 +214,8 @@ contains
           end if
         end if
         call converge(live, s%order, smallest_size(), s%a, s%powers, factor)
-        if (x%is_reaching .and. factor < GUESSED .and. factor > 0.0_dp .and. tries < MOST_TRIES) then
+        if (x%is_reaching .and. factor < GUESSED .and. factor > 0.0_dp &
+            .and. tries < MOST_TRIES) then
           ! The guess of the scale is that of a longer step.
           call guess_again()
           cycle integration
@@ -269,7 +270,7 @@ contains
       n_before = solution%n_rows
       call add_rows(x, s, e, factor, request, size(request%times) - merge(1, 0, at_end), solution, &
                     found%error)
-      if (solution%status /= COMPLETE) exit
+      if (solution%status /= COMPLETE) exit integration
       if (associated(solution%nodes)) then
         call add_nodes(x, s, e, factor, t_next(1), request%tolerance, solution, found%error)
       end if
@@ -289,7 +290,7 @@ contains
           found%switches_at = x%t(1)
           found%switch = long_step%slides
           solution%status = SLIDING
-          exit
+          exit integration
         end if
       else
         call take_error(x, s, factor, e)
@@ -298,7 +299,7 @@ contains
       found%steps = found%steps + 1
       if (.not. maxval(abs(x%y)) <= huge(s%h)) then
         solution%status = OVERFLOW
-        exit
+        exit integration
       end if
       x%scale = max(x%scale, maxval(abs(x%y(:3))))
       do i = x%first_own, x%n
@@ -306,12 +307,12 @@ contains
       end do
       if (at_end) then
         call add_row(x, request, x%y_low, e%lanes(1, :x%n, 1), solution, found%error)
-        exit
+        exit integration
       end if
       ! The steps shrink to nothing before a singularity.
       if (abs(factor*s%h) <= spacing(x%t(1)) .and. .not. arrives .and. verdict /= CROSSES) then
         solution%status = merge(STALLED, OVERFLOW, x%scale <= UNBOUNDED*first_scale)
-        exit
+        exit integration
       end if
       call count_step(solution%n_rows > n_before, transitions, is_full)
       if (is_full) then
@@ -330,7 +331,7 @@ contains
       if (has_guess) call share_tolerance()
       call check_steps(found%steps, x%t(1), rest, arrives .or. verdict == CROSSES .or. is_long, &
                        limit, found%ahead, solution%status)
-      if (solution%status /= COMPLETE) exit
+      if (solution%status /= COMPLETE) exit integration
     end do integration
     call weigh(t_end, to_stop, s, x)
     where (x%weights > 0.0_dp)
@@ -401,7 +402,8 @@ contains
       if (is_long) then
         next_try = huge(next_try)
       else
-        next_try = abs(h)*max(LEAST_PART, sqrt(min(1.0_dp, long_step%allowed/long_step%largest_error)))
+        next_try = abs(h)*max(LEAST_PART, sqrt(min(1.0_dp, &
+                                                   long_step%allowed/long_step%largest_error)))
       end if
     end subroutine step_beyond_singular
 
@@ -450,8 +452,8 @@ contains
     end subroutine guess_unknown_sizes
 
     subroutine guess_again()
-      !! Try a shorter step, from whose series the sizes of unknowns that begin at 0 are guessed. From
-      !! rest under a high power, the guesses would shrink with the steps: they need no series.
+      !! Try a shorter step, from whose series the sizes of unknowns that begin at 0 are guessed.
+      !! From rest under a high power, the guesses would shrink with the steps: they need no series.
       real(dp) :: reached(x%n)
 
       tries = tries + 1

@@ -43,7 +43,7 @@ module tape_runge_kutta
 
   type, public :: long_step_t
     ! What is required.
-    real(dp) :: first, least            ! length that is tried first, and that of the shortest step, s
+    real(dp) :: first, least            ! length that is tried first, and shortest length, s
     real(dp) :: allowed                 ! error
     logical :: with_derivatives
     ! What is computed.
@@ -53,7 +53,7 @@ module tape_runge_kutta
     real(dp) :: change(MOST_UNKNOWNS)
     real(dp) :: error(MOST_UNKNOWNS)    ! bound of its error
     real(dp) :: terms(4, MOST_UNKNOWNS) ! of the quartic with the change, rates and middle value
-    ! Derivatives of the change by the unknowns at the beginning: element (i, j) is that of change i.
+    ! Derivatives of the change by the unknowns at the beginning; element (i, j) is of change i.
     real(dp) :: derivatives(MOST_UNKNOWNS, MOST_UNKNOWNS)
   end type long_step_t
 
@@ -264,8 +264,8 @@ contains
     if (switches%n == 0) return
     rounded = 8.0_dp*SHORTEST*spacing(t)/abs(s%h)
     if (before_crossings(switches, s, factor)) then
-      longest_without_terms = sign(merge(factor - rounded, factor + rounded, factor > 2.0_dp*rounded), &
-                                   s%h)*abs(s%h)
+      if (factor > 2.0_dp*rounded) rounded = -rounded
+      longest_without_terms = (factor + rounded)*s%h
     end if
   end function longest_without_terms
 

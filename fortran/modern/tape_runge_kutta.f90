@@ -57,6 +57,10 @@ module tape_runge_kutta
     real(dp) :: derivatives(MOST_UNKNOWNS, MOST_UNKNOWNS)
   end type long_step_t
 
+  ! Pointers, so that code that is rarely needed is not inlined.
+  procedure(rates_at), pointer, public :: rates_by => rates_at
+  procedure(integrate), pointer, public :: integrate_by => integrate
+
   public :: guess_sizes, has_singular_points, is_near_singular, longest_without_terms, step_over
 
 contains
@@ -136,7 +140,7 @@ contains
     step%h = 0.0_dp
     step%largest_error = huge(error)
     call keep_slots(switches, s, terms, on_level, is_new)
-    call rates_at(tape, t, y, step%first, switches, s, live, rates)
+    call rates_by(tape, t, y, step%first, switches, s, live, rates)
     if (.not. all(abs(rates) <= huge(error))) then
       call restore_slots(tape, terms, on_level, is_new, switches, s, live)
       return
@@ -153,10 +157,10 @@ contains
       pieces%h = tried
       pieces%rates(:size(y)) = rates
       pieces%n = MOST_PIECES/2
-      call integrate(tape, t, y, switches, s, live, pieces)
+      call integrate_by(tape, t, y, switches, s, live, pieces)
       coarse = pieces%change(:size(y))
       pieces%n = MOST_PIECES
-      call integrate(tape, t, y, switches, s, live, pieces)
+      call integrate_by(tape, t, y, switches, s, live, pieces)
       fine = pieces%change(:size(y))
       step%error(:size(y)) = HALVED*abs(fine - coarse)
       ! NaN must not be lost in the maximum.
@@ -208,7 +212,7 @@ contains
     end subroutine end_step
 
     subroutine set_end()
-      call rates_at(tape, [t(1) + tried, t(2)], y + fine, tried, switches, s, live, end_rates)
+      call rates_by(tape, [t(1) + tried, t(2)], y + fine, tried, switches, s, live, end_rates)
     end subroutine set_end
 
     subroutine interpolate()
@@ -236,8 +240,8 @@ contains
                            min(OF_SIZE, step%allowed)/weights(j))
         perturbed = y
         perturbed(j) = perturbed(j) + perturbation
-        call rates_at(tape, t, perturbed, tried, switches, s, live, other%rates(:size(y)))
-        call integrate(tape, t, perturbed, switches, s, live, other)
+        call rates_by(tape, t, perturbed, tried, switches, s, live, other%rates(:size(y)))
+        call integrate_by(tape, t, perturbed, switches, s, live, other)
         associate (change => other%change(:size(y)))
           if (all(abs(change) <= huge(error))) then
             step%derivatives(:size(y), j) = (change - fine)/(perturbed(j) - y(j))
@@ -285,13 +289,13 @@ contains
 
     call keep_slots(switches, s, terms, on_level, is_new)
     pieces%h = longest
-    call rates_at(tape, t, y, longest, switches, s, live, pieces%rates(:size(y)))
+    call rates_by(tape, t, y, longest, switches, s, live, pieces%rates(:size(y)))
     do tries = 1, MOST_TRIES
       pieces%n = MANY_PIECES/2
-      call integrate(tape, t, y, switches, s, live, pieces)
+      call integrate_by(tape, t, y, switches, s, live, pieces)
       coarse = pieces%change(:size(y))
       pieces%n = MANY_PIECES
-      call integrate(tape, t, y, switches, s, live, pieces)
+      call integrate_by(tape, t, y, switches, s, live, pieces)
       sizes = pieces%largest(:size(y))
       ! NaN is not allowed.
       if (all(abs(pieces%change(:size(y)) - coarse) <= ROUGHLY*sizes)) exit
@@ -369,7 +373,7 @@ contains
       real(dp) :: there(2)
 
       call two_sum(t(1), time + t(2), there(1), there(2))
-      call rates_at(tape, there, y + change_there, h, switches, s, live, rates_there)
+      call rates_by(tape, there, y + change_there, h, switches, s, live, rates_there)
     end subroutine rates_after
 
   end subroutine integrate

@@ -21,7 +21,7 @@ import numpy as np
 
 from pyharness.engine.plan import RK4_OR_TAYLOR
 from pyharness.engine.solver import CODES as _CODES
-from pyharness.model.codes import Methods, Places
+from pyharness.model.codes import Methods, Operations, Places, Statuses
 from pyharness.model.extension import GAVE_UP, OVERFLOW, SENSITIVE
 
 _ON_ARM = platform.machine().lower() in ("arm64", "aarch64")
@@ -76,8 +76,11 @@ def guarded(name: str, entry: Callable[..., Any]) -> Callable[..., Any]:
         # A tape has integers in the places of numbers.
         numbers = args[1:] if is_tape else args
         has_infinity = bool(raised & TOO_LARGE) or not _finite((*numbers, *named.values()))
-        if is_tape and found["status"] == OVERFLOW:
-            # The torque that the user wrote may be singular, as 1/0 is.
+        if is_tape and (
+            found["status"] in (OVERFLOW, Statuses.STALLED) or _has_roots(args[0], packed)
+        ):
+            # The torque that the user wrote may be singular, as 1/0 is, and steps over a zero of a
+            # root's argument compute the torque beyond it.
             has_infinity = True
         if is_tape or (name == "solve_packed" and method in _TRIES_AGAIN):
             # An attempt with too long steps may overflow; shorter steps or the series then follow.
@@ -98,6 +101,13 @@ def guarded(name: str, entry: Callable[..., Any]) -> Callable[..., Any]:
         raise UntoldException(f"{name}: {words}")
 
     return functools.wraps(entry, assigned=("__doc__",), updated=())(call)
+
+
+def _has_roots(numbers: np.ndarray, is_packed: bool) -> bool:
+    """Return whether a tape has operations that are undefined at some arguments."""
+    tape = numbers[Places.WAVES :] if is_packed else numbers
+    operations = tape[8 : 8 + 2 * int(tape[2])].view(np.int32)[::4]
+    return not set(operations).isdisjoint((Operations.SQRT, Operations.LOG, Operations.QUOTIENT))
 
 
 def _told(found: dict[str, Any], has_infinity: bool) -> int:

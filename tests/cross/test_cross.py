@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from pyharness import case_scene
+from pyharness.model.codes import Operations, Statuses
 from pyharness.model.extension import COMPLETE, GAVE_UP, OVERFLOW
 from pyharness.model.listing import Listing
 from pyharness.model.trajectory import Stop
@@ -107,7 +108,7 @@ def test_build_that_is_not_what_it_claims_is_named(
     command: str, record: dict[str, str], words: str | None, tmp_path: Path
 ) -> None:
     (tmp_path / "build").mkdir()
-    entry = f'[{{"command": "{command}", "output": "liboriginal.a.p/deck.o"}}]'
+    entry = f'[{{"command": "{command}", "file": "deck_binary64.f90"}}]'
     (tmp_path / "build" / "compile_commands.json").write_text(entry)
     said = {
         "extension": str(tmp_path / "pyharness" / "_kernels.so"),
@@ -180,19 +181,25 @@ def test_guard_knows_an_attempt_that_is_refused(
 
 
 @pytest.mark.parametrize(
-    ("raised", "status", "is_told"),
+    ("raised", "status", "operation", "is_told"),
     [
-        (DIVIDE, OVERFLOW, True),
-        (INVALID, OVERFLOW, True),
-        (TOO_LARGE, COMPLETE, True),
-        (DIVIDE, COMPLETE, False),
-        (INVALID, COMPLETE, False),
+        (DIVIDE, OVERFLOW, Operations.PRODUCT, True),
+        (INVALID, OVERFLOW, Operations.PRODUCT, True),
+        (INVALID, Statuses.STALLED, Operations.PRODUCT, True),
+        (TOO_LARGE, COMPLETE, Operations.PRODUCT, True),
+        (DIVIDE, COMPLETE, Operations.PRODUCT, False),
+        (INVALID, COMPLETE, Operations.PRODUCT, False),
+        (INVALID, COMPLETE, Operations.SQRT, True),
+        (DIVIDE, COMPLETE, Operations.QUOTIENT, True),
     ],
 )
 def test_guard_knows_that_a_users_torque_may_be_singular(
-    raised: int, status: int, is_told: bool, guarded_entry: Guarded
+    raised: int, status: int, operation: int, is_told: bool, guarded_entry: Guarded
 ) -> None:
-    assert _untold(guarded_entry(raised, status, name="tape_rows")) != is_told
+    tape = np.zeros(10)
+    tape[2] = 1.0
+    tape[8:].view(np.int32)[0] = operation
+    assert _untold(guarded_entry(raised, status, name="tape_rows"), tape) != is_told
 
 
 def test_guard_knows_an_infinity_that_was_given(guarded_entry: Guarded) -> None:

@@ -8,7 +8,7 @@ generates the permutations of their lanes that it needs. Other processors get Fo
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from pathlib import Path
 
@@ -327,7 +327,7 @@ def fortran_multiply() -> Iterator[str]:
 
 
 def c_source(level: str) -> Iterator[str]:
-    """Yield a C function for each order, and one that calls them by order."""
+    """Yield C functions, each of which ends at one of several orders."""
     yield "/* Written by unroll.py: the Taylor terms of a step, one register a term. */"
     yield "#include <immintrin.h>" if level == "avx512" else AVX2
     yield from """
@@ -343,30 +343,26 @@ def c_source(level: str) -> Iterator[str]:
 #define BOTH(low, high) _mm512_insertf64x4(_mm512_castpd256_pd512(low), high, 1)
 #define FOLDED(v) _mm256_add_pd(_mm512_castpd512_pd256(v), _mm512_extractf64x4_pd(v, 1))
 """.splitlines()
-    for order in ORDERS:
-        for name in ("terms", "both"):
-            yield f"static void {name}_{order}(double *restrict s)"
-            yield "{"
-            yield from (f"  {line}" for line in c_terms(order, name == "both", level == "avx512"))
-            yield "}\n"
-        yield f"static void variations_{order}(double *restrict s)"
+    for entry, body in {
+        "taylor_terms": c_terms(with_attitude=False, wide=level == "avx512"),
+        "attitude_terms": c_terms(with_attitude=True, wide=level == "avx512"),
+        "variation_terms": c_variations(wide=level == "avx512"),
+    }.items():
+        yield f"void {entry}_{level}(int order, double *restrict s)"
         yield "{"
-        yield from (f"  {line}" for line in c_variations(order, level == "avx512"))
-        yield "}\n"
-    for name, entry in (
-        ("terms", "taylor_terms"),
-        ("both", "attitude_terms"),
-        ("variations", "variation_terms"),
-    ):
-        yield f"void {entry}_{level}(int order, double *s)"
-        yield "{"
-        yield "  switch (order) {"
-        yield from (f"  case {order}: {name}_{order}(s); break;" for order in ORDERS)
-        yield "  }"
+        yield from (f"  {line}" for line in body)
         yield "}"
 
 
-def c_terms(order: int, with_attitude: bool, wide: bool) -> Iterator[str]:
+def c_end(order: int, ending: Iterable[str]) -> Iterator[str]:
+    """Yield statements that end a procedure at this order."""
+    yield f"if (order == {order}) {{"
+    yield from (f"  {line}" for line in ending)
+    yield "  return;"
+    yield "}"
+
+
+def c_terms(with_attitude: bool, wide: bool) -> Iterator[str]:
     """Yield the statements for omega, mixed with those for the attitude, which wait less."""
     yield f"const __m256d f = {load(RATES)}, t0 = {load(TERMS)};"
     yield "const __m256d a0 = TURNED_ONCE(t0), b0 = TURNED_TWICE(t0);"
@@ -377,30 +373,39 @@ def c_terms(order: int, with_attitude: bool, wide: bool) -> Iterator[str]:
         yield f"const __m256d k0 = {load(TURNS)};"
         yield from ready_for_products(0, wide)
     known: set[str] = set()
-    for line in recurrence(order):
+    for line in recurrence(MOST_ORDER):
         yield c(line, known)
         term = re.match(r"t(\d+) ", line)
         if not term:
             continue
         k = int(term[1])
         yield f"_mm256_store_pd(s + {TERMS + 4 * k}, t{k});"
-        if k < order:
-            yield f"const __m256d a{k} = TURNED_ONCE(t{k}), b{k} = TURNED_TWICE(t{k});"
         if k == 5:
             yield c("c = t4 + t5", known)
         elif k > 5:
             yield c(f"c = c + t{k}", known)
         if with_attitude:
             yield from attitude_term(k, wide)
-            yield from ready_for_products(k, wide)
             if k == 5:
                 yield c("d = k4 + k5", known)
             elif k > 5:
                 yield c(f"d = d + k{k}", known)
+        if k in ORDERS:
+            yield from c_end(k, end_of_c_terms(k, with_attitude, wide))
+        if k < MOST_ORDER:
+            yield f"const __m256d a{k} = TURNED_ONCE(t{k}), b{k} = TURNED_TWICE(t{k});"
+            if with_attitude:
+                yield from ready_for_products(k, wide)
+
+
+def end_of_c_terms(order: int, with_attitude: bool, wide: bool) -> Iterator[str]:
+    """Yield the sums of the terms, to which the largest terms are added last."""
+    known = {"c", "d"}
     yield from (c(f"c = c + t{k}", known) for k in (3, 2, 1))
     yield f"_mm256_store_pd(s + {CHANGE}, c);"
     if with_attitude:
         k = order + 1
+        yield from ready_for_products(order, wide)
         yield from attitude_term(k, wide)
         # Omega has no term of this order.
         yield f"const __m256d t{k} = _mm256_setzero_pd();"
@@ -472,7 +477,7 @@ def attitude_term(k: int, wide: bool) -> Iterator[str]:
     yield f"_mm256_store_pd(s + {TURNS + 4 * k}, k{k});"
 
 
-def c_variations(order: int, wide: bool) -> Iterator[str]:
+def c_variations(wide: bool) -> Iterator[str]:
     """Yield the linear part of the recurrence for four perturbations of omega, one a lane.
 
     Term k of the perturbation of an axis is v1_k, v2_k or v3_k. A wide register has the terms of
@@ -488,7 +493,7 @@ def c_variations(order: int, wide: bool) -> Iterator[str]:
             yield f"const __m256d n{axis}{mine} = _mm256_mul_pd(f{axis}, {factor});"
     yield "__m256d sum1 = v1_0, sum2 = v2_0, sum3 = v3_0;"
     yield from older_factors(0, wide)
-    for k in range(1, order + 1, 2):
+    for k in range(1, MOST_ORDER, 2):
         yield from (line for j in (k - 1, k) if j for line in omega_factors(j, wide))
         for i in range(k):
             for axis in OTHERS:
@@ -507,7 +512,10 @@ def c_variations(order: int, wide: bool) -> Iterator[str]:
                 yield f"const __m256d v{axis}_{m} = {value};"
                 yield f"sum{axis} = _mm256_add_pd(sum{axis}, v{axis}_{m});"
             yield from older_factors(m, wide)
-    yield from (f"_mm256_store_pd(s + {LANES + 4 * axis - 4}, sum{axis});" for axis in OTHERS)
+        if k + 1 in ORDERS:
+            places = {axis: LANES + 4 * axis - 4 for axis in OTHERS}
+            stores = [f"_mm256_store_pd(s + {place}, sum{n});" for n, place in places.items()]
+            yield from c_end(k + 1, stores)
 
 
 def older_factors(k: int, wide: bool) -> Iterator[str]:

@@ -327,7 +327,7 @@ def fortran_multiply() -> Iterator[str]:
 
 
 def c_source(level: str) -> Iterator[str]:
-    """Yield C functions, each of which ends at one of several orders."""
+    """Yield a C function for each order, and those that call them by order."""
     yield "/* Written by unroll.py: the Taylor terms of a step, one register a term. */"
     yield "#include <immintrin.h>" if level == "avx512" else AVX2
     yield from """
@@ -343,26 +343,34 @@ def c_source(level: str) -> Iterator[str]:
 #define BOTH(low, high) _mm512_insertf64x4(_mm512_castpd256_pd512(low), high, 1)
 #define FOLDED(v) _mm256_add_pd(_mm512_castpd512_pd256(v), _mm512_extractf64x4_pd(v, 1))
 """.splitlines()
+    wide = level == "avx512"
+    # An end inside omega's or the attitude's terms would cost up to a tenth of the time of a step.
+    for order in ORDERS:
+        for name in ("terms", "both"):
+            yield f"static void {name}_{order}(double *restrict s)"
+            yield from c_body(c_terms(order, name == "both", wide))
     for entry, body in {
-        "taylor_terms": c_terms(with_attitude=False, wide=level == "avx512"),
-        "attitude_terms": c_terms(with_attitude=True, wide=level == "avx512"),
-        "variation_terms": c_variations(wide=level == "avx512"),
+        "taylor_terms": c_calls("terms"),
+        "attitude_terms": c_calls("both"),
+        "variation_terms": c_variations(wide),
     }.items():
         yield f"void {entry}_{level}(int order, double *restrict s)"
-        yield "{"
-        yield from (f"  {line}" for line in body)
-        yield "}"
+        yield from c_body(body)
 
 
-def c_end(order: int, ending: Iterable[str]) -> Iterator[str]:
-    """Yield statements that end a procedure at this order."""
-    yield f"if (order == {order}) {{"
-    yield from (f"  {line}" for line in ending)
-    yield "  return;"
+def c_calls(name: str) -> Iterator[str]:
+    yield "switch (order) {"
+    yield from (f"case {order}: {name}_{order}(s); break;" for order in ORDERS)
     yield "}"
 
 
-def c_terms(with_attitude: bool, wide: bool) -> Iterator[str]:
+def c_body(lines: Iterable[str]) -> Iterator[str]:
+    yield "{"
+    yield from (f"  {line}" for line in lines)
+    yield "}"
+
+
+def c_terms(order: int, with_attitude: bool, wide: bool) -> Iterator[str]:
     """Yield the statements for omega, mixed with those for the attitude, which wait less."""
     yield f"const __m256d f = {load(RATES)}, t0 = {load(TERMS)};"
     yield "const __m256d a0 = TURNED_ONCE(t0), b0 = TURNED_TWICE(t0);"
@@ -373,39 +381,30 @@ def c_terms(with_attitude: bool, wide: bool) -> Iterator[str]:
         yield f"const __m256d k0 = {load(TURNS)};"
         yield from ready_for_products(0, wide)
     known: set[str] = set()
-    for line in recurrence(MOST_ORDER):
+    for line in recurrence(order):
         yield c(line, known)
         term = re.match(r"t(\d+) ", line)
         if not term:
             continue
         k = int(term[1])
         yield f"_mm256_store_pd(s + {TERMS + 4 * k}, t{k});"
+        if k < order:
+            yield f"const __m256d a{k} = TURNED_ONCE(t{k}), b{k} = TURNED_TWICE(t{k});"
         if k == 5:
             yield c("c = t4 + t5", known)
         elif k > 5:
             yield c(f"c = c + t{k}", known)
         if with_attitude:
             yield from attitude_term(k, wide)
+            yield from ready_for_products(k, wide)
             if k == 5:
                 yield c("d = k4 + k5", known)
             elif k > 5:
                 yield c(f"d = d + k{k}", known)
-        if k in ORDERS:
-            yield from c_end(k, end_of_c_terms(k, with_attitude, wide))
-        if k < MOST_ORDER:
-            yield f"const __m256d a{k} = TURNED_ONCE(t{k}), b{k} = TURNED_TWICE(t{k});"
-            if with_attitude:
-                yield from ready_for_products(k, wide)
-
-
-def end_of_c_terms(order: int, with_attitude: bool, wide: bool) -> Iterator[str]:
-    """Yield the sums of the terms, to which the largest terms are added last."""
-    known = {"c", "d"}
     yield from (c(f"c = c + t{k}", known) for k in (3, 2, 1))
     yield f"_mm256_store_pd(s + {CHANGE}, c);"
     if with_attitude:
         k = order + 1
-        yield from ready_for_products(order, wide)
         yield from attitude_term(k, wide)
         # Omega has no term of this order.
         yield f"const __m256d t{k} = _mm256_setzero_pd();"
@@ -514,8 +513,9 @@ def c_variations(wide: bool) -> Iterator[str]:
             yield from older_factors(m, wide)
         if k + 1 in ORDERS:
             places = {axis: LANES + 4 * axis - 4 for axis in OTHERS}
-            stores = [f"_mm256_store_pd(s + {place}, sum{n});" for n, place in places.items()]
-            yield from c_end(k + 1, stores)
+            yield f"if (order == {k + 1}) {{"
+            yield from (f"  _mm256_store_pd(s + {at}, sum{axis});" for axis, at in places.items())
+            yield from ("  return;", "}")
 
 
 def older_factors(k: int, wide: bool) -> Iterator[str]:

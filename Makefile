@@ -15,7 +15,7 @@ ARGS ?=
 OUT ?= build/edition
 
 BIN := .venv/bin
-PIP = $(BIN)/python -m pip install --quiet --disable-pip-version-check
+PIP = $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 FORTRAN := $(wildcard fortran/*.f90 fortran/*/*.f90)
 # What fypp wrote: the tools for Fortran do not read its input.
 WRITTEN := build/cp*/*_binary*.f90 build/cp*/words.f90

@@ -21,9 +21,9 @@ from pyharness.model.dense_output import DenseOutput, Pieces, nodes, sizes_of
 from pyharness.model.errors import InputError
 
 # Largest of the last coefficients of a polynomial that has converged, relative to its values.
-_LAST = 2e-14
+LAST = 2e-14
 _RUN = 3  # a function that is 0 at so many adjacent nodes is 0 between them
-_TAIL = 3  # last coefficients, whose magnitude estimates the omitted ones
+TAIL = 3  # last coefficients, whose magnitude estimates the omitted ones
 _MOST_DIVISIONS = 44  # halvings of an interval after which a function counts as not smooth
 MUCH = 1e3  # a value this many times its error is not 0
 # Relative rounding error of the state's polynomials.
@@ -133,8 +133,8 @@ class Solution:
         return sizes_of(largest, self.sol.n_own)
 
 
-def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
-    """Return polynomials through an event's values, and sign changes where they do not converge."""
+def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Fits, Roots]:
+    """Return polynomials, those that do not converge, and sign changes of the latter."""
     edges = solution.pieces.edges
     low, high = edges[:-1], edges[1:]
     times, inner = solution.at_nodes
@@ -145,12 +145,13 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
     first[1:] = last[:-1]
     most = max(_MOST_PIECES, 2 * len(edges))
     done: list[Fits] = []
-    rough = [Roots.bare(np.zeros(0), 0)]
+    rough: list[Fits] = []
+    changes = [Roots.bare(np.zeros(0), 0)]
     for level in range(_MOST_DIVISIONS + 1):
         c = transformed(values, TO_COEFFICIENTS)
         largest = np.abs(values).max(axis=1)
-        tail = np.abs(c[:, -_TAIL:]).max(axis=1)
-        is_done = tail <= _LAST * largest
+        tail = np.abs(c[:, -TAIL:]).max(axis=1)
+        is_done = tail <= LAST * largest
         if not is_done.all():
             near = np.flatnonzero(~is_done)
             noise = noise_of(g, solution, low[near], high[near])
@@ -175,7 +176,8 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
                     f"{g.name}: the function changes too fast for {most} polynomials; use a "
                     "shorter time, or a smooth function"
                 )
-        rough.append(_sign_changes(times[is_rough], values[is_rough], first[is_rough]))
+        rough.append(fits.only(is_rough))
+        changes.append(_sign_changes(times[is_rough], values[is_rough], first[is_rough]))
         split = ~is_done & ~is_rough
         middle = 0.5 * low[split] + 0.5 * high[split]
         ends = np.column_stack([low[split], middle, middle, high[split]])
@@ -187,7 +189,9 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
         values = solution.values(g, times.ravel()).reshape(times.shape)
         centre = values[0::2, -1]
         first, last = np.column_stack([first, centre, centre, last]).reshape(-1, 2).T
-    return done[0] if len(done) == 1 else together(done, "low"), together(rough, "time")
+    fits = done[0] if len(done) == 1 else together(done, "low")
+    rough = rough or [fits.only(slice(0))]
+    return fits, together(rough, "low"), together(changes, "time")
 
 
 def noise_of(

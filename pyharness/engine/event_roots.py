@@ -50,14 +50,14 @@ def transformed(rows: Array, matrix: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class _Columns:
+class Columns:
     """A table; each attribute is a column."""
 
     def only(self, kept: Index) -> Self:
         return type(self)(*(getattr(self, name)[kept] for name in self.__dataclass_fields__))
 
 
-C = TypeVar("C", bound=_Columns)
+C = TypeVar("C", bound=Columns)
 
 
 def together(parts: list[C], order: str) -> C:
@@ -67,7 +67,7 @@ def together(parts: list[C], order: str) -> C:
 
 
 @dataclass(frozen=True, eq=False)
-class Fits(_Columns):
+class Fits(Columns):
     """Polynomials that approximate a function on p intervals."""
 
     low: Array  # s
@@ -85,7 +85,7 @@ class Fits(_Columns):
 
 
 @dataclass(frozen=True, eq=False)
-class Roots(_Columns):
+class Roots(Columns):
     """Candidates for roots at n times."""
 
     time: Array  # s

@@ -10,7 +10,7 @@ import numpy as np
 
 from pyharness.engine.event_fits import LONG_SHIFT, MUCH, STATE_ROUNDING, Solution, noise_of
 from pyharness.engine.event_functions import EventFunction
-from pyharness.engine.event_roots import Fits, Index, Roots
+from pyharness.engine.event_roots import Columns, Fits, Index, Roots
 from pyharness.model.array_type import Array
 from pyharness.model.dense_output import sizes_of
 
@@ -22,7 +22,7 @@ _PARTS = np.array([0.1459, 0.382, 0.618, 0.8541, 1.0])
 
 
 @dataclass(frozen=True, eq=False)
-class ZeroIntervals:
+class ZeroIntervals(Columns):
     """The ascending intervals in which a function is 0 to within its error."""
 
     low: Array  # s
@@ -144,13 +144,9 @@ def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroInte
     low = _refined(g, solution, low, earlier, level[begins])
     high = _refined(g, solution, high, later, level[ends])
     noise = noise[begins]
-    earlier, later = _beside(solution, low, -1), _beside(solution, high, 1)
-    both = np.concatenate([earlier, later])
-    values = solution.values(g, both).reshape(2, -1)
+    (before, after), beside = signs_beside(g, solution, low, high)
     # The noise within the interval may come from a jump at its end.
-    beside = solution.noise(g, both).reshape(2, -1)
-    before, after = np.where(np.abs(values) > _SUDDEN * beside, np.sign(values), 0.0)
-    noise = np.maximum(noise, beside.max(axis=0))
+    noise = np.maximum(noise, beside)
     return ZeroIntervals(low, high, noise, before, after).merged(g, solution)
 
 
@@ -170,6 +166,19 @@ def _refined(
         inner[k] = np.where(is_zero, middle, inner[k])
         outer[k] = np.where(is_zero, outer[k], middle)
     return inner
+
+
+def signs_beside(
+    g: EventFunction, solution: Solution, low: Array, high: Array
+) -> tuple[Array, Array]:
+    """Return a function's signs before and after n intervals, (2, n), and its noise there.
+
+    A sign is 0 if the function decays to 0.
+    """
+    both = np.concatenate([_beside(solution, low, -1), _beside(solution, high, 1)])
+    values, noise, _ = (x.reshape(2, -1) for x in solution.values_and_noise(g, both))
+    signs = np.where(np.abs(values) > _SUDDEN * noise, np.sign(values), 0.0)
+    return signs, noise.max(axis=0)
 
 
 def _beside(solution: Solution, times: Array, side: int) -> Array:

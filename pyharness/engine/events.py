@@ -12,6 +12,7 @@ from functools import partial
 
 import numpy as np
 
+from pyharness.engine.event_corners import find_corners
 from pyharness.engine.event_fits import ROUNDING, STATE_ROUNDING, Solution, fitted, with_noise
 from pyharness.engine.event_functions import EventFunction
 from pyharness.engine.event_roots import FIT_ERROR, Index, Roots, isolated, joined, may_vanish
@@ -28,17 +29,21 @@ _WIDER = 16.0  # factor on the half width of an interval, until the sign changes
 
 def event_roots(g: EventFunction, solution: Solution) -> Roots:
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        fits, rough = fitted(g, solution)
+        fits, rough, changes = fitted(g, solution)
         kept = may_vanish(fits)
         fits, at_ends = with_noise(g, solution, fits, kept)
         zeros = zero_intervals(g, solution, fits)
+        corners = find_corners(g, solution, fits, kept, rough)
         fits.noise[:] += ROUNDING * fits.sizes
         fits = fits.only(kept & (fits.sizes > 2.0 * fits.noise))
         blocks = [slice(k, k + _BLOCK) for k in range(0, len(fits.low), _BLOCK)]
         found = [isolated(fits.only(block)) for block in blocks]
-        roots = joined([_distinct(g, solution, joined(found)), rough, at_ends])
+        roots = joined([_distinct(g, solution, joined(found)), changes])
+        roots = joined([roots.only(~corners.contain(roots.time)), at_ends])
         if zeros is not None:
             roots = roots.only(~zeros.contain(g, solution, roots))
+            zeros = zeros.only(~corners.are_in(zeros.low, zeros.high))
+        roots = joined([roots, corners.roots])
         if roots.time.size:
             roots = _merged(g, solution, roots)
             # The root at the start remains there.

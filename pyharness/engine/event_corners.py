@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from pyharness.engine.event_fits import LAST, ROUNDING, TAIL, Solution
+from pyharness.engine.event_fits import LAST, MUCH, ROUNDING, TAIL, Solution
 from pyharness.engine.event_functions import EventFunction
 from pyharness.engine.event_roots import (
     NODES,
@@ -32,6 +32,8 @@ _GRID = np.linspace(0.0, 1.0, 17)  # points of an interval at which a minimum is
 _MOST_ROUNDS = 40
 _NEAR = 8.0  # spacings of floats
 _SPACINGS = 64.0  # of floats, in an interval in which rounding hides a function's shape
+# Largest part of a polynomial's size in its first coefficient, if the function has a root.
+_MOST_MEAN = 0.6
 # Beside a double root, a value at half the distance is about a quarter.
 _FLAT = 0.18, 0.33
 
@@ -60,17 +62,26 @@ class Corners(Columns):
 
 
 def find_corners(
-    g: EventFunction, solution: Solution, fits: Fits, kept: Index, rough: Fits
-) -> Corners:
-    low, high, sign = _brackets(fits, kept, rough)
-    none = Corners(*np.zeros((4, 0)))
+    g: EventFunction, solution: Solution, fits: Fits, rough: list[Fits]
+) -> Corners | None:
+    sizes = fits.sizes
+    # At a corner at 0, a polynomial has errors of up to a tenth of its size.
+    is_near = _are_bent(fits) & (np.abs(fits.coefficients[:, 0]) <= _MOST_MEAN * sizes)
+    # The corner may be at or near the common end of two polynomials.
+    limit = MUCH * (fits.noise + ROUNDING * sizes)
+    is_chosen = is_near | (np.abs(fits.first) <= limit) | (np.abs(fits.last) <= limit)
+    if not is_chosen.any() and not rough:
+        return None
+    is_chosen[1:] |= is_near[:-1]
+    is_chosen[:-1] |= is_near[1:]
+    low, high, sign = _brackets(together([fits.only(is_chosen), *rough], "low"))
     if not low.size:
-        return none
+        return None
     middle = 0.5 * low + 0.5 * high
     signs, _ = signs_beside(g, solution, middle, middle)
     is_sudden = signs.all(axis=0)
     if not is_sudden.any():
-        return none
+        return None
     low, high, sign = low[is_sudden], high[is_sudden], sign[is_sudden]
     time = _minima(g, solution, low, high, sign)
     is_root, noise = _are_roots(g, solution, time)
@@ -105,14 +116,8 @@ def _are_corners(
     return is_short | ~is_flat.all(axis=0)
 
 
-def _brackets(fits: Fits, kept: Index, rough: Fits) -> tuple[Array, Array, Array]:
+def _brackets(every: Fits) -> tuple[Array, Array, Array]:
     """Return intervals between nodes in which |g| has a minimum, and the sign of g there."""
-    is_bent = _are_bent(fits)
-    chosen = kept | is_bent
-    # A corner may be near the end of an interval.
-    chosen[1:] |= is_bent[:-1]
-    chosen[:-1] |= is_bent[1:]
-    every = together([fits.only(chosen), rough], "low")
     times = nodes(every.low, every.high, POINTS)
     values = transformed(every.coefficients, _TO_VALUES)
     before = np.column_stack([np.roll(values[:, -2], 1), values[:, :-2]])

@@ -12,6 +12,7 @@ from pyharness.engine.event_roots import (
     Fits,
     Index,
     Roots,
+    joined,
     together,
     transformed,
 )
@@ -133,7 +134,7 @@ class Solution:
         return sizes_of(largest, self.sol.n_own)
 
 
-def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Fits, Roots]:
+def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, list[Fits], Roots]:
     """Return polynomials, those that do not converge, and sign changes of the latter."""
     edges = solution.pieces.edges
     low, high = edges[:-1], edges[1:]
@@ -146,7 +147,7 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Fits, Roots]:
     most = max(_MOST_PIECES, 2 * len(edges))
     done: list[Fits] = []
     rough: list[Fits] = []
-    changes = [Roots.bare(np.zeros(0), 0)]
+    changes: list[Roots] = []
     for level in range(_MOST_DIVISIONS + 1):
         c = transformed(values, TO_COEFFICIENTS)
         largest = np.abs(values).max(axis=1)
@@ -176,8 +177,9 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Fits, Roots]:
                     f"{g.name}: the function changes too fast for {most} polynomials; use a "
                     "shorter time, or a smooth function"
                 )
-        rough.append(fits.only(is_rough))
-        changes.append(_sign_changes(times[is_rough], values[is_rough], first[is_rough]))
+        if is_rough.any():
+            rough.append(fits.only(is_rough))
+            changes.append(_sign_changes(times[is_rough], values[is_rough], first[is_rough]))
         split = ~is_done & ~is_rough
         middle = 0.5 * low[split] + 0.5 * high[split]
         ends = np.column_stack([low[split], middle, middle, high[split]])
@@ -189,9 +191,7 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Fits, Roots]:
         values = solution.values(g, times.ravel()).reshape(times.shape)
         centre = values[0::2, -1]
         first, last = np.column_stack([first, centre, centre, last]).reshape(-1, 2).T
-    fits = done[0] if len(done) == 1 else together(done, "low")
-    rough = rough or [fits.only(slice(0))]
-    return fits, together(rough, "low"), together(changes, "time")
+    return done[0] if len(done) == 1 else together(done, "low"), rough, joined(changes)
 
 
 def noise_of(

@@ -33,17 +33,20 @@ def event_roots(g: EventFunction, solution: Solution) -> Roots:
         kept = may_vanish(fits)
         fits, at_ends = with_noise(g, solution, fits, kept)
         zeros = zero_intervals(g, solution, fits)
-        corners = find_corners(g, solution, fits, kept, rough)
+        corners = find_corners(g, solution, fits, rough)
         fits.noise[:] += ROUNDING * fits.sizes
         fits = fits.only(kept & (fits.sizes > 2.0 * fits.noise))
         blocks = [slice(k, k + _BLOCK) for k in range(0, len(fits.low), _BLOCK)]
         found = [isolated(fits.only(block)) for block in blocks]
         roots = joined([_distinct(g, solution, joined(found)), changes])
-        roots = joined([roots.only(~corners.contain(roots.time)), at_ends])
+        if corners is not None:
+            roots = roots.only(~corners.contain(roots.time))
+        roots = joined([roots, at_ends])
         if zeros is not None:
             roots = roots.only(~zeros.contain(g, solution, roots))
-            zeros = zeros.only(~corners.are_in(zeros.low, zeros.high))
-        roots = joined([roots, corners.roots])
+        if corners is not None:
+            roots = joined([roots, corners.roots])
+            zeros = zeros and zeros.only(~corners.are_in(zeros.low, zeros.high))
         if roots.time.size:
             roots = _merged(g, solution, roots)
             # The root at the start remains there.

@@ -29,6 +29,8 @@ _MOST_DIVISIONS = 44  # halvings of an interval after which a function counts as
 MUCH = 1e3  # a value this many times its error is not 0
 # Relative rounding error of the state's polynomials.
 STATE_ROUNDING = 2.0**-46
+# Halvings after which only corners, jumps and rounding errors of the function prevent convergence.
+_ROUNDED = 6
 _MOST_PIECES = 100_000  # intervals that are divided at the same time
 # Relative changes of an argument for a numerical derivative.
 _SHIFT, LONG_SHIFT = 2.0**-26, 2.0**-13
@@ -145,6 +147,7 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, list[Fits], Root
     # Equal signs at the common end of adjacent intervals, so that no root is lost or doubled.
     first[1:] = last[:-1]
     most = max(_MOST_PIECES, 2 * len(edges))
+    scale = np.abs(values).max(axis=1)
     done: list[Fits] = []
     rough: list[Fits] = []
     changes: list[Roots] = []
@@ -160,6 +163,8 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, list[Fits], Root
             # smooth: the ends of the part are events.
             is_zero = np.lib.stride_tricks.sliding_window_view(values[near] == 0.0, _RUN, axis=1)
             is_partly_zero = np.any(is_zero.all(axis=2), axis=1) & (largest[near] > 2.0 * noise)
+            if level >= _ROUNDED:
+                noise = np.maximum(noise, ROUNDING * scale[near])
             is_done[near] = (tail[near] <= noise) & ~is_partly_zero
         fits = Fits(low, high, first, last, c, np.zeros(len(low)))
         done.append(fits if is_done.all() else fits.only(is_done))
@@ -184,7 +189,7 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, list[Fits], Root
         middle = 0.5 * low[split] + 0.5 * high[split]
         ends = np.column_stack([low[split], middle, middle, high[split]])
         low, high = ends.reshape(-1, 2).T
-        first, last = first[split], last[split]
+        first, last, scale = first[split], last[split], np.repeat(scale[split], 2)
         if not low.size:
             break
         times = nodes(low, high, POINTS)

@@ -78,5 +78,6 @@ def improved(
         with np.errstate(all="ignore"):
             step = -value * 2.0 * probe / (after - before)
         # A root without a sign change has no slope.
-        found[begin : begin + _BLOCK] += np.where(np.abs(step) < probe, step, 0.0)
+        is_simple = (np.abs(step) < probe) & (before * after < 0.0)
+        found[begin : begin + _BLOCK] += np.where(is_simple, step, 0.0)
     return found

@@ -1,7 +1,9 @@
 """`python -m tests.campaigns.event_campaign COUNT SEED`: search for planted roots of functions.
 
-Each function depends on time alone, and has known simple and double roots: some at random times,
-some pairs within a step of the integrator, some at the ends of the integration or of its intervals.
+Each function has known roots: simple and double ones, and corners at 0 without a change of sign.
+Some are at random times, some pairs within a step of the integrator, some at the ends of the
+integration or of its intervals. Most functions depend on time alone, some on an omega in closed
+form, and some are above 0.
 The command prints the numbers of planted, missed and invented roots, and the largest error of a
 time, relative to the last time. Exit status 1 if a root is missed or invented, if its direction is
 wrong, or if the error of a time exceeds LARGEST in addition to its rounding error.
@@ -9,7 +11,7 @@ wrong, or if the error of a time exceeds LARGEST in addition to its rounding err
 
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +22,8 @@ from pyharness.model.array_type import Array
 LARGEST = 1e-12
 _EPS = 2.0**-52
 BODY = Scene("body", omega=(0.1, 2.0, 0.1), moments=(1.0, 2.0, 3.0))
-KINDS = ("polynomial", "edges", "cosine", "sine", "squared sine", "modulated", "odd")
+CORNERS = ("corners", "least", "branch", "rectified", "omega")
+KINDS = ("polynomial", "edges", "cosine", "sine", "squared sine", "modulated", "odd", *CORNERS)
 
 
 @dataclass(frozen=True)
@@ -32,10 +35,11 @@ class Planted:
     roots: Array
     changes: Any
     rounding: Array
+    scene: Scene = BODY
 
     def only(self, kept: Any) -> "Planted":
-        arrays = (each[kept] for each in (self.roots, self.changes, self.rounding))
-        return Planted(self.function, self.end, *arrays)
+        arrays = (each[: len(kept)][kept] for each in (self.roots, self.changes, self.rounding))
+        return Planted(self.function, self.end, *arrays, self.scene)
 
 
 def planted(kind: str, rng: np.random.Generator) -> Planted:
@@ -45,6 +49,10 @@ def planted(kind: str, rng: np.random.Generator) -> Planted:
         return _product(end, kind == "edges", rng)
     if kind == "odd":
         return _of_odd_multiplicity(end, rng)
+    if kind in CORNERS[:3]:
+        return _with_corners(kind, end, rng)
+    if kind == "omega":
+        return _of_omega(end, rng)
     rate, phase = rng.uniform(1.0, 40.0), rng.uniform(0.0, 2.0 * np.pi)
     n: Any = np.arange(-2, int(rate * end / np.pi) + 4)
     if kind == "cosine":
@@ -66,6 +74,12 @@ def planted(kind: str, rng: np.random.Generator) -> Planted:
     if kind == "squared sine":
         return _within(lambda t, w: np.sin(rate * t + phase) ** 2, end, roots, 0 * n, simple)
     decay = rng.uniform(0.0, 30.0) / end
+    if kind == "rectified":
+        above = rng.choice([0.0, 0.0, 10.0 ** rng.uniform(-9.0, 0.0)])
+        return _within(
+            lambda t, w: np.exp(-decay * t) * (abs(np.sin(rate * t + phase)) + above),
+            end, roots[: None if above == 0.0 else 0], 0 * n, simple,
+        )  # fmt: skip
     return _within(
         lambda t, w: np.exp(-decay * t) * np.sin(rate * t + phase), end, roots, signs, simple
     )
@@ -128,6 +142,71 @@ def _of_odd_multiplicity(end: float, rng: np.random.Generator) -> Planted:
     return Planted(function, end, roots, changes, np.full(3, 4.0 * _EPS * end))
 
 
+def _with_corners(kind: str, end: float, rng: np.random.Generator) -> Planted:
+    """Return a product, or the least, of powers of |t - root|, or a product with branches."""
+    count = int(rng.integers(1, 7))
+    roots = end * rng.choice(np.arange(1, 17), count, replace=False) / 16.0
+    if rng.random() < 0.7:
+        roots = rng.uniform(0.01 * end, end, count)
+        roots[-1] = min(roots[0] + end * 10.0 ** rng.uniform(-5.0, -1.0), end)
+    roots = np.unique(roots)
+    powers = rng.choice([0.5, 1.0, 1.0, 1.0, 1.5], len(roots))
+    sizes = rng.choice([-1.0, 1.0]) * rng.uniform(0.1, 2.0, len(roots))
+
+    def product(t: Any, omega: Any) -> Any:
+        found = sizes[0] + 0.0 * t
+        for root, power in zip(roots, powers, strict=True):
+            found = found * abs(t - root) ** power
+        return found
+
+    def least(t: Any, omega: Any) -> Any:
+        each = [a * abs(t - x) ** n for a, x, n in zip(sizes, roots, powers, strict=True)]
+        return (np.minimum if sizes[0] > 0.0 else np.maximum).reduce(each)
+
+    def with_branches(t: Any, omega: Any) -> Any:
+        found = float(sizes[0])
+        for size, root in zip(np.abs(sizes), roots, strict=True):
+            found *= t - root if t > root else size * (root - t)
+        return found
+
+    function = {"corners": product, "least": least, "branch": with_branches}[kind]
+    zeros = np.zeros(len(roots), dtype=int)
+    return Planted(function, end, roots, zeros, np.full(len(roots), 4.0 * _EPS * end))
+
+
+def _of_omega(end: float, rng: np.random.Generator) -> Planted:
+    """Return a product, or the least, of |omega - level| of a symmetric top."""
+    size, spin, third = rng.uniform([0.2, 0.5, 0.4], [2.0, 3.0, 0.9])
+    phase = rng.uniform(0.0, 2.0 * np.pi)
+    omega = size * np.cos(phase), size * np.sin(phase), spin
+    scene = Scene("top", omega, moments=(1.0, 1.0, third))
+    # The first two components are size * cos(angle) and size * sin(angle), with this rate.
+    rate = (1.0 - third) * spin
+    axes = rng.integers(0, 2, int(rng.integers(1, 4)))
+    tilts = np.where(rng.random(len(axes)) < 0.2, 0.0, rng.uniform(0.3, np.pi - 0.3, len(axes)))
+    levels, is_least = size * np.cos(tilts), rng.random() < 0.5
+    sign = rng.choice([-1.0, 1.0])
+
+    def function(t: Any, w: Any) -> Any:
+        each = [abs(w[axis] - level) for axis, level in zip(axes, levels, strict=True)]
+        return sign * (np.minimum.reduce(each) if is_least else np.prod(each, axis=0))
+
+    turns = 2.0 * np.pi * np.arange(-int(rate * end / 6.0) - 2, 2)
+    angles = [(0.5 * np.pi * axis + side * tilt + turns, 0.0 * turns + tilt)
+              for axis, tilt in zip(axes, tilts, strict=True)
+              for side in ((1.0, -1.0) if tilt else (1.0,))]  # fmt: skip
+    angle, tilt = np.concatenate(angles, axis=1)
+    order = np.argsort(-angle)
+    roots = (phase - angle[order]) / rate
+    if np.diff(roots).min() < 1e-2 / rate:
+        # Rounding errors would combine the roots.
+        return _of_omega(end, rng)
+    # An extremum of omega is flat.
+    rounding = np.where(tilt[order] == 0.0, 1e-4, 1e-9) / rate
+    planted = _within(function, end, roots, 0 * order, rounding)
+    return replace(planted, scene=scene)
+
+
 @dataclass
 class Tally:
     """The results of a campaign so far."""
@@ -149,7 +228,7 @@ def run(kind: str, seed: int, tally: Tally) -> None:
         return given.function(t, omega)
 
     rising.direction = 1  # type: ignore[attr-defined]
-    found = solve(BODY, given.end, events=[given.function, rising])
+    found = solve(given.scene, given.end, events=[given.function, rising])
     assert found.t_events is not None
     times, rises = found.t_events
     # A root at the start is no event.

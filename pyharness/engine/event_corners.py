@@ -53,7 +53,9 @@ class Corners(Columns):
 
     def contain(self, times: Array) -> Index:
         """Return which times are of roots that polynomials show instead of corners."""
-        found: Index = ((times[:, None] > self.low) & (times[:, None] < self.high)).any(axis=1)
+        near = _SPACINGS * np.spacing(np.abs(self.time))
+        is_after, is_before = times[:, None] > self.low - near, times[:, None] < self.high + near
+        found: Index = (is_after & is_before).any(axis=1)
         return found
 
     def are_in(self, low: Array, high: Array) -> Index:
@@ -84,20 +86,24 @@ def find_corners(
         return None
     low, high, sign = low[is_sudden], high[is_sudden], sign[is_sudden]
     time = _minima(g, solution, low, high, sign)
-    is_root, noise = _are_roots(g, solution, time)
+    is_root, noise = _are_roots(g, solution, fits, time)
     is_kept = is_root & _are_corners(g, solution, low, time, high)
     return Corners(low, time, high, noise).only(is_kept)
 
 
-def _are_roots(g: EventFunction, solution: Solution, times: Array) -> tuple[Index, Array]:
+def _are_roots(
+    g: EventFunction, solution: Solution, fits: Fits, times: Array
+) -> tuple[Index, Array]:
     """Return whether a function is continuous and 0 at minima of |g|, and its noise there."""
     value, noise, _ = solution.values_and_noise(g, times)
-    number = solution.pieces.numbers(times)
     near = _NEAR * np.spacing(np.abs(times))
-    others = [times - near, times + near, *solution.pieces.edges[[number, number + 1]]]
-    sizes = np.abs(solution.values(g, np.concatenate(others))).reshape(4, -1)
-    noise += ROUNDING * sizes[2:].max(axis=0)
-    value, sizes = np.abs(value), sizes[:2]
+    sizes = solution.values(g, np.concatenate([times - near, times + near])).reshape(2, -1)
+    value, sizes = np.abs(value), np.abs(sizes)
+    # The function's own rounding errors may be those of larger terms.
+    pieces = solution.pieces
+    largest = np.zeros(len(pieces.values))
+    np.maximum.at(largest, pieces.numbers(fits.low), fits.sizes)
+    noise += ROUNDING * largest[pieces.numbers(times)]
     # A function such as sqrt(|t - 1|) is steeper than a numerical derivative.
     is_cusp = value <= 0.5 * sizes.min(axis=0)
     # The noise at a jump is no limit.
@@ -113,7 +119,8 @@ def _are_corners(
     size, half = np.abs(solution.values(g, np.concatenate([ends, halves]))).reshape(2, 2, -1)
     is_flat = (half >= _FLAT[0] * size) & (half <= _FLAT[1] * size)
     is_short: Index = high - low <= _SPACINGS * np.spacing(np.abs(times))
-    return is_short | ~is_flat.all(axis=0)
+    # In an interval of zeros, every value is a minimum.
+    return (size > 0.0).all(axis=0) & (is_short | ~is_flat.all(axis=0))
 
 
 def _brackets(every: Fits) -> tuple[Array, Array, Array]:

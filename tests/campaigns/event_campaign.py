@@ -9,6 +9,7 @@ time, relative to the last time. Exit status 1 if a root is missed or invented, 
 wrong, or if the error of a time exceeds LARGEST in addition to its rounding error.
 """
 
+import math
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -76,6 +77,7 @@ def planted(kind: str, rng: np.random.Generator) -> Planted:
     decay = rng.uniform(0.0, 30.0) / end
     if kind == "rectified":
         above = rng.choice([0.0, 0.0, 10.0 ** rng.uniform(-9.0, 0.0)])
+        decay *= above == 0.0
         return _within(
             lambda t, w: np.exp(-decay * t) * (abs(np.sin(rate * t + phase)) + above),
             end, roots[: None if above == 0.0 else 0], 0 * n, simple,
@@ -150,6 +152,9 @@ def _with_corners(kind: str, end: float, rng: np.random.Generator) -> Planted:
         roots = rng.uniform(0.01 * end, end, count)
         roots[-1] = min(roots[0] + end * 10.0 ** rng.uniform(-5.0, -1.0), end)
     roots = np.unique(roots)
+    if kind == "corners":
+        # Between adjacent nodes of a polynomial, a product of two corners is a parabola.
+        roots = roots[np.diff(roots, append=math.inf) > 0.1]
     powers = rng.choice([0.5, 1.0, 1.0, 1.0, 1.5], len(roots))
     sizes = rng.choice([-1.0, 1.0]) * rng.uniform(0.1, 2.0, len(roots))
 
@@ -160,7 +165,7 @@ def _with_corners(kind: str, end: float, rng: np.random.Generator) -> Planted:
         return found
 
     def least(t: Any, omega: Any) -> Any:
-        each = [a * abs(t - x) ** n for a, x, n in zip(sizes, roots, powers, strict=True)]
+        each = [size * abs(t - root) for size, root in zip(sizes, roots, strict=True)]
         return (np.minimum if sizes[0] > 0.0 else np.maximum).reduce(each)
 
     def with_branches(t: Any, omega: Any) -> Any:
@@ -198,7 +203,7 @@ def _of_omega(end: float, rng: np.random.Generator) -> Planted:
     angle, tilt = np.concatenate(angles, axis=1)
     order = np.argsort(-angle)
     roots = (phase - angle[order]) / rate
-    if np.diff(roots).min() < 1e-2 / rate:
+    if np.diff(roots).min() < (0.01 if is_least else 0.2) / rate:
         # Rounding errors would combine the roots.
         return _of_omega(end, rng)
     # An extremum of omega is flat.

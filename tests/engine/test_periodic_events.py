@@ -20,6 +20,7 @@ FUNCTIONS: dict[str, Callable[[Any, Any], Any]] = {
     "sum": lambda t, w: w[0] + 0.3 * w[1] - 0.2,
     "product": lambda t, w: w[0] * w[1] + 0.01 * w[2],
     "square": lambda t, w: w[1] ** 2 - 4.0,
+    "corner": lambda t, w: abs(w[0]),
     "touch": lambda t, w: (w[0] - w[2]) ** 2,
     "none": lambda t, w: w[0] + 100.0,
 }

@@ -1,8 +1,8 @@
 """Events: the times at which functions of time, omega and attitude are 0.
 
 A function is approximated by polynomials, on intervals divided until they converge. All roots are
-isolated, including close and double ones. Where the function is not smooth, only sign changes
-between nodes of tiny intervals are found.
+isolated, including close and double ones. Where the function is not smooth, sign changes between
+nodes of tiny intervals are found, and minima of its magnitude at corners.
 """
 
 import math

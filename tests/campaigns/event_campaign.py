@@ -39,8 +39,10 @@ class Planted:
     scene: Scene = BODY
 
     def only(self, kept: Any) -> "Planted":
-        arrays = (each[: len(kept)][kept] for each in (self.roots, self.changes, self.rounding))
-        return Planted(self.function, self.end, *arrays, self.scene)
+        roots, changes, rounding = (
+            each[: len(kept)][kept] for each in (self.roots, self.changes, self.rounding)
+        )
+        return replace(self, roots=roots, changes=changes, rounding=rounding)
 
 
 def planted(kind: str, rng: np.random.Generator) -> Planted:

@@ -33,11 +33,13 @@ def test_planted_corners_are_found(kind: str, seed: int) -> None:
 @pytest.mark.parametrize("points", POINTS)
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_equal_corners_are_all_found(points: list[float], sign: float) -> None:
-    apart = [lambda t, p=p: abs(t - p) for p in points]
+    def apart(t: Any) -> list[Any]:
+        return [abs(t - point) for point in points]
+
     functions: list[Callable[[Any], Any]] = [
-        lambda t: np.prod([each(t) for each in apart], axis=0),
-        lambda t: np.minimum.reduce([each(t) for each in apart]),
-        lambda t: min(each(float(t)) for each in apart),
+        lambda t: np.prod(apart(t), axis=0),
+        lambda t: np.minimum.reduce(apart(t)),
+        lambda t: min(apart(float(t))),
     ]
     for function in functions:
         for side in (1.0, -1.0):

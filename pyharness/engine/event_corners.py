@@ -4,6 +4,7 @@ No polynomial shows such a root: it is between the nodes of a polynomial that do
 at the common end of two.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,17 +67,19 @@ class Corners(Columns):
 def find_corners(
     g: EventFunction, solution: Solution, fits: Fits, rough: list[Fits]
 ) -> Corners | None:
+    if rough:
+        fits = together([fits, *rough], "low")
     sizes = fits.sizes
     # At a corner at 0, a polynomial has errors of up to a tenth of its size.
     is_near = _are_bent(fits) & (np.abs(fits.coefficients[:, 0]) <= _MOST_MEAN * sizes)
     # The corner may be at or near the common end of two polynomials.
     limit = MUCH * (fits.noise + ROUNDING * sizes)
     is_chosen = is_near | (np.abs(fits.first) <= limit) | (np.abs(fits.last) <= limit)
-    if not is_chosen.any() and not rough:
+    if not is_chosen.any():
         return None
     is_chosen[1:] |= is_near[:-1]
     is_chosen[:-1] |= is_near[1:]
-    low, high, sign = _brackets(together([fits.only(is_chosen), *rough], "low"))
+    low, high, sign = _brackets(fits.only(is_chosen))
     if not low.size:
         return None
     middle = 0.5 * low + 0.5 * high
@@ -123,19 +126,22 @@ def _are_corners(
     return (size > 0.0).all(axis=0) & (is_short | ~is_flat.all(axis=0))
 
 
-def _brackets(every: Fits) -> tuple[Array, Array, Array]:
+def _brackets(fits: Fits) -> tuple[Array, Array, Array]:
     """Return intervals between nodes in which |g| has a minimum, and the sign of g there."""
-    times = nodes(every.low, every.high, POINTS)
-    values = transformed(every.coefficients, _TO_VALUES)
-    before = np.column_stack([np.roll(values[:, -2], 1), values[:, :-2]])
-    after, size = values[:, 1:], np.abs(values[:, :-1])
+    times = nodes(fits.low, fits.high, POINTS)
+    values = transformed(fits.coefficients, _TO_VALUES)
+    # Polynomials that have converged show minima between their ends.
+    is_shown = np.repeat(~_are_bent(fits)[:, None], NODES, axis=1)
+    is_shown[:, 0] = True
+    is_shown[:, -1] = fits.high != np.append(fits.low[1:], math.inf)
+    # The nodes of a short interval are not distinct.
+    is_new = np.append(True, np.diff(times.ravel()) > 0.0)
+    times, values, is_shown = (x.ravel()[is_new] for x in (times, values, is_shown))
+    before, size, after = values[:-2], np.abs(values[1:-1]), values[2:]
     smaller, larger = np.sort(np.abs([before, after]), axis=0)
     is_least = (size <= smaller) & (size <= _LESS * larger) & (before * after > 0.0)
-    is_least[:, 1:] &= _are_bent(every)[:, None]
-    is_least[:, 0] &= every.low == np.roll(every.high, 1)
-    row, column = np.nonzero(is_least)
-    first = np.where(column == 0, times[row - 1, -2], times[row, column - 1])
-    return first, times[row, column + 1], np.sign(after[row, column])
+    k = np.flatnonzero(is_least & ~is_shown[1:-1])
+    return times[k], times[k + 2], np.sign(after[k])
 
 
 def _are_bent(fits: Fits) -> Index:

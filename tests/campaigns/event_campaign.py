@@ -152,13 +152,11 @@ def _with_corners(kind: str, end: float, rng: np.random.Generator) -> Planted:
     roots = end * rng.choice(np.arange(1, 17), count, replace=False) / 16.0
     if rng.random() < 0.7:
         roots = rng.uniform(0.01 * end, end, count)
-        roots[-1] = min(roots[0] + end * 10.0 ** rng.uniform(-5.0, -1.0), end)
-    roots = np.unique(roots)
-    if kind == "corners":
-        # Between adjacent nodes of a polynomial, a product of two corners is a parabola.
-        roots = roots[np.diff(roots, append=math.inf) > 0.1]
+    roots = np.sort(roots)
+    # Between adjacent nodes of a polynomial, a product of two corners is a parabola.
+    roots = roots[np.diff(roots, append=math.inf) > 0.2]
     powers = rng.choice([0.5, 1.0, 1.0, 1.0, 1.5], len(roots))
-    sizes = rng.choice([-1.0, 1.0]) * rng.uniform(0.1, 2.0, len(roots))
+    sizes = rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 2.0, len(roots))
 
     def product(t: Any, omega: Any) -> Any:
         found = sizes[0] + 0.0 * t
@@ -205,8 +203,7 @@ def _of_omega(end: float, rng: np.random.Generator) -> Planted:
     angle, tilt = np.concatenate(angles, axis=1)
     order = np.argsort(-angle)
     roots = (phase - angle[order]) / rate
-    if np.diff(roots).min() < (0.01 if is_least else 0.2) / rate:
-        # Rounding errors would combine the roots.
+    if np.diff(roots).min() < 0.4 / rate:
         return _of_omega(end, rng)
     # An extremum of omega is flat.
     rounding = np.where(tilt[order] == 0.0, 1e-4, 1e-9) / rate

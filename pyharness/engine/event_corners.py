@@ -106,7 +106,7 @@ def _are_roots(
     pieces = solution.pieces
     largest = np.zeros(len(pieces.values))
     np.maximum.at(largest, pieces.numbers(fits.low), fits.sizes)
-    noise += ROUNDING * largest[pieces.numbers(times)]
+    noise += 4.0 * ROUNDING * largest[pieces.numbers(times)]
     # A function such as sqrt(|t - 1|) is steeper than a numerical derivative.
     is_cusp = value <= 0.5 * sizes.min(axis=0)
     # The noise at a jump is no limit.

@@ -11,7 +11,7 @@ wrong, or if the error of a time exceeds LARGEST in addition to its rounding err
 
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -257,12 +257,12 @@ def run(kind: str, seed: int, tally: Tally) -> None:
         tally.examples.append(f"{what}, error {excess:.1e}, rises {rises.tolist()}")
 
 
-def campaign(count: int, seed: int) -> Tally:
+def campaign(count: int, seed: int, kinds: Sequence[str] = KINDS) -> Tally:
     """Return the results for random functions with at least `count` roots in all."""
     tally = Tally()
     number = seed * 1_000_000
     while tally.roots < count:
-        run(KINDS[number % len(KINDS)], number, tally)
+        run(kinds[number % len(kinds)], number, tally)
         number += 1
     return tally
 

@@ -18,7 +18,7 @@ from pyharness.events import Event, crosses, extremum, flip, rest, tilt
 from pyharness.model.dense_output import Pieces
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.torques import damping, opaque, pulses
-from tests.campaigns.event_campaign import BODY, KINDS, Tally, campaign, planted, run
+from tests.campaigns.event_campaign import BODY, CORNERS, KINDS, Tally, campaign, planted, run
 
 METHODS = ("auto", "closed-form", "taylor", "dop853", "gauss-4", "reference")
 
@@ -46,8 +46,9 @@ def second(t: Any, omega: Any) -> Any:
 
 
 @pytest.mark.campaign
-def test_planted_roots_are_found_and_none_is_invented() -> None:
-    tally = campaign(3000, 7)
+@pytest.mark.parametrize("kinds", [KINDS, CORNERS])
+def test_planted_roots_are_found_and_none_is_invented(kinds: tuple[str, ...]) -> None:
+    tally = campaign(3000, 7, kinds)
     assert tally.roots >= 3000
     assert (tally.missed, tally.invented, tally.wrong) == (0, 0, 0), tally.examples[:3]
 

@@ -100,10 +100,10 @@ def _are_roots(
     """Return whether a function is continuous and 0 at minima of |g|, and its noise there."""
     value, noise, _ = solution.values_and_noise(g, times)
     near = _NEAR * np.spacing(np.abs(times))
-    sizes = solution.values(g, np.concatenate([times - near, times + near])).reshape(2, -1)
-    value, sizes = np.abs(value), np.abs(sizes)
-    # The function's own rounding errors may be those of larger terms.
     pieces = solution.pieces
+    beside = np.clip(np.concatenate([times - near, times + near]), *pieces.edges[[0, -1]])
+    value, sizes = np.abs(value), np.abs(solution.values(g, beside)).reshape(2, -1)
+    # The function's own rounding errors may be those of larger terms.
     largest = np.zeros(len(pieces.values))
     np.maximum.at(largest, pieces.numbers(fits.low), fits.sizes)
     noise += 4.0 * ROUNDING * largest[pieces.numbers(times)]

@@ -14,6 +14,7 @@ import tomllib
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, TextIO
+from zipfile import ZipFile
 
 import mesonpy
 from build_progress import watch
@@ -57,7 +58,18 @@ def build_wheel(
         place = settings.setdefault("build-dir", settings.pop("builddir", folder))
         if terminal := _terminal_of_pip():
             threading.Thread(target=_tell, args=(terminal, place), daemon=True).start()
-        return str(mesonpy.build_wheel(wheel_directory, settings, metadata_directory))
+        name = str(mesonpy.build_wheel(wheel_directory, settings, metadata_directory))
+    _compress(Path(wheel_directory, name))
+    return name
+
+
+def _compress(wheel: Path) -> None:
+    """Write a wheel again at the highest level of compression."""
+    with ZipFile(wheel) as archive:
+        files = [(entry, archive.read(entry)) for entry in archive.infolist()]
+    with ZipFile(wheel, "w") as archive:
+        for entry, content in files:
+            archive.writestr(entry, content, compresslevel=9)
 
 
 def _terminal_of_pip() -> TextIO | None:

@@ -59,7 +59,7 @@ contains
     !! Return whether attitudes are requested.
     type(bodies_t), intent(in) :: bodies
 
-    with_attitude = size(bodies%attitude0) > 0
+    with_attitude = size(bodies%attitude0, 2) > 0
   end function with_attitude
 
   subroutine put_estimates(bodies, i, error, growth)
@@ -69,7 +69,7 @@ contains
     real(dp), intent(in) :: error  !! of the result, relative; negative: unknown
     real(dp), intent(in) :: growth !! error amplification; negative: unknown
 
-    if (size(bodies%estimates) > 0) bodies%estimates(:, i) = [error, growth]
+    if (size(bodies%estimates, 2) > 0) bodies%estimates(:, i) = [error, growth]
   end subroutine put_estimates
 
   pure function coefficients_of(bodies, i) result(a)

@@ -49,7 +49,7 @@ contains
     each_own = size(bodies%body, 2) > 1
     order = IN_ORDER
     is_turned = with_attitude(bodies)
-    is_estimated = size(bodies%estimates) > 0
+    is_estimated = size(bodies%estimates, 2) > 0
     do
       call next_block(n, status, bodies%mark, block)
       if (block%there == 0) exit
@@ -63,7 +63,7 @@ contains
       end if
       call columns_of(bodies%omega0, block, m, w, order)
       if (each_own) call turn_axes(m, o%odd, w)
-      if (is_first .or. size(bodies%times) > 1) call times_of(bodies%times, block, m, t)
+      if (is_first .or. size(bodies%times, 1) > 1) call times_of(bodies%times, block, m, t)
       is_first = .false.
       call begin(m, bodies%tolerance, a, w, o)
       call turn(m, t, o)

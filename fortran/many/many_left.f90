@@ -49,17 +49,17 @@ contains
 
     raised = 0
     alone = 0
-    is_estimated = size(bodies%estimates) > 0
+    is_estimated = size(bodies%estimates, 2) > 0
     do i = 1, bodies%n
       if (status(i) /= NEEDS_FALLBACK) cycle
       alone = alone + 1
       if (mod(alone, BETWEEN_LOOKS) == 0) raised = interrupt_raised()
       if (raised /= 0) return
-      time = bodies%times(of_body(size(bodies%times), i))
-      if (size(packed) > 0) then
-        call solve_prepared(packed, size(packed), bodies%omega0(:, i), time, omega(:, i), ended, &
-                            steps, found)
-        call tell_sensitive(packed, size(packed), bodies%omega0(:, i), time, steps, ended)
+      time = bodies%times(of_body(size(bodies%times, 1), i))
+      if (size(packed, 1) > 0) then
+        call solve_prepared(packed, size(packed, 1), bodies%omega0(:, i), time, omega(:, i), &
+                            ended, steps, found)
+        call tell_sensitive(packed, size(packed, 1), bodies%omega0(:, i), time, steps, ended)
       else
         call pack(bodies, i, code, own, n_own)
         if (.not. is_body(bodies, i, own(:n_own - 1))) then
@@ -95,7 +95,7 @@ contains
 
     raised = 0
     alone = 0
-    is_estimated = size(bodies%estimates) > 0
+    is_estimated = size(bodies%estimates, 2) > 0
     do i = 1, bodies%n
       if (status(i) /= NEEDS_FALLBACK) cycle
       alone = alone + 1
@@ -109,7 +109,7 @@ contains
         call put_estimates(bodies, i, -1.0_dp, -1.0_dp)
         cycle
       end if
-      time = bodies%times(of_body(size(bodies%times), i))
+      time = bodies%times(of_body(size(bodies%times, 1), i))
       start(:3) = bodies%omega0(:, i)
       start(4:) = bodies%attitude0(:, of_body(size(bodies%attitude0, 2), i))
       call bring_near_one(start(4:), power)

@@ -170,8 +170,8 @@ contains
       if (b%alive(i) == 0) cycle
       body = b%first + i - 1
       e%omega_rows(:, row, body) = b%U(i, :)
-      if (size(e%velocity_rows) > 0) e%velocity_rows(:, row, body) = b%V(i, :)
-      if (size(e%ier_rows) > 0) e%ier_rows(row, body) = b%ier(i)
+      if (size(e%velocity_rows, 3) > 0) e%velocity_rows(:, row, body) = b%V(i, :)
+      if (size(e%ier_rows, 2) > 0) e%ier_rows(row, body) = b%ier(i)
       e%times(row, min(body, size(e%times, 2))) = b%TIME(i)
     end do
   end subroutine record

@@ -35,9 +35,9 @@ contains
     bodies%pieces = c_loc(equations%pieces)
     bodies%tolerance = min(packed(TOLERANCE), COARSEST)
     bodies%n_slots = equations%n_slots
-    bodies%n_tables = size(equations%table_starts) - 1
+    bodies%n_tables = size(equations%table_starts, 1) - 1
     bodies%n = many%n
-    bodies%n_times = size(many%times)
+    bodies%n_times = size(many%times, 1)
     bodies%omega0 = c_loc(many%omega0)
     bodies%attitude0 = c_loc(many%attitude0)
     bodies%times = c_loc(many%times)
@@ -45,7 +45,7 @@ contains
     bodies%attitude = c_loc(many%attitude)
     bodies%status = c_loc(status)
     bodies%estimates = c_null_ptr
-    if (size(many%estimates) > 0) bodies%estimates = c_loc(many%estimates)
+    if (size(many%estimates, 2) > 0) bodies%estimates = c_loc(many%estimates)
     bodies%n_parameters = 0
     bodies%n_sets = 0
     bodies%parameters = c_null_ptr

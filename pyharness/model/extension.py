@@ -1,6 +1,7 @@
 """Access to the compiled Fortran extension."""
 
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -22,10 +23,11 @@ ENDS = tuple(name.lower().replace("_", " ") for name in vars(Statuses) if name.i
 
 def extension() -> ModuleType:
     try:
-        from pyharness import _kernels
-    except ImportError as error:
+        module = import_module("pyharness._kernels")
+    except ModuleNotFoundError as error:
         raise NotBuiltError(_why_missing()) from error
-    module: ModuleType = _kernels
+    except ImportError as error:
+        raise NotBuiltError(f"the Fortran extension can't be loaded: {error}") from error
     _check_processor()
     return module
 

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -68,6 +69,12 @@ def test_a_build_for_another_processor_is_refused(
         assert "instructions      none that this processor has" in capsys.readouterr().out
     finally:
         extension._check_processor.cache_clear()
+
+
+def test_an_extension_that_cannot_be_loaded_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(extension, "import_module", Mock(side_effect=ImportError("no symbol: f")))
+    with pytest.raises(NotBuiltError, match=r"^the Fortran extension can't be loaded: no symbol: f"):
+        solve(case_scene(3), 1.0)
 
 
 def test_flags_are_the_ones_that_keep_the_bits() -> None:

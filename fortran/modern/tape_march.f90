@@ -20,8 +20,8 @@ module tape_march
   use tape_rows, only: add_nodes, add_row, add_rows, evaluate
   use tape_series, only: derivatives_at, expand, noise_of, PADDED, series_t, slot_gradient, &
                          sum_terms
-  use tape_state, only: begin_state, keep_guesses, keep_sizes, LEAST_OWN, LEAST_SCALE, reach, &
-                        set_first_terms, state_t, weigh
+  use tape_state, only: begin_state, bound_guess, keep_guesses, keep_sizes, LEAST_OWN, &
+                        LEAST_SCALE, reach, set_first_terms, state_t, weigh
   use tape_steady, only: find_varying, near_zero, resolving
   use tape_switches, only: follow, jump_at, operand_error, switches_t
   use two_words, only: two_sum
@@ -104,6 +104,7 @@ contains
     real(dp) :: break_time                    ! next breakpoint of a table, or t_end, s
     real(dp) :: to_stop                       ! time to it, s
     logical :: arrives, at_end, from_rest, is_full, has_guess
+    logical :: is_bounded                     ! whether the guess of the scale was reduced
     logical :: is_rejected                    ! whether a longer step was rejected
     logical :: has_values                     ! whether terms 0 of all slots are known
     logical :: is_resolved                    ! whether the terms of the Jacobian were checked
@@ -263,6 +264,14 @@ contains
           cycle integration
         end if
         was_singular = .false.
+        if (from_rest .and. tries < MOST_TRIES) then
+          call bound_guess(factor*s%h, s, x, is_bounded)
+          if (is_bounded) then
+            tries = tries + 1
+            s%h = factor*s%h
+            cycle integration
+          end if
+        end if
       end block find_step
       tries = 0
       is_rejected = .false.

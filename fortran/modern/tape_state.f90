@@ -14,6 +14,8 @@ module tape_state
   ! Largest of the last terms of an own state, relative to its guessed size.
   real(dp), parameter :: CONVERGED = 0.01_dp
   integer, parameter :: PARTS = 4 ! of a step, at whose ends the size of an own state is guessed
+  ! Largest guess of the scale, over the omega that the step reaches.
+  real(dp), parameter :: MOST_OF_REACHED = 2.0_dp
 
   type, public :: state_t
     integer :: n                   ! number of unknowns
@@ -23,6 +25,7 @@ module tape_state
     real(dp), pointer, contiguous :: y(:)         ! unknowns
     real(dp), pointer, contiguous :: y_low(:)     ! their rounding errors
     real(dp) :: scale              ! largest omega, rad/s
+    real(dp) :: most_guessed       ! largest guess of the scale, rad/s
     real(dp), pointer, contiguous :: own_sizes(:) ! of own states: the largest so far
     real(dp), pointer, contiguous :: weights(:)   ! which make the unknowns comparable
     logical :: is_reaching         ! whether the scale is guessed from all terms
@@ -30,7 +33,8 @@ module tape_state
     logical :: diverges            ! whether the known terms of a guess do
   end type state_t
 
-  public :: begin_state, keep_guesses, keep_sizes, reach, rotate, set_first_terms, weigh
+  public :: begin_state, bound_guess, keep_guesses, keep_sizes, reach, rotate, set_first_terms, &
+            weigh
 
 contains
 
@@ -56,6 +60,7 @@ contains
     x%y(:3) = request%omega
     x%y(4:x%first_own - 1) = attitude(:x%first_own - 4)
     x%scale = maxval(abs(request%omega))
+    x%most_guessed = huge(x%scale)
     if (x%first_own > x%n) return
     associate (own => x%y(x%first_own:))
       own = solution%own(:size(own), 0)
@@ -84,13 +89,34 @@ contains
     type(state_t), intent(inout) :: x
     integer :: i
 
-    if (from_rest) x%scale = max(maxval(abs(x%y(:3))), largest_terms(s, to_stop, 1, 3, 1, 4))
+    if (from_rest) then
+      x%scale = max(maxval(abs(x%y(:3))), &
+                    min(x%most_guessed, largest_terms(s, to_stop, 1, 3, 1, 4)))
+    end if
     x%is_reaching = .not. x%scale >= LEAST_SCALE
     if (.not. x%is_reaching) return
     do i = 1, 3
       x%scale = max(x%scale, reached_size(s, to_stop, i))
     end do
   end subroutine reach
+
+  subroutine bound_guess(step, s, x, is_bounded)
+    !! Bound the guessed scale by the omega that a step reaches, because the guess's terms may cancel.
+    real(dp), intent(in) :: step !! s
+    type(series_t), intent(in) :: s
+    type(state_t), intent(inout) :: x
+    logical, intent(out) :: is_bounded !! whether the guess was much larger
+    real(dp) :: reached
+    integer :: i
+
+    reached = 0.0_dp
+    do i = 1, 3
+      reached = max(reached, reached_size(s, step, i))
+    end do
+    is_bounded = reached >= LEAST_SCALE .and. &
+                 min(x%scale, largest_terms(s, step, 1, 3, 1, 4)) > MOST_OF_REACHED*reached
+    if (is_bounded) x%most_guessed = reached
+  end subroutine bound_guess
 
   subroutine weigh(t_end, to_stop, s, x, least)
     !! Make errors of omega relative to the scale, errors of the quaternion angles, and errors of

@@ -171,6 +171,11 @@ def _is_moderate(factor: float) -> bool:
     return _LEAST_FACTOR <= abs(factor) <= 1.0 / _LEAST_FACTOR
 
 
+def _is_subnormal(factor: float) -> bool:
+    """Return whether a factor that is not 0 lost digits, which its product with a slot may need."""
+    return abs(factor) < sys.float_info.min
+
+
 def _function(
     kind: str, derivative: "Callable[[Symbol], Symbol] | None" = None
 ) -> Callable[["Symbol"], "Symbol"]:
@@ -260,6 +265,8 @@ class Symbol(Recorded):
         if factor == 0.0:
             return Symbol(self.recorder, 0.0, {})
         terms = {slot: factor * each for slot, each in self._terms.items()}
+        if any(map(_is_subnormal, terms.values())):
+            return Symbol(self.recorder, 0.0, {self._own_slot(): factor})
         return Symbol(self.recorder, factor * self._constant, terms)
 
     @_of_symbols
@@ -301,6 +308,9 @@ class Symbol(Recorded):
             if other._constant == 0.0:
                 raise InputError(f"{self.recorder.place}: division by the constant 0")
             quotient = {slot: each / other._constant for slot, each in self._terms.items()}
+            if any(map(_is_subnormal, quotient.values())):
+                quotient = {self._own_slot(): 1.0 / other._constant}
+                return Symbol(self.recorder, 0.0, quotient)
             return Symbol(self.recorder, self._constant / other._constant, quotient)
         if not (self._terms or self._constant):
             return self
@@ -540,9 +550,10 @@ def _combined(linear: Linear, values: Sequence[Any]) -> Any:
             constant += factor * value
             continue
         recorder = value.recorder
-        constant += factor * value._constant
-        for inner, x in value._terms.items():
-            total = terms.pop(inner, 0.0) + factor * x
+        part = value._scaled(factor)
+        constant += part._constant
+        for inner, x in (part._terms if factor else dict.fromkeys(value._terms, 0.0)).items():
+            total = terms.pop(inner, 0.0) + x
             if total or not factor:
                 terms[inner] = total
     constant += linear.constant

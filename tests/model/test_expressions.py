@@ -212,3 +212,25 @@ def test_powers_of_small_quotients_do_not_underflow() -> None:
         assert isinstance(torque, StateTorque)
         found = torque.at(0.0, (0.0, 0.0, 1e12), (1.0, 0.0, 0.0, 0.0))
         assert found[2] == pytest.approx(1.0, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "(w3 + 1e200)*1e-170*1e-170", "w3/1e250/1e90", "1e-200*(w1/1e140 - w3/1e140)",
+        "1e-170*w2*1e-170*(1e-10*w1)", "1e300*(1e-170*w2*1e-170)", "sin(1e-170*w2*1e-170*1e100)",
+    ],
+)  # fmt: skip
+def test_coefficients_that_would_underflow_are_not_folded(text: str) -> None:
+    """The product of two numbers is 0 or subnormal, but not their products with an omega."""
+    omega = (3e200, 1e200, 5e200)
+    torque = parsed([text, "0", "0"], {})
+    assert isinstance(torque, StateTorque)
+    names = dict(zip(("w1", "w2", "w3"), omega, strict=True))
+    wanted = eval(text, {"sin": math.sin}, names)
+    assert wanted
+    assert torque.at(0.0, omega, (1.0, 0.0, 0.0, 0.0))[0] == pytest.approx(wanted, rel=1e-12)
+    # Turned by a third of a turn about (1, 1, 1), the torque is recorded anew.
+    axes = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    turned = torque.rotated(axes).at(0.0, tuple(axes.T @ omega), (1.0, 0.0, 0.0, 0.0))
+    assert sum(turned) == pytest.approx(wanted, rel=1e-12)

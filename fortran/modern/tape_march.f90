@@ -265,7 +265,7 @@ contains
         end if
         was_singular = .false.
         if (from_rest .and. tries < MOST_TRIES) then
-          call bound_guess(factor*s%h, s, x, is_bounded)
+          call bound_guess(factor*s%h, verdict == CROSSES, s, x, is_bounded)
           if (is_bounded) then
             tries = tries + 1
             s%h = factor*s%h

@@ -100,21 +100,24 @@ contains
     end do
   end subroutine reach
 
-  subroutine bound_guess(step, s, x, is_bounded)
-    !! Bound the guessed scale by the omega that a step reaches, because the guess's terms may cancel.
-    real(dp), intent(in) :: step !! s
+  subroutine bound_guess(step, is_early, s, x, is_bounded)
+    !! Bound the guessed scale by the omega that a step reaches, because the guess's terms may
+    !! cancel, or be those of a longer step.
+    real(dp), intent(in) :: step     !! s
+    logical, intent(in) :: is_early  !! whether a switch ends it
     type(series_t), intent(in) :: s
     type(state_t), intent(inout) :: x
     logical, intent(out) :: is_bounded !! whether the guess was much larger
-    real(dp) :: reached
+    real(dp) :: guess, reached
     integer :: i
 
     reached = 0.0_dp
     do i = 1, 3
       reached = max(reached, reached_size(s, step, i))
     end do
-    is_bounded = reached >= LEAST_SCALE .and. &
-                 min(x%scale, largest_terms(s, step, 1, 3, 1, 4)) > MOST_OF_REACHED*reached
+    guess = x%scale
+    if (.not. is_early) guess = min(guess, largest_terms(s, step, 1, 3, 1, 4))
+    is_bounded = reached >= LEAST_SCALE .and. guess > MOST_OF_REACHED*reached
     if (is_bounded) x%most_guessed = reached
   end subroutine bound_guess
 

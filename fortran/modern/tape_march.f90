@@ -139,9 +139,7 @@ contains
     call begin_state(tape, request, attitude, solution, memory(:, :4), x)
     call begin_error(x%n, memory(:, 5:), e)
     call begin(x%n, transitions)
-    ! Slots of a branch that is not chosen may be singular.
-    n_varying = 0
-    if (switches%n == 0) call find_varying(tape, varying, n_varying)
+    call find_varying(tape, varying, n_varying)
     live = tape
     switches%part = 0.0_dp
     if (switches%n > 0) call settle(tape, x%t, x%y, t_end, switches, s, live, rates)
@@ -165,7 +163,10 @@ contains
     first_scale = huge(first_scale)
     integration: do
       call set_first_terms(x, s)
-      if (switches%n > 0) call keep_live(tape, switches, s, live)
+      if (switches%n > 0) then
+        call keep_live(tape, switches, s, live)
+        call find_varying(live, varying, n_varying)
+      end if
       call expand(live, x%t(2), has_values, s)
       has_values = .false.
       break_time = next_break(tape, x%t(1), t_end)

@@ -2,7 +2,8 @@ module tape_steady
   !! Steps of nearly steady motions. A time function that multiplies an unknown near 0 changes
   !! perturbations but not the motion, whose terms do not show whether its series converges.
   use kinds, only: dp
-  use operations, only: LINEAR, LOGARITHM => LOG, PRODUCT, QUOTIENT, TABLE
+  use operations, only: FLOOR_OF => FLOOR, LINEAR, LOGARITHM => LOG, PRODUCT, QUOTIENT, &
+                        SELECT_OF => SELECT, SWITCH, TABLE
   use tape, only: FIRST_UNKNOWN, tape_t, TIME_SLOT
   use tape_growth, only: MOST_UNKNOWNS
   use tape_series, only: BLOCKS_OF_COLUMNS, jacobian_at, series_t, SIDE_BY_SIDE
@@ -49,6 +50,13 @@ contains
         case (LINEAR)
           call add_combination(out, first)
           cycle
+        case (SELECT_OF)
+          ! One of the two is chosen; the other has no slots that matter.
+          call add_combination(out, second)
+          call add_combination(out, second + 1)
+          cycle
+        case (SWITCH, FLOOR_OF)
+          cycle
         case (PRODUCT, QUOTIENT, LOGARITHM:)
           moves(out:last_slot) = moves(first) .or. moves(second)
           depends(out:last_slot) = depends(first) .or. depends(second)
@@ -92,7 +100,7 @@ contains
     integer :: i
 
     do i = 1, n
-      near(i) = weights(i)*maxval(abs(s%a(:3, FIRST_UNKNOWN - 1 + i))) < MULTIPLE*local_tolerance
+      near(i) = weights(i)*maxval(abs(s%a(1:3, FIRST_UNKNOWN - 1 + i))) < MULTIPLE*local_tolerance
     end do
   end function near_zero
 

@@ -213,6 +213,32 @@ def test_growth_of_a_steady_motion_follows_pulses(
     assert found.growth == pytest.approx(wanted, rel=0.2)
 
 
+@pytest.mark.parametrize("aim", [0.02, -3.0, 0.0])
+@pytest.mark.parametrize("is_switched", [False, True])
+@pytest.mark.parametrize(("frequency", "time"), [(6.0, 60.0), (2.4, 315.0), (9.7, 102.0)])
+def test_growth_of_a_motion_that_becomes_steady_follows_its_control(
+    aim: float, is_switched: bool, frequency: float, time: float
+) -> None:
+    """The control amplifies no error, about any aim: the rate is a gain above 0 times the rest."""
+
+    def rate(time: Any, value: Any) -> Any:
+        found = (1.2 + np.cos(frequency * time)) * (aim - value)
+        return np.where(value < aim - 0.5, 1.0, found) if is_switched else found
+
+    def with_state(time: Any, omega: Any, states: Any) -> Any:
+        return 0.0 * omega, {"x": rate(time, states["x"])}
+
+    begin = aim - 0.7
+    plain = Scene("", (0.0, 0.0, begin), (1.0, 2.0, 3.0), torque=lambda t, w: [
+        0.0 * t, 0.0 * t, 3.0 * rate(t, w[2])])  # fmt: skip
+    own = Scene("", (0.0, 0.0, 1.0), (1.0, 2.0, 3.0), states={"x": begin}, torque=with_state)
+    for scene in (plain, own):
+        found = solve(scene, time, tolerance=1e-9)
+        assert found.ended == "complete"
+        assert found.growth == pytest.approx(1.0, abs=0.01)
+        assert found.y[-1, 0] == pytest.approx(aim, abs=1e-9)
+
+
 @pytest.mark.parametrize("power", [-320, -299, -250, 250])
 def test_growth_beside_the_attitude_has_no_unit(power: int) -> None:
     """Derivatives of the attitude by omega are as large as the unit of time."""

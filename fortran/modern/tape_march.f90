@@ -16,7 +16,8 @@ module tape_march
   use tape_plan, only: converge, fitting, LEAST_LOCAL_TOLERANCE, local_tolerance_of, &
                        MOST_TRIES, order_for
   use tape_runge_kutta, only: guess_sizes, has_singular_points, is_near_singular, long_step_t, &
-                              LONGER_THAN_SERIES, longest_without_terms, step_over
+                              LONGER_THAN_SERIES, longest_without_terms, step_over, &
+                              stop_unknowns
   use tape_rows, only: add_nodes, add_row, add_rows, evaluate
   use tape_series, only: derivatives_at, expand, noise_of, PADDED, series_t, slot_gradient, &
                          sum_terms
@@ -105,6 +106,7 @@ contains
     real(dp) :: to_stop                       ! time to it, s
     logical :: arrives, at_end, from_rest, is_full, has_guess
     logical :: is_bounded                     ! whether the guess of the scale was reduced
+    logical :: has_stopped                    ! whether an unknown remains 0 from this step on
     logical :: is_rejected                    ! whether a longer step was rejected
     logical :: has_values                     ! whether terms 0 of all slots are known
     logical :: is_resolved                    ! whether the terms of the Jacobian were checked
@@ -158,6 +160,7 @@ contains
     has_singular = has_singular_points(tape)
     next_try = huge(next_try)
     was_singular = .false.
+    long_step%is_stopped = .false.
     longest = 0.0_dp
     least_expected = 0.0_dp
     first_scale = huge(first_scale)
@@ -320,9 +323,13 @@ contains
         exit integration
       end if
       ! The steps shrink to nothing before a singularity.
+      has_stopped = .false.
       if (abs(factor*s%h) <= spacing(x%t(1)) .and. .not. arrives .and. verdict /= CROSSES) then
-        solution%status = merge(STALLED, OVERFLOW, x%scale <= UNBOUNDED*first_scale)
-        exit integration
+        if (has_singular) call stop()
+        if (.not. has_stopped) then
+          solution%status = merge(STALLED, OVERFLOW, x%scale <= UNBOUNDED*first_scale)
+          exit integration
+        end if
       end if
       call count_step(solution%n_rows > n_before, transitions, is_full)
       if (is_full) then
@@ -331,12 +338,13 @@ contains
       end if
       x%t = t_next
       has_values = size(tape%table_starts) == 1 .and. verdict == STAYS &
-                   .and. .not. (is_compared .or. is_long)
+                   .and. .not. (is_compared .or. is_long .or. has_stopped)
       from_rest = .not. x%scale >= LEAST_SCALE
       rest = (t_end - x%t(1)) - x%t(2)
       s%h = factor*s%h
       longest = max(longest, abs(s%h))
       if (verdict == CROSSES) s%h = whole_step
+      if (has_stopped) s%h = sign(longest, s%h)
       if (abs(s%h) > abs(rest)) s%h = rest
       if (has_guess) call share_tolerance()
       call check_steps(found%steps, x%t(1), rest, arrives .or. verdict == CROSSES .or. is_long, &
@@ -632,6 +640,24 @@ contains
         found%switches_at = at_time(1)
       end if
     end subroutine compare_touch
+
+    subroutine stop()
+      !! Let unknowns remain 0 that reach it in a finite time. There their perturbations and errors
+      !! end.
+      logical :: is_new(x%n)
+      integer :: i
+
+      call stop_unknowns(tape, t_next, x%weights, change(:x%n), s%h, switches, s, live, x%y, is_new)
+      has_stopped = any(is_new)
+      do i = 1, x%n
+        if (.not. is_new(i)) cycle
+        long_step%is_stopped(i) = .true.
+        x%y_low(i) = 0.0_dp
+        e%lanes(:, i, :) = 0.0_dp
+        e%noise(i) = 0.0_dp
+        e%noise_of_block(i) = 0.0_dp
+      end do
+    end subroutine stop
 
     subroutine cross()
       !! Change the switches at the end of the step.

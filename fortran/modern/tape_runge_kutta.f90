@@ -21,6 +21,8 @@ module tape_runge_kutta
   real(dp), parameter :: SHORTER = 0.25_dp    ! factor on a step whose error is too large
   integer, parameter :: MOST_TRIES = 60
   integer, parameter :: LAST_TABLE_TERM = 3 ! of a cubic polynomial
+  real(dp), parameter :: NO_DIGIT = 2.0_dp**(-53) ! relative size of an unknown
+  real(dp), parameter :: LEAST_CHANGE = 1e-6_dp    ! in a shortest step, of an unknown that stops
   real(dp), parameter :: SHORTEST = 4.0_dp    ! step, over the distance of neighbouring times
   ! Error of the halved step over the difference that halving makes, if rates grow as 1/sqrt(t).
   real(dp), parameter :: HALVED = 2.5_dp
@@ -46,6 +48,7 @@ module tape_runge_kutta
     real(dp) :: first, least            ! length that is tried first, and shortest length, s
     real(dp) :: allowed                 ! error
     logical :: with_derivatives
+    logical :: is_stopped(MOST_UNKNOWNS) ! unknowns that a perturbation leaves for a moment alone
     ! What is computed.
     real(dp) :: h                       ! s; 0 if no step is accurate enough
     real(dp) :: largest_error           ! of the step, or of the last that was tried, relative
@@ -61,7 +64,8 @@ module tape_runge_kutta
   procedure(rates_at), pointer, public :: rates_by => rates_at
   procedure(integrate), pointer, public :: integrate_by => integrate
 
-  public :: guess_sizes, has_singular_points, is_near_singular, longest_without_terms, step_over
+  public :: guess_sizes, has_singular_points, is_near_singular, longest_without_terms, step_over, &
+            stop_unknowns
 
 contains
 
@@ -235,7 +239,7 @@ contains
       other%n = MOST_PIECES
       do j = 1, size(y)
         step%derivatives(:size(y), j) = 0.0_dp
-        if (.not. weights(j) > 0.0_dp) cycle
+        if (.not. weights(j) > 0.0_dp .or. (step%is_stopped(j) .and. fine(j) == 0.0_dp)) cycle
         perturbation = max(OF_CHANGE*abs(fine(j)), OF_SIZE*abs(y(j)), &
                            min(OF_SIZE, step%allowed)/weights(j))
         perturbed = y
@@ -304,6 +308,43 @@ contains
     if (tries > MOST_TRIES) sizes = 0.0_dp
     call restore_slots(tape, terms, on_level, is_new, switches, s, live)
   end subroutine guess_sizes
+
+  subroutine stop_unknowns(tape, t, weights, change, h, switches, s, live, y, is_stopped)
+    !! Set unknowns to 0 that reach it in a finite time, before which steps shrink to nothing, and
+    !! remain: the rates there are 0, and lead back to 0 from both sides, as w' = -sign(w)
+    !! sqrt(abs(w)). None is set if one of them does not remain.
+    type(tape_t), intent(in) :: tape
+    real(dp), intent(in) :: t(2)       !! time and its rounding error, s
+    real(dp), intent(in) :: weights(:) !! make the unknowns comparable
+    real(dp), intent(in) :: change(:)  !! of the unknowns in the last step
+    real(dp), intent(in) :: h          !! s
+    type(switches_t), intent(inout), target :: switches
+    type(series_t), intent(inout) :: s
+    type(tape_t), intent(inout) :: live
+    real(dp), intent(inout) :: y(:)
+    logical, intent(out) :: is_stopped(:) !! unknowns that were set
+    real(dp), dimension(size(y)) :: rates, there
+    integer :: i, side
+
+    is_stopped = weights > 0.0_dp .and. y /= 0.0_dp .and. weights*abs(y) <= NO_DIGIT &
+                 .and. abs(change) > LEAST_CHANGE*abs(y)
+    do i = 1, size(y)
+      if (.not. is_stopped(i)) cycle
+      do side = -1, 1, 2
+        there = merge(0.0_dp, y, is_stopped)
+        there(i) = sign(y(i), real(side, dp))
+        call rates_by(tape, t, there, h, switches, s, live, rates)
+        ! NaN, where the torque is not defined, leads nowhere.
+        if (rates(i)*side*h > 0.0_dp) is_stopped = .false.
+      end do
+    end do
+    there = merge(0.0_dp, y, is_stopped)
+    call rates_by(tape, t, there, h, switches, s, live, rates)
+    if (.not. all(abs(rates) <= huge(h)) .or. any(is_stopped .and. rates /= 0.0_dp)) then
+      is_stopped = .false.
+    end if
+    where (is_stopped) y = 0.0_dp
+  end subroutine stop_unknowns
 
   subroutine keep_slots(switches, s, terms, on_level, is_new)
     !! Copy the terms of slots that `rates_at` overwrites, and the switches.

@@ -128,3 +128,55 @@ def test_campaign_finds_no_fault() -> None:
         driver.campaign(singular_campaign.MODULE, singular_campaign.try_scene, 8, "test").faults
         == []
     )
+
+
+def _root(x: Any) -> Any:
+    return np.sign(x) * np.sqrt(np.abs(x))
+
+
+# Rates of a motion that begins at 1, and its values at 1, 2.5 and 4 s.
+STOPS: dict[str, tuple[Any, list[float]]] = {
+    "root": (lambda t, x: -_root(x), [0.25, 0.0, 0.0]),
+    "root of a level": (lambda t, x: -np.sqrt(x), [0.25, 0.0, 0.0]),
+    "power 1/4": (lambda t, x: -np.sign(x) * np.abs(x) ** 0.25, [0.25 ** (4 / 3), 0.0, 0.0]),
+    "power 2/3": (lambda t, x: -1.5 * np.sign(x) * np.abs(x) ** (2 / 3), [0.125, 0.0, 0.0]),
+    "pushed later": (
+        lambda t, x: np.where(t > 3.0, 1.0, 0.0) - _root(x), [0.25, 0.0, 0.487609534846501],
+    ),
+    "pushed more and more": (
+        lambda t, x: np.where(t > 3.0, t - 3.0, 0.0) - _root(x), [0.25, 0.0, 0.25],
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("tolerance", [1e-5, 1e-9, 1e-12])
+@pytest.mark.parametrize("name", STOPS)
+def test_what_stops_in_a_finite_time_remains_at_0(name: str, tolerance: float, side: float) -> None:
+    law, wanted = STOPS[name]
+    times = [side * t for t in (1.0, 2.5, 4.0)]
+
+    def with_state(t: Any, w: Any, states: Any) -> Any:
+        return [0.1 * np.cos(t), 0.0 * t, 0.0 * t], {"x": side * law(side * t, states["x"])}
+
+    plain = _about_z(lambda t, w: side * law(side * t, w[2]), 1.0)
+    own = Scene("own", (0.3, 0.2, 0.1), moments=SPHERE, states={"x": 1.0}, torque=with_state)
+    for scene in (plain, own):
+        found = solve(scene, times, tolerance=tolerance, dense_output=True)
+        assert found.ended == "complete"
+        assert found.growth is not None
+        assert found.error is not None
+        limit = tolerance + 4e-15 * found.growth
+        assert found.error <= limit
+        assert found.y[-1] == pytest.approx(wanted, rel=0.0, abs=limit)
+        assert found.sol(times)[-1] == pytest.approx(wanted, rel=0.0, abs=limit)
+
+
+@pytest.mark.parametrize("power", [0.5, 2 / 3])
+def test_what_may_leave_0_is_not_kept_there(power: float) -> None:
+    """Past its touch of 0 the motion is not unique: it may stay for any time, or go on at once."""
+    scene = _about_z(lambda t, w: np.abs(w[2]) ** power, -1.0)
+    found = solve(scene, [1.0, 2.5 / (1.0 - power)])
+    assert found.ended in ("sensitive", "singular")
+    if found.ended == "sensitive":
+        assert found.omega[-1, 2] > 0.0

@@ -20,7 +20,7 @@ def check(omega: OfTime, rate: OfTime, end: float, tolerance: float) -> None:
     own = Scene("own", (0, 0, 1), _MOMENTS, states={"x": 0.0},
                 torque=lambda t, w, states: (0 * w, {"x": rate(t)}))  # fmt: skip
     for scene, unknown in ((plain, 2), (own, 3)):
-        found = solve(scene, times, tolerance=tolerance, dense_output=True)
+        found: Any = solve(scene, times, tolerance=tolerance, dense_output=True)
         for rows in (found.y, found.sol(times)):
             assert np.abs(rows[unknown] - omega(times)).max() <= tolerance * size, scene
     rows = [prepare(plain, tolerance=tolerance)(plain.omega, end)]

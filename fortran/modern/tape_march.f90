@@ -374,7 +374,7 @@ contains
       longest_step = fitting(tape, s%order, local_tolerance, x%weights, s%a)
       is_resolved = .false.
       if (n_varying == 0 .or. .not. longest_step > 0.0_dp) return
-      near = near_zero(x%n, local_tolerance, x%weights, s)
+      near = near_zero(x%n, longest_step, local_tolerance, x%weights, s)
       is_resolved = any(near)
       if (is_resolved) then
         longest_step = resolving(varying(:n_varying), near, x%weights, max(1.0_dp, abs(t_end)), &

@@ -19,6 +19,7 @@ module tape_steady
   real(dp), parameter :: MOST_VARIATION = 0.2_dp ! the same, from node to node
   ! An unknown is near 0 if its first terms are smaller than this multiple of the local tolerance.
   real(dp), parameter :: MULTIPLE = 1e3_dp
+  real(dp), parameter :: LONGER = 1.5_dp ! step, over the last
 
   public :: find_varying, near_zero, resolving
 
@@ -90,17 +91,20 @@ contains
 
   end subroutine find_varying
 
-  pure function near_zero(n, local_tolerance, weights, s) result(near)
-    !! Return which unknowns are near 0, relative to their sizes, and do not leave it at once.
+  pure function near_zero(n, factor, local_tolerance, weights, s) result(near)
+    !! Return which unknowns are near 0, relative to their sizes, and do not leave it at once. If the
+    !! step becomes longer, another value may be the zero, as in a(t) (1 - x).
     integer, intent(in) :: n !! number of unknowns
+    real(dp), intent(in) :: factor !! on the step
     real(dp), intent(in) :: local_tolerance
     real(dp), intent(in) :: weights(n)
     type(series_t), intent(in) :: s
     logical :: near(n)
-    integer :: i
+    integer :: first, i
 
+    first = merge(1, 0, factor > LONGER)
     do i = 1, n
-      near(i) = weights(i)*maxval(abs(s%a(1:3, FIRST_UNKNOWN - 1 + i))) < MULTIPLE*local_tolerance
+      near(i) = weights(i)*maxval(abs(s%a(first:3, FIRST_UNKNOWN - 1 + i))) < MULTIPLE*local_tolerance
     end do
   end function near_zero
 

@@ -92,19 +92,21 @@ contains
   end subroutine find_varying
 
   pure function near_zero(n, factor, local_tolerance, weights, s) result(near)
-    !! Return which unknowns are near 0, relative to their sizes, and do not leave it at once. If the
-    !! step becomes longer, another value may be the zero, as in a(t) (1 - x).
-    integer, intent(in) :: n !! number of unknowns
+    !! Return which unknowns are near 0, relative to their sizes, and do not leave it at once. Where
+    !! the step becomes longer, that is near any value, as near 1 in a(t) (1 - x).
+    integer, intent(in) :: n       !! number of unknowns
     real(dp), intent(in) :: factor !! on the step
     real(dp), intent(in) :: local_tolerance
     real(dp), intent(in) :: weights(n)
     type(series_t), intent(in) :: s
     logical :: near(n)
+    real(dp) :: largest ! of the first terms
     integer :: first, i
 
     first = merge(1, 0, factor > LONGER)
     do i = 1, n
-      near(i) = weights(i)*maxval(abs(s%a(first:3, FIRST_UNKNOWN - 1 + i))) < MULTIPLE*local_tolerance
+      largest = maxval(abs(s%a(first:3, FIRST_UNKNOWN - 1 + i)))
+      near(i) = weights(i)*largest < MULTIPLE*local_tolerance
     end do
   end function near_zero
 

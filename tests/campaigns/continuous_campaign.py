@@ -116,7 +116,7 @@ def timed(source: Random, kind: str) -> Drawn:
     """Return a body under torques of time about one axis or all, or with own states."""
     length = 10.0 ** source.uniform(-1.0, 1.0)
     if kind != "own" and source.random() < 0.1:
-        length = math.ldexp(length, source.choice((-320, 320)))
+        length = math.ldexp(length, source.choice((-320, 320, 460)))
     ends = source.choice(((0.0, length), (-length, 0.0), (-0.7 * length, length)))
     moments = [source.uniform(1.0, 1.9) for _ in range(3)]
     axis, about = source.randrange(3), range(3)

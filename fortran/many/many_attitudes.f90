@@ -9,7 +9,7 @@ module many_attitudes
   implicit none(type, external)
   private
 
-  integer, parameter :: MOST_TERMS = 18
+  integer, parameter :: MOST_TERMS = 17
   real(dp), parameter :: FAR = 1e100_dp ! squared norms from 1/FAR to FAR are accurate
   ! Largest last term in half a step of a steady rotation, in tolerances.
   real(dp), parameter :: A_TERM = 0.002_dp
@@ -63,10 +63,8 @@ contains
       now%order = 12
     else if (tolerance >= 1e-10_dp) then
       now%order = 15
-    else if (tolerance >= 3e-13_dp) then
-      now%order = 17
     else
-      now%order = 18
+      now%order = 17
     end if
     now%widest = (4.0_dp/sqrt(3.0_dp)) &
                  *exp((log(A_TERM*tolerance) + log_gamma(now%order + 1.0_dp))/now%order)

@@ -131,14 +131,12 @@ contains
     !! of a body does not depend on the others.
     real(dp), intent(in) :: tolerance
 
-    if (tolerance >= 1e-4_dp) then
+    if (tolerance >= 5e-4_dp) then
       order_for = 8
     else if (tolerance >= 3e-8_dp) then
       order_for = 12
-    else if (tolerance >= 3e-13_dp) then
-      order_for = 20
     else
-      order_for = 24
+      order_for = 20
     end if
   end function order_for
 

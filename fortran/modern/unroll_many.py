@@ -4,8 +4,8 @@ import itertools
 import re
 from collections.abc import Iterator
 
-ORDERS = (8, 12, 20, 24)
-ATTITUDE_ORDERS = (8, 12, 15, 17, 18)
+ORDERS = (8, 12, 20)
+ATTITUDE_ORDERS = (8, 12, 15, 17)
 CARRIED = 7  # order of the exponential that propagates perturbations
 MOMENTS = 8  # terms that count in the mean of omega over a step
 FACTORS = (("x", "y", "z", "fa"), ("y", "x", "z", "fb"), ("z", "x", "y", "fc"))

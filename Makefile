@@ -87,7 +87,7 @@ clean:
 
 .venv/ready-to-test: .venv/ready
 	@$(PIP) uv && $(BIN)/uv pip install --quiet --python $(BIN)/python --group test || \
-	  $(PIP) --group test
+	  { $(PIP) "pip>=25.1" && $(PIP) --group test; }
 	@touch $@
 
 .venv/tools: FORCE

@@ -53,6 +53,7 @@ module tape_march
   real(dp), parameter :: LEAST_EXPECTED_PART = 1.0_dp/16.0_dp ! for most of the time
   ! Largest omega over the first, unless omega becomes infinite.
   real(dp), parameter :: UNBOUNDED = 1e6_dp
+  real(dp), parameter :: LEAST_CHANGE = 1e-6_dp ! in a shortest step, of an unknown that stops
   real(dp), parameter :: LARGEST_JUMP = 1e100_dp ! whose square is finite
 
   ! One integration of a request.
@@ -647,7 +648,9 @@ contains
       logical :: is_new(x%n)
       integer :: i
 
-      call stop_unknowns(tape, t_next, x%weights, change(:x%n), s%h, switches, s, live, x%y, is_new)
+      is_new = x%weights > 0.0_dp .and. x%y /= 0.0_dp .and. x%weights*abs(x%y) <= ROUNDING &
+               .and. abs(change(:x%n)) > LEAST_CHANGE*abs(x%y)
+      call stop_unknowns(tape, t_next, switches, s, live, x%y, is_new)
       has_stopped = any(is_new)
       do i = 1, x%n
         if (.not. is_new(i)) cycle

@@ -21,8 +21,6 @@ module tape_runge_kutta
   real(dp), parameter :: SHORTER = 0.25_dp    ! factor on a step whose error is too large
   integer, parameter :: MOST_TRIES = 60
   integer, parameter :: LAST_TABLE_TERM = 3 ! of a cubic polynomial
-  real(dp), parameter :: NO_DIGIT = 2.0_dp**(-53) ! relative size of an unknown
-  real(dp), parameter :: LEAST_CHANGE = 1e-6_dp    ! in a shortest step, of an unknown that stops
   real(dp), parameter :: SHORTEST = 4.0_dp    ! step, over the distance of neighbouring times
   ! Error of the halved step over the difference that halving makes, if rates grow as 1/sqrt(t).
   real(dp), parameter :: HALVED = 2.5_dp
@@ -309,38 +307,33 @@ contains
     call restore_slots(tape, terms, on_level, is_new, switches, s, live)
   end subroutine guess_sizes
 
-  subroutine stop_unknowns(tape, t, weights, change, h, switches, s, live, y, is_stopped)
+  subroutine stop_unknowns(tape, t, switches, s, live, y, is_stopped)
     !! Set unknowns to 0 that reach it in a finite time, before which steps shrink to nothing, and
     !! remain: the rates there are 0, and lead back to 0 from both sides, as w' = -sign(w)
     !! sqrt(abs(w)). None is set if one of them does not remain.
     type(tape_t), intent(in) :: tape
     real(dp), intent(in) :: t(2)       !! time and its rounding error, s
-    real(dp), intent(in) :: weights(:) !! make the unknowns comparable
-    real(dp), intent(in) :: change(:)  !! of the unknowns in the last step
-    real(dp), intent(in) :: h          !! s
     type(switches_t), intent(inout), target :: switches
     type(series_t), intent(inout) :: s
     type(tape_t), intent(inout) :: live
     real(dp), intent(inout) :: y(:)
-    logical, intent(out) :: is_stopped(:) !! unknowns that were set
+    logical, intent(inout) :: is_stopped(:) !! unknowns that may reach 0; those that were set
     real(dp), dimension(size(y)) :: rates, there
     integer :: i, side
 
-    is_stopped = weights > 0.0_dp .and. y /= 0.0_dp .and. weights*abs(y) <= NO_DIGIT &
-                 .and. abs(change) > LEAST_CHANGE*abs(y)
     do i = 1, size(y)
       if (.not. is_stopped(i)) cycle
       do side = -1, 1, 2
         there = merge(0.0_dp, y, is_stopped)
         there(i) = sign(y(i), real(side, dp))
-        call rates_by(tape, t, there, h, switches, s, live, rates)
+        call rates_by(tape, t, there, s%h, switches, s, live, rates)
         ! NaN, where the torque is not defined, leads nowhere.
-        if (rates(i)*side*h > 0.0_dp) is_stopped = .false.
+        if (rates(i)*side*s%h > 0.0_dp) is_stopped = .false.
       end do
     end do
     there = merge(0.0_dp, y, is_stopped)
-    call rates_by(tape, t, there, h, switches, s, live, rates)
-    if (.not. all(abs(rates) <= huge(h)) .or. any(is_stopped .and. rates /= 0.0_dp)) then
+    call rates_by(tape, t, there, s%h, switches, s, live, rates)
+    if (.not. all(abs(rates) <= huge(rates)) .or. any(is_stopped .and. rates /= 0.0_dp)) then
       is_stopped = .false.
     end if
     where (is_stopped) y = 0.0_dp

@@ -21,7 +21,7 @@ class InputError(ValueError):
     ...     case_scene(9)
     ... except InputError as error:
     ...     print(error)
-    --case: unknown case '9'; allowed: 1, 2, 3, 4, 5, 6, 7
+    unknown case '9'; allowed: 1, 2, 3, 4, 5, 6, 7
     """
 
     def __init__(self, message: str) -> None:

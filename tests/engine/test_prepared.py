@@ -1,7 +1,6 @@
 """Prepared solvers and the plan: right results, one check of arguments, cheap calls, equal bits."""
 
 import copy
-import doctest
 import gc
 import math
 import pickle
@@ -24,7 +23,6 @@ import numpy as np
 import pytest
 
 import pyharness.engine.plan as planning
-import pyharness.engine.solve as solving
 import pyharness.engine.solver as solver_module
 from pyharness import InputError, Scene, TorqueLaw, case_scene, prepare, solve, solve_many
 from pyharness.bench.growth import growth
@@ -412,12 +410,6 @@ def test_wave_without_effect_is_not_packed(solver: Solver) -> None:
     for method in ("gauss-4", "dop853"):
         found, wanted = (solve(each, [1.0], method, 1e-9).omega for each in (same, PUSHED))
         np.testing.assert_array_equal(found, wanted)
-
-
-def test_examples_in_the_docstrings_run() -> None:
-    for each in (solver_module, solving):
-        result = doctest.testmod(each)
-        assert (result.attempted >= 2, result.failed) == (True, 0)
 
 
 def test_plan_savings_are_measured() -> None:

@@ -1,6 +1,5 @@
 """Trajectories under SciPy's names, as frames, data sets, diagrams and HTML."""
 
-import doctest
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
@@ -12,7 +11,6 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pyharness import InputError, Scene, case_scene, run_program, solve, subset
-from pyharness.model import conversions, trajectory
 from pyharness.model.trajectory import Trajectory
 
 TIMES = [0.5, 1.0, 2.0]
@@ -215,12 +213,6 @@ def test_notebook_shows_few_rows_in_full(count: int, shown: int) -> None:
     rows = [row for row in _table(found)[1] if len(row) > 2]
     assert len(rows) == 1 + shown
     assert (["..."] * 4 in rows) == (count > 7)
-
-
-def test_examples_in_the_docstrings_run() -> None:
-    for each in (conversions, trajectory):
-        result = doctest.testmod(each)
-        assert (result.attempted >= 2, result.failed) == (True, 0)
 
 
 def test_notebook_shows_any_ending() -> None:

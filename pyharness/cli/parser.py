@@ -8,8 +8,10 @@ from typing import Any, NoReturn
 
 from pyharness.cli.options import FORMATS, LISTING, SCENE, check_known, warn
 from pyharness.model.errors import InputError, unknown
+from pyharness.model.scene_file import case_numbers
 
 _NEGATIVE = re.compile(r"-[.\d]")
+_NUMBERS = re.compile(r"-?[.\d][-+.,\deEdD]*")
 _GROUPS = {**dict.fromkeys(SCENE, "scene"), **dict.fromkeys(LISTING, "version of the programs")}
 _OUTPUTS = ("--format", "--plot", "--out", "--also", "--strict")
 _RENAMED = {"--omega0": "--omega", "--methods": "--method", "--random": "--draws"}
@@ -102,7 +104,7 @@ class Parser(argparse.ArgumentParser):
     def read(self, verb: str, arguments: Sequence[str]) -> argparse.Namespace:
         options, rest = self.parse_known_args(self._joined(arguments))
         if rest:
-            raise unknown("option", rest[0], self.option_names(), verb)
+            raise self._left_over(verb, rest[0], arguments)
         for name, value in vars(options).items():
             # For `--name=--`, argparse returns a list.
             if isinstance(value, list):
@@ -113,6 +115,36 @@ class Parser(argparse.ArgumentParser):
                 formats = fewer
         check_known("format", options.format, formats)
         return options
+
+    def _left_over(self, verb: str, word: str, arguments: Sequence[str]) -> InputError:
+        """Return an InputError for a word that belongs to no option."""
+        names = self.option_names()
+        last, value = "", ""
+        for each in arguments[: list(arguments).index(word)]:
+            if each.startswith("--"):
+                last, _, value = each.partition("=")
+            else:
+                value = each
+        if _NUMBERS.fullmatch(word) and _NUMBERS.fullmatch(value) and self._takes_list(last):
+            return InputError(
+                f"{verb} {last}: '{word}' is a second value; join numbers by commas, without "
+                f"spaces, as in {last} {value},{word}"
+            )
+        if word.startswith("-"):
+            return unknown("option", word, names, verb)
+        if "--case" in names and word in map(str, case_numbers()):
+            return InputError(f"{verb}: '{word}' belongs to no option; did you mean --case {word}?")
+        if "--scene" in names and word.endswith(".toml"):
+            return InputError(
+                f"{verb}: '{word}' belongs to no option; did you mean --scene {word}?"
+            )
+        return InputError(
+            f"{verb}: '{word}' belongs to no option; pyharness {verb} --help names them"
+        )
+
+    def _takes_list(self, option: str) -> bool:
+        action = self._option_string_actions.get(option)
+        return action is not None and "," in str(action.metavar)
 
     def _joined(self, arguments: Sequence[str]) -> list[str]:
         """Return the arguments, with negative numbers joined to their options, as in --x=-1."""

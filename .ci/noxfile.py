@@ -105,7 +105,8 @@ def release(session: nox.Session) -> None:
 def levels(session: nox.Session) -> None:
     """Test each instruction set of the wheel, without the sources; or run the tests named."""
     tests = FACTS["tool"]["cibuildwheel"]
-    session.install(f"{the('whl')}[plots]", *tests["test-requires"])
+    # What modules with such tests import.
+    session.install(f"{the('whl')}[plots,proofs]", *tests["test-requires"], "pandas")
     session.chdir(copied_tree(session))
     shutil.rmtree("pyharness")
     chosen = session.posargs or [

@@ -163,9 +163,10 @@ def test_what_stops_in_a_finite_time_remains_at_0(name: str, tolerance: float, s
     own = Scene("own", (0.3, 0.2, 0.1), moments=SPHERE, states={"x": 1.0}, torque=with_state)
     for scene in (plain, own):
         found: Any = solve(scene, times, tolerance=tolerance, dense_output=True)
-        assert found.ended == "complete"
         limit = tolerance + 4e-15 * found.growth
-        assert found.error <= limit
+        # Before the stop perturbations grow without limit, so that rounding errors decide.
+        assert found.ended == "sensitive" or found.error <= limit
+        assert found.has_all_rows
         assert found.y[-1] == pytest.approx(wanted, rel=0.0, abs=limit)
         assert found.sol(times)[-1] == pytest.approx(wanted, rel=0.0, abs=limit)
 

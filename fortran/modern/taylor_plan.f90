@@ -16,7 +16,7 @@ module taylor_plan
   real(dp), parameter :: WITH_ATTITUDE_TOO = 0.25_dp
 
   ! Order of precise variations at the smallest local tolerance: enough for 1e6 radians.
-  integer, parameter :: ORDER_FINEST = 20
+  integer, parameter :: ORDER_FINEST = 18
 
   public :: add_wave_rates, first_step, local_tolerance_of, order_of_variations, plan, steady_rates
 
@@ -121,16 +121,16 @@ contains
   end subroutine add_wave_rates
 
   pure integer function order_for(local_tolerance)
-    !! Return the order of unroll.py with the least work, by a line through measured orders.
+    !! Return the even order with the least work, by a line through measured orders.
     real(dp), intent(in) :: local_tolerance
     integer(int64) :: bits  ! bits of accuracy
 
     bits = 1023 - ishft(transfer(local_tolerance, bits), -52)
-    order_for = max(LEAST_ORDER, min(MOST_ORDER, 8 + 4*int((8*bits + 100)/100)))
+    order_for = max(LEAST_ORDER, min(MOST_ORDER, 8 + 2*int((16*bits + 100)/100)))
   end function order_for
 
   pure integer function order_of_variations(order, tolerance, local_tolerance)
-    !! Return the order to which precise variations are propagated. Their errors grow in
+    !! Return the even order to which precise variations are propagated. Their errors grow in
     !! proportion to the square of the time, as those of the motion do, for which reason the local
     !! tolerance is smaller than the tolerance. Terms of omega decrease by its power 1/order.
     integer, intent(in) :: order
@@ -138,7 +138,7 @@ contains
 
     order_of_variations = ORDER_FINEST
     if (local_tolerance > LEAST_LOCAL_TOLERANCE) then
-      order_of_variations = 4*ceiling(0.5_dp + 0.25_dp*order &
+      order_of_variations = 2*ceiling(1.0_dp + 0.5_dp*order &
                                       *log(local_tolerance/tolerance)/log(local_tolerance))
     end if
     order_of_variations = max(LEAST_ORDER, min(order, order_of_variations))

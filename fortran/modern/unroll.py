@@ -64,8 +64,7 @@ MODULES = (
     "many_programs",
 )
 LEAST_ORDER, MOST_ORDER = layout.ORDERS.LEAST_ORDER, layout.ORDERS.MOST_ORDER
-# Those between gain less than 3 %.
-ORDERS = range(LEAST_ORDER, MOST_ORDER + 1, 4)
+ORDERS = range(LEAST_ORDER, MOST_ORDER + 1, 2)
 ORDER_CARRIED = 7
 # The two factors of the products in equations 13-15, and the arrays in which the plain code stores
 # each unknown.

@@ -6,7 +6,7 @@ module tape_march
   use problem, only: request_t, solution_t
   use statuses, only: COMPLETE, OVERFLOW, SLIDING, STALLED
   use step_limit, only: check_steps, limit_of, step_limit_t
-  use tape, only: FIRST_UNKNOWN, next_break, tape_t
+  use tape, only: next_break, tape_t
   use tape_crossings, only: CROSSES, IS_CHANGED, next_crossing, resolve_switches, SLIDES, STAYS
   use tape_error, only: add_noise, begin_block, begin_error, cross_error, error_t, &
                         estimate_truncation, fitting_lanes, keep_lanes, matrix_of, perturb, &
@@ -16,8 +16,8 @@ module tape_march
   use tape_plan, only: converge, fitting, LEAST_LOCAL_TOLERANCE, local_tolerance_of, &
                        MOST_TRIES, order_for
   use tape_runge_kutta, only: guess_sizes, has_singular_points, is_near_singular, long_step_t, &
-                              LONGER_THAN_SERIES, longest_without_terms, step_over, &
-                              stop_unknowns
+                              LONGER_THAN_SERIES, longest_without_terms, put_terms, &
+                              step_over, stop_unknowns
   use tape_rows, only: add_nodes, add_row, add_rows, evaluate
   use tape_series, only: derivatives_at, expand, noise_of, PADDED, series_t, slot_gradient, &
                          sum_terms
@@ -445,12 +445,10 @@ contains
       call step_over(tape, x%t, x%y + x%y_low, x%weights, switches, s, live, long_step)
       is_long = long_step%h /= 0.0_dp
       if (.not. is_long) return
-      s%h = long_step%h
+      call put_terms(long_step, x%n, s)
       factor = 1.0_dp
       verdict = STAYS
       change(:x%n) = long_step%change(:x%n)
-      s%a(1:, FIRST_UNKNOWN:FIRST_UNKNOWN - 1 + x%n) = 0.0_dp
-      s%a(1:4, FIRST_UNKNOWN:FIRST_UNKNOWN - 1 + x%n) = long_step%terms(:, :x%n)
       call set_lanes(x, e, s)
       call keep_lanes(e)
       ! The length was rounded.

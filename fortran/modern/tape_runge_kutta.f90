@@ -4,7 +4,7 @@ module tape_runge_kutta
   !! short step that its error, found by halving, is small enough.
   use kinds, only: dp
   use operations, only: LOGARITHM => LOG, QUOTIENT, SQUARE_ROOT => SQRT
-  use tape, only: tape_t
+  use tape, only: FIRST_UNKNOWN, tape_t
   use tape_crossings, only: before_crossings
   use tape_growth, only: MOST_UNKNOWNS
   use tape_live, only: keep_live, settle
@@ -62,8 +62,8 @@ module tape_runge_kutta
   procedure(rates_at), pointer, public :: rates_by => rates_at
   procedure(integrate), pointer, public :: integrate_by => integrate
 
-  public :: guess_sizes, has_singular_points, is_near_singular, longest_without_terms, step_over, &
-            stop_unknowns
+  public :: guess_sizes, has_singular_points, is_near_singular, longest_without_terms, put_terms, &
+            step_over, stop_unknowns
 
 contains
 
@@ -306,6 +306,17 @@ contains
     if (tries > MOST_TRIES) sizes = 0.0_dp
     call restore_slots(tape, terms, on_level, is_new, switches, s, live)
   end subroutine guess_sizes
+
+  pure subroutine put_terms(step, n, s)
+    !! Let the terms of the n unknowns be those of the step, and the step its length.
+    type(long_step_t), intent(in) :: step
+    integer, intent(in) :: n
+    type(series_t), intent(inout) :: s
+
+    s%h = step%h
+    s%a(1:, FIRST_UNKNOWN:FIRST_UNKNOWN - 1 + n) = 0.0_dp
+    s%a(1:4, FIRST_UNKNOWN:FIRST_UNKNOWN - 1 + n) = step%terms(:, :n)
+  end subroutine put_terms
 
   subroutine stop_unknowns(tape, t, switches, s, live, y, is_stopped)
     !! Set unknowns to 0 that reach it in a finite time, before which steps shrink to nothing, and

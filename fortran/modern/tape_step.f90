@@ -10,7 +10,7 @@ module tape_step
   use tape_plan, only: converge, fitting, LONGER, MOST_TRIES, order_for
   use tape_roots, only: size_of
   use tape_runge_kutta, only: has_singular_points, is_near_singular, long_step_t, &
-                              LONGER_THAN_SERIES, longest_without_terms, step_over
+                              LONGER_THAN_SERIES, longest_without_terms, put_terms, step_over
   use tape_series, only: allocate_series, derivatives_at, expand, noise_of, series_t
   use tape_switches, only: change, find_switches, operand_error, switches_t, update
   implicit none(type, external)
@@ -194,10 +194,7 @@ contains
       if (.not. abs(long_step%h) > 0.0_dp) return
       step%status = SLIDING
       if (long_step%slides > 0) return
-      s%h = long_step%h
-      s%a(1:, FIRST_UNKNOWN:FIRST_UNKNOWN + tape%n_unknowns - 1) = 0.0_dp
-      s%a(1:4, FIRST_UNKNOWN:FIRST_UNKNOWN + tape%n_unknowns - 1) &
-        = long_step%terms(:, :tape%n_unknowns)
+      call put_terms(long_step, tape%n_unknowns, s)
       step%is_switched = .false.
       call end_after(s%h)
       call set_terms()

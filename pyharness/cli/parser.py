@@ -120,12 +120,15 @@ class Parser(argparse.ArgumentParser):
         """Return an InputError for a word that belongs to no option."""
         names = self.option_names()
         last, value = "", ""
-        for each in arguments[: list(arguments).index(word)]:
+        # The same word may be the value of an option before.
+        places = [k for k, each in enumerate(arguments) if each == word]
+        at = next((k for k in places if not self._metavar(arguments[k - 1])), places[-1])
+        for each in arguments[:at]:
             if each.startswith("--"):
                 last, _, value = each.partition("=")
             else:
                 value = each
-        if _NUMBERS.fullmatch(word) and _NUMBERS.fullmatch(value) and self._takes_list(last):
+        if _NUMBERS.fullmatch(word) and _NUMBERS.fullmatch(value) and "," in self._metavar(last):
             return InputError(
                 f"{verb} {last}: '{word}' is a second value; join numbers by commas, without "
                 f"spaces, as in {last} {value},{word}"
@@ -142,9 +145,10 @@ class Parser(argparse.ArgumentParser):
             f"{verb}: '{word}' belongs to no option; pyharness {verb} --help names them"
         )
 
-    def _takes_list(self, option: str) -> bool:
+    def _metavar(self, option: str) -> str:
+        """Return what stands for the value of an option in its help; "" if it takes none."""
         action = self._option_string_actions.get(option)
-        return action is not None and "," in str(action.metavar)
+        return str(getattr(action, "metavar", None) or "")
 
     def _joined(self, arguments: Sequence[str]) -> list[str]:
         """Return the arguments, with negative numbers joined to their options, as in --x=-1."""

@@ -17,7 +17,7 @@ from pyharness.engine.event_fits import ROUNDING, STATE_ROUNDING, Solution, fitt
 from pyharness.engine.event_functions import EventFunction
 from pyharness.engine.event_roots import FIT_ERROR, Index, Roots, isolated, joined, may_vanish
 from pyharness.engine.event_zeros import zero_intervals
-from pyharness.engine.periodic_events import improved, repeated
+from pyharness.engine.periodic_events import improved, repeat
 from pyharness.model.array_type import Array
 
 _BLOCK = 4_000  # polynomials whose roots are isolated together
@@ -85,7 +85,7 @@ def _polished(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
     # Integration may continue from the state at a root, which must be beyond the sign change.
     is_short = value * _after(time, roots.change) < 0.0
     values, ends = partial(solution.values, g), solution.pieces.edges[[0, -1]]
-    time = _bisected(solution, values, ends, time, roots.change, is_short)
+    time = _bisect(solution, values, ends, time, roots.change, is_short)
     if solution.sol.states is not solution.pieces:
         time = _beyond(g, solution, time, roots.change, roots.noise)
     return replace(roots, time=time)
@@ -107,10 +107,10 @@ def _beyond(
     value = values(times)
     # The start of an integration hides smaller values.
     is_short = (value * _after(times, changes) < 0.0) & (np.abs(value) > noise)
-    return _bisected(solution, values, ends, times, np.where(is_short, changes, 0), is_short)
+    return _bisect(solution, values, ends, times, np.where(is_short, changes, 0), is_short)
 
 
-def _bisected(
+def _bisect(
     solution: Solution,
     values: Callable[[Array], Array],
     ends: Array,
@@ -258,7 +258,7 @@ def _repeated(
         last, end = solution.pieces.edges[0], solution.sol.t_min
     if last == end or period == 0.0:
         return roots.time
-    found, which, kept = repeated(side * roots.time, period, abs(end), g.name)
+    found, which, kept = repeat(side * roots.time, period, abs(end), g.name)
     found *= side
     found[kept:] = improved(g, found[kept:], solution.exact_values, period)
     found = np.clip(found, solution.sol.t_min, solution.sol.t_max)

@@ -37,7 +37,7 @@ def _is_of_omega(g: EventFunction) -> bool:
     return tape.inputs.isdisjoint({TIME, *ATTITUDE})
 
 
-def repeated(
+def repeat(
     times: Array, period: float, end: float, where: str
 ) -> tuple[Array, NDArray[np.intp], int]:
     """Return event times (s) until `end`, their originals, and how many precede the repetition.

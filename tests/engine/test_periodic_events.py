@@ -12,7 +12,7 @@ from pyharness import InputError, Scene, TorqueLaw, events, solve
 from pyharness.engine import continuous, periodic_events
 from pyharness.engine.closed_form import period_of
 from pyharness.engine.event_functions import event_functions
-from pyharness.engine.periodic_events import are_of_omega, repeated
+from pyharness.engine.periodic_events import are_of_omega, repeat
 
 WING_NUT = Scene("wing nut", omega=(0.01, 5.0, 0.0), moments=(1.0, 2.0, 3.0))
 FUNCTIONS: dict[str, Callable[[Any, Any], Any]] = {
@@ -141,25 +141,25 @@ def test_the_period_that_is_repeated_begins_between_events() -> None:
         some = np.concatenate([all_of_them, all_of_them + 1e-9])
         some.sort()
         three = some[(some >= 0.0) & (some <= 3.0)]
-        found, which, kept = repeated(three, 1.0, 37.5, "")
+        found, which, kept = repeat(three, 1.0, 37.5, "")
         np.testing.assert_allclose(found, some[(some >= 0.0) & (some <= 37.5)], rtol=0, atol=1e-12)
         periods = found - three[which]
         np.testing.assert_allclose(periods, np.round(periods), rtol=0, atol=1e-12)
         assert 0 < kept < len(found)
     # An event at the end of the polynomials may be lost there.
     some = np.sort(np.concatenate([np.arange(0.0, 37.5), np.arange(0.9, 37.5)]))
-    found, _, kept = repeated(some[some < 3.0], 1.0, 37.5, "")
+    found, _, kept = repeat(some[some < 3.0], 1.0, 37.5, "")
     np.testing.assert_allclose(found, some, rtol=0, atol=1e-12)
-    found, which, kept = repeated(np.array([0.1]), 1.0, 37.5, "")
+    found, which, kept = repeat(np.array([0.1]), 1.0, 37.5, "")
     assert (found.tolist(), which.tolist(), kept) == ([0.1], [0], 1)
 
 
 def test_an_event_on_both_sides_of_the_ends_of_periods_is_found() -> None:
     """The first event is just before the end of a period, and the second just after its end."""
     once = np.array([1.0 - 1e-12, 2.0 + 1e-12])
-    found, _, _ = repeated(once, 1.0, 37.5, "")
+    found, _, _ = repeat(once, 1.0, 37.5, "")
     np.testing.assert_allclose(found, np.arange(1.0, 38.0), rtol=0, atol=1e-9)
-    found, _, _ = repeated(np.sort([*once, 0.5, 1.5, 2.5]), 1.0, 37.5, "")
+    found, _, _ = repeat(np.sort([*once, 0.5, 1.5, 2.5]), 1.0, 37.5, "")
     np.testing.assert_allclose(found, np.arange(1, 76) / 2.0, rtol=0, atol=1e-9)
     tilt = 0.47137931034482766
     omega = 2.0 * np.array([np.cos(tilt), 0.0, np.sin(tilt)])

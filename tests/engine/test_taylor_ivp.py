@@ -187,8 +187,10 @@ def test_switches_whose_intervals_shrink_to_nothing_fail(friction: float) -> Non
 
     _, message = failed_at(Taylor(twisting, 0.0, [1.0, 0.5], 200.0))
     assert message is not None
-    # Rounding errors decide which comes first.
-    ends = ("would change back and forth without end", "step size is less than spacing")
+    ends = ["would change back and forth without end"]
+    if friction < 0.2:
+        # The intervals shrink so slowly that rounding errors decide which comes first.
+        ends.append("step size is less than spacing")
     assert any(end in message for end in ends)
 
 

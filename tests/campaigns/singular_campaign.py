@@ -22,6 +22,7 @@ from tests.campaigns import driver
 
 MODULE = "tests.campaigns.singular_campaign"
 SPHERE, BRICK = (1.0, 1.0, 1.0), (1.0, 2.0, 3.0)
+_MOST = 20_000  # evaluations near a zero of a rate
 _SETTLED = 1e-2  # largest change of the truth by its own tolerance, over the tolerance
 
 
@@ -149,8 +150,13 @@ def smooth_motion(
         i, side = next(zone for zone, each in zip(zones, found.t_events, strict=True) if len(each))
         v = near ** (1.0 / m)
         for sign, span in ((side, (v, 0.0)), (-side, (0.0, v * (1.0 + 1e-9)))):
+            left = iter(range(_MOST))
 
-            def slopes(v: float, y: Array, sign: float = sign, i: int = i) -> Array:
+            def slopes(
+                v: float, y: Array, sign: float = sign, i: int = i, left: Any = left
+            ) -> Array:
+                if next(left, None) is None:
+                    raise ValueError("the rate turns near 0, where the slopes are infinite")
                 w = y[1:].copy()
                 w[i] = sign * v**m
                 f = rates(w)

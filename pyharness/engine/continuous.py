@@ -13,7 +13,6 @@ from pyharness.engine.event_functions import EventFunction
 from pyharness.engine.events import FoundEvents, found_events, no_events
 from pyharness.engine.periodic_events import PERIODS, are_of_omega
 from pyharness.engine.registry import METHODS
-from pyharness.engine.sides import row_names
 from pyharness.model.dense_output import DenseOutput, Pieces
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
@@ -55,7 +54,7 @@ def with_events(
     is_terminal = math.isfinite(events.first) or math.isfinite(events.last)
     if is_terminal:
         kept = (found.time >= events.first) & (found.time <= events.last)
-        cut |= {name: getattr(found, name)[kept] for name in row_names(found)}
+        cut |= {name: each[kept] for name, each in found.with_rows().items()}
     # An overflow that no terminal event precedes remains the ending.
     overflowed = found.ended == "overflow" and (
         (events.first == -math.inf and ends[0] < min(found.time, default=0.0))

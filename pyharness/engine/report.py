@@ -8,6 +8,7 @@ import numpy as np
 
 from pyharness.model.assumptions import assumption_records
 from pyharness.model.attitude import IDENTITY
+from pyharness.model.fields import ROWS
 from pyharness.model.listing import Listing
 from pyharness.model.report import Column, Picture, Report, Table, digits, words
 from pyharness.model.scene import Scene
@@ -21,14 +22,7 @@ if TYPE_CHECKING:
     from pyharness.truth.bounded import ErrorBound
 
 _NUMBER = digits(".6g")
-_TIMES = (
-    Column("time", _NUMBER, unit="s"),
-    Column("TIME", _NUMBER, unit="s", name="recorded_time"),
-)
-_OMEGA = tuple(Column(f"U{i}", _NUMBER, unit="rad/s", name=f"omega{i}") for i in (1, 2, 3))
-_VELOCITY = tuple(Column(f"V{i}", _NUMBER, unit="m/s", name=f"velocity{i}") for i in (1, 2, 3))
 _ATTITUDE = {
-    "quaternion": tuple(Column(f"q{i}", _NUMBER, name=f"q{i}") for i in range(4)),
     "3-1-3": tuple(Column(name, _NUMBER, unit="deg") for name in ("phi", "theta", "psi")),
     "3-2-1": tuple(Column(name, _NUMBER, unit="deg") for name in ("yaw", "pitch", "roll")),
     "matrix": tuple(
@@ -52,22 +46,26 @@ def trajectory_report(
     word: str | None = None,  # a thesis program's arithmetic; None is binary64
     bound: "ErrorBound | None" = None,
 ) -> Report:
-    times = np.column_stack([trajectory.time, trajectory.recorded_time])
-    blocks: list[tuple[tuple[Column, ...], Array]] = [(_TIMES, times), (_OMEGA, trajectory.omega)]
-    if trajectory.velocity is not None:
-        blocks.append((_VELOCITY, trajectory.velocity))
-    if trajectory.attitude is not None:
-        blocks.append((_ATTITUDE[form], _shown(trajectory.attitude, form)))
+    printed = {name: each for name, each in ROWS.items() if each.heads}
+    blocks: list[tuple[tuple[Column, ...], Array]] = []
+    for name, each in printed.items():
+        values, names = getattr(trajectory, name), zip(each.heads, each.columns, strict=True)
+        if name == "attitude" and values is not None and form in _ATTITUDE:
+            blocks.append((_ATTITUDE[form], _shown(values, form)))
+        elif values is not None:
+            unit = each.unit if each.unit != "1" else ""
+            columns = tuple(Column(head, _NUMBER, unit=unit, name=name) for head, name in names)
+            blocks.append((columns, values))
     states = trajectory.states
     blocks += [((Column(name, _NUMBER, name=name),), states[name]) for name in states]
-    columns = [column for each, _ in blocks for column in each]
+    shown = [column for each, _ in blocks for column in each]
     rows = np.column_stack([values for _, values in blocks])
-    numbers = Table(columns, rows)
+    numbers = Table(shown, rows)
     steps = np.arange(1, len(rows) + 1)
     # A terminal has the width for a matrix's nine elements and the time alone.
-    kept = [0, *range(5, len(columns))] if form == "matrix" else list(range(len(columns)))
+    kept = [0, *range(5, len(shown))] if form == "matrix" else list(range(len(shown)))
     counted = Table(
-        [Column("step", digits(".0f")), *(columns[k] for k in kept)],
+        [Column("step", digits(".0f")), *(shown[k] for k in kept)],
         np.column_stack([steps, rows[:, kept]]),
     )
 
@@ -82,8 +80,7 @@ def trajectory_report(
         from pyharness.model import records
 
         singular = 0 if trajectory.ier is None else int(np.count_nonzero(trajectory.ier))
-        names = ("time", "recorded_time", "omega", "velocity", "attitude")
-        arrays = {name: getattr(trajectory, name) for name in names}
+        arrays = {name: getattr(trajectory, name) for name in printed}
         return {
             "scene": records.scene_record(scene),
             "method": method,
@@ -121,7 +118,7 @@ def _shown(attitude: Array, form: str) -> Array:
 
     if form in SEQUENCES:
         return angles(attitude, form)
-    return matrices(attitude).reshape(-1, 9) if form == "matrix" else attitude
+    return matrices(attitude).reshape(-1, 9)
 
 
 def _picture(title: str, trajectory: Trajectory, numbers: Table) -> Picture:

@@ -17,6 +17,7 @@ import numpy as np
 from pyharness.engine.steps import transformed_steps
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.errors import TimedError
+from pyharness.model.fields import ROWS
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.tape import N_INPUTS, OMEGA, TIME, Linear, Operation, Table, Tape
@@ -259,13 +260,17 @@ def _scaled(values: Any, exponents: Any) -> Any:
 def unscaled(trajectory: Trajectory, times: Sequence[float], factor: float) -> Trajectory:
     """Return a rescaled trajectory in rad/s and s, up to the first overflow."""
     with np.errstate(over="ignore"):
-        omega = trajectory.omega / factor
-    finite = np.isfinite(omega).all(axis=1)
-    count = len(omega) if finite.all() else int(np.argmin(finite))
+        rows = {
+            name: _in_rad_s(each, factor, ROWS[name].rates if name in ROWS else 0)
+            for name, each in trajectory.with_rows().items()
+        }
+    finite: Any = np.isfinite(rows["omega"]).all(axis=1)
+    count = len(finite) if finite.all() else int(np.argmin(finite))
     time = np.array(times[:count], dtype=float)
-    attitude = trajectory.attitude if trajectory.attitude is None else trajectory.attitude[:count]
     found = replace(
-        trajectory, time=time, recorded_time=time, omega=omega[:count], attitude=attitude,
+        trajectory,
+        **{name: each[:count] for name, each in rows.items()}
+        | {"time": time, "recorded_time": time},
         sol=transformed_steps(
             trajectory.sol, lambda x: np.column_stack([x[:, :3] / factor, x[:, 3:]]), factor
         ),
@@ -273,3 +278,10 @@ def unscaled(trajectory: Trajectory, times: Sequence[float], factor: float) -> T
     if count == len(trajectory.omega):
         return found
     return replace(found, ended="overflow", error=None, growth=None, sol=None)
+
+
+def _in_rad_s(values: Any, factor: float, rates: int) -> Any:
+    # A power of the factor may overflow.
+    for _ in range(rates):
+        values = values / factor
+    return values

@@ -8,24 +8,19 @@ import numpy as np
 from pyharness.engine.steps import joined_steps
 from pyharness.model.trajectory import Trajectory
 
-_ROWS = ("time", "recorded_time", "omega")
 _WORST_FIRST = ("singular", "stalled", "sliding", "overflow", "unchecked", "sensitive", "complete")
 
 
-def row_names(found: Trajectory) -> tuple[str, ...]:
-    more = ("attitude", "own")
-    return *_ROWS, *(name for name in more if getattr(found, name) is not None)
-
-
 def in_reverse(found: Trajectory) -> Trajectory:
-    return replace(found, **{name: getattr(found, name)[::-1] for name in row_names(found)})
+    return replace(found, **{name: each[::-1] for name, each in found.with_rows().items()})
 
 
 def joined(before: Trajectory, after: Trajectory) -> Trajectory:
     both = before, after
     ended = min((x.ended for x in both), key=_WORST_FIRST.index)
     rows: dict[str, Any] = {
-        name: np.concatenate([getattr(x, name) for x in both]) for name in row_names(after)
+        name: np.concatenate([getattr(before, name), each])
+        for name, each in after.with_rows().items()
     }
     return replace(
         after,

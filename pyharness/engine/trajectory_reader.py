@@ -12,6 +12,7 @@ from pyharness.engine.scene_reader import scene_of_file
 from pyharness.model.archive import checked_path, read_archive, text_of
 from pyharness.model.changing import ChangingInertia, ChangingMoments
 from pyharness.model.errors import InputError
+from pyharness.model.fields import FACTS, ROWS
 from pyharness.model.inertia_function import COUNTS, InertiaFunction, checked_function
 from pyharness.model.json_text import unique
 from pyharness.model.own_states import checked_states
@@ -24,9 +25,7 @@ from pyharness.model.trajectory_file import (
     EVENTS,
     KIND,
     MOST_FUNCTIONS,
-    NUMBERS,
     OWN,
-    ROWS,
     SENSITIVITIES,
     tape_of,
 )
@@ -81,9 +80,9 @@ def load(path: str | os.PathLike[str]) -> Trajectory:
 def _trajectory(arrays: dict[str, Any], header: dict[str, Any], where: str) -> Trajectory:
     rows: dict[str, Any] = {name: arrays.get(name) for name in ROWS}
     count = len(arrays["time"])
-    for name, (kind, shape) in ROWS.items():
+    for name, each in ROWS.items():
         if rows[name] is not None:
-            _check_array(rows[name], kind, count, *shape)
+            _check_array(rows[name], each.kind, count, *each.shape)
     if rows["recorded_time"] is None:
         rows["recorded_time"] = rows["time"]
     axes, own, scene = arrays.get(AXES), arrays.get(OWN), None
@@ -111,16 +110,12 @@ def _trajectory(arrays: dict[str, Any], header: dict[str, Any], where: str) -> T
         stop = Stop(**header["stop"])
         _require(stop.variable in STOP_VARIABLES and type(stop.quotient) is float)
         stop = replace(stop, step=_count(stop.step))
-    rows["ended"] = header["ended"]
-    rows["reason"] = header.get("reason")
-    _require(rows["reason"] is None or type(rows["reason"]) is str)
-    for name in NUMBERS:
-        _require(header[name] is None or type(header[name]) is float)
-        rows[name] = header[name]
+    for name, kind in FACTS.items():
+        value = header.get(name)
+        _require(kind is int or isinstance(value, kind))
+        rows[name] = _count(value) if kind is int else value
     return Trajectory(
         **rows,
-        steps=_count(header["steps"]),
-        evaluations=_count(header["evaluations"]),
         own=own,
         axes=axes,
         stop=stop,

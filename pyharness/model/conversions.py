@@ -1,17 +1,17 @@
 """Mechanical quantities of trajectories; trajectories in pandas, xarray, matplotlib and files."""
 
 import os
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import turned_to_space
 from pyharness.model.changing import Changing
 from pyharness.model.distribution import check_package, checked_axes
 from pyharness.model.errors import InputError, known
+from pyharness.model.fields import FACTS, ROWS, Fields, Quantity
 from pyharness.model.torque_law import FRAMES, TorqueLaw
 from pyharness.model.values import Triple
 
@@ -21,63 +21,18 @@ if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
     from xarray import Dataset
 
-    from pyharness.model.dense_output import DenseOutput
     from pyharness.model.scene import Scene
-    from pyharness.model.trajectory import Stop, Trajectory
+    from pyharness.model.trajectory import Trajectory
 
 _SMOOTH = 1000  # points of a line through dense output
-# By attribute: a description, the unit, and the names of the components.
-_QUANTITIES = {
-    "omega": ("angular velocity about the body axes", "rad/s", "omega1 omega2 omega3"),
-    "velocity": (
-        "translational velocity along the body axes",
-        "m/s",
-        "velocity1 velocity2 velocity3",
-    ),
-    "attitude": ("quaternion from body to space", "1", "q0 q1 q2 q3"),
-    "recorded_time": ("time in the output file of the program", "s", "recorded_time"),
-    "ier": ("error code of the linear solver", "1", "ier"),
-}
-
-
-class _Quantity(NamedTuple):
-    name: str
-    long_name: str
-    unit: str
-    columns: tuple[str, ...]  # names of the components; one name if each row has a number
-    values: NDArray[Any]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Conversions:
+class Conversions(Fields):
     """The base class of trajectories.
 
     With a changing inertia, quantities use the inertia at each time.
     """
-
-    time: Array
-    recorded_time: Array
-    omega: Array
-    velocity: Array | None
-    steps: int
-    evaluations: int
-    ended: str = "complete"
-    stop: "Stop | None" = None
-    ier: NDArray[np.int32] | None = None
-    error: float | None = None
-    growth: float | None = None
-    reason: str | None = field(default=None, repr=False)
-    attitude: Array | None = None
-    own: Array | None = None
-    moments: Triple | Changing | None = None
-    axes: Array | None = None
-    exact: NDArray[np.object_] | None = None
-    tolerance: float | None = None
-    scene: "Scene | None" = field(default=None, repr=False)
-    sol: "DenseOutput | None" = field(default=None, repr=False)
-    t_events: list[Array] | None = field(default=None, repr=False)
-    y_events: list[Array] | None = field(default=None, repr=False)
-    sensitivities: dict[str, Array] | None = field(default=None, repr=False)
 
     def rotation(self) -> "Rotation":
         """Return the attitudes as SciPy rotations, which rotate vectors from body to space.
@@ -309,16 +264,14 @@ class Conversions:
         }
         variables: dict[str, Any] = {}
         for each in self._quantities():
-            second = "component" if each.name == "attitude" else "axis"
-            dimensions = ("time", second) if len(each.columns) > 1 else ("time",)
-            if second == "component":
+            dimensions = ("time", each.dimension) if each.dimension else ("time",)
+            if each.dimension == "component":
                 about = {"long_name": "component of the quaternion, scalar first"}
-                coordinates[second] = (second, list(each.columns), about)
-            attributes = {"units": each.unit, "long_name": each.long_name}
+                coordinates[each.dimension] = (each.dimension, list(each.columns), about)
+            attributes = {"units": each.unit, "long_name": each.about}
             variables[each.name] = (dimensions, each.values.copy(), attributes)
-        described = ("ended", "steps", "evaluations", "error", "growth", "tolerance")
         facts = {} if self.scene is None else {"title": self.scene.name}
-        facts |= {name: getattr(self, name) for name in described}
+        facts |= {name: getattr(self, name) for name in FACTS}
         known = {name: value for name, value in facts.items() if value is not None}
         return Dataset(variables, coordinates, known)
 
@@ -419,14 +372,15 @@ class Conversions:
 
         save(cast("Trajectory", self), path)
 
-    def _quantities(self) -> list[_Quantity]:
+    def _quantities(self) -> list[Quantity]:
         is_late = not np.array_equal(self.recorded_time, self.time, equal_nan=True)
+        left_out = {"time"} if is_late else {"time", "recorded_time"}
         found = [
-            _Quantity(name, about, unit, tuple(columns.split()), values)
-            for name, (about, unit, columns) in _QUANTITIES.items()
-            if (values := getattr(self, name)) is not None and (is_late or name != "recorded_time")
+            Quantity(name, each.about, each.unit, each.columns, each.dimension, getattr(self, name))
+            for name, each in sorted(ROWS.items(), key=lambda item: not item[1].turns)
+            if name not in left_out and getattr(self, name) is not None
         ]
         own = cast("Trajectory", self).states.items()
         return found + [
-            _Quantity(name, "state of the scene's own", "", (name,), each) for name, each in own
+            Quantity(name, "state of the scene's own", "", (name,), "", each) for name, each in own
         ]

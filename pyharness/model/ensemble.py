@@ -2,13 +2,14 @@
 
 import os
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from pyharness.model.arrays import buffer_of, check_rows, only_one, rows_of, spread
 from pyharness.model.distribution import check_package, checked_axes
 from pyharness.model.errors import InputError, known
+from pyharness.model.fields import ATTITUDE, ESTIMATES, OMEGA, declared
 from pyharness.model.inertia import SYMMETRIC, symmetric_matrix
 from pyharness.model.torque_law import FRAMES
 from pyharness.model.trajectory import Array, BatchResult, turned_to_space
@@ -66,8 +67,9 @@ class Ensemble(BatchResult):
     array([ True,  True])
     """
 
-    attitude: Array | None = None
-    estimates: Array | None = None
+    omega: Annotated[Array, OMEGA]
+    attitude: Annotated[Array | None, ATTITUDE] = None
+    estimates: Annotated[Array | None, ESTIMATES] = None
     t_events: list[list[Array | None]] | None = field(default=None, repr=False)
     y_events: list[list[Array | None]] | None = field(default=None, repr=False)
     sensitivities: dict[str, Array] | None = field(default=None, repr=False)
@@ -156,7 +158,7 @@ class Ensemble(BatchResult):
         def divided(array: Any) -> Any:
             return None if array is None else array.reshape(-1, len(times), *array.shape[1:])
 
-        names = ("omega", "status", "attitude", "estimates")
+        names = (*ENSEMBLE_ROWS, "status", "own")
         return replace(self, times=times, **{name: divided(getattr(self, name)) for name in names})
 
     def to_pandas(self) -> "DataFrame":
@@ -192,13 +194,11 @@ class Ensemble(BatchResult):
         return frame
 
     def _columns(self) -> list[tuple[str, tuple[str, ...], Array]]:
-        given = (
-            ("rad/s", ("omega1", "omega2", "omega3"), self.omega),
-            ("1", ("q0", "q1", "q2", "q3"), self.attitude),
-            ("1", ("error", "growth"), self.estimates),
-            ("", self.names, self.own),
-        )
-        return [(unit, names, array) for unit, names, array in given if array is not None]
+        found = [
+            (each.unit, each.columns, getattr(self, name)) for name, each in ENSEMBLE_ROWS.items()
+        ]
+        found.append(("", self.names, self.own))
+        return [(unit, names, array) for unit, names, array in found if array is not None]
 
     def to_xarray(self) -> "Dataset":
         """Return the states as an xarray Dataset.
@@ -218,21 +218,21 @@ class Ensemble(BatchResult):
         check_package("xarray", "to_xarray", "pip install xarray")
         from xarray import Dataset
 
-        rows = ("body",) if self.times is None else ("body", "time")
+        first = ("body",) if self.times is None else ("body", "time")
         coordinates: dict[str, Any] = {"axis": [1, 2, 3]}
         if self.times is not None:
             coordinates["time"] = ("time", self.times.copy(), {"units": "s"})
-        variables: dict[str, Any] = {
-            "omega": ((*rows, "axis"), self.omega.copy(), {"units": "rad/s"}),
-            "ended": (rows, self.ended),
-        }
-        if self.attitude is not None:
-            coordinates["component"] = ["q0", "q1", "q2", "q3"]
-            variables["attitude"] = ((*rows, "component"), self.attitude.copy(), {"units": "1"})
-        if self.estimates is not None:
-            variables["error"] = (rows, self.estimates[..., 0].copy())
-            variables["growth"] = (rows, self.estimates[..., 1].copy())
-        variables |= {name: (rows, values.copy()) for name, values in self.states.items()}
+        variables: dict[str, Any] = {"ended": (first, self.ended)}
+        for name, each in ENSEMBLE_ROWS.items():
+            array = getattr(self, name)
+            if array is not None and each.dimension:
+                variables[name] = ((*first, each.dimension), array.copy(), {"units": each.unit})
+                if each.dimension != "axis":
+                    coordinates[each.dimension] = list(each.columns)
+            elif array is not None:
+                parts = zip(each.columns, self._last(array), strict=True)
+                variables |= {column: (first, part.copy()) for column, part in parts}
+        variables |= {name: (first, values.copy()) for name, values in self.states.items()}
         return Dataset(variables, coordinates)
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
@@ -315,6 +315,7 @@ class Ensemble(BatchResult):
         return _NO_ESTIMATES if self.estimates is None else self.estimates[piece].T
 
 
+ENSEMBLE_ROWS = declared(Ensemble)
 _NO_ESTIMATES = np.empty((2, 0), order="F")
 
 

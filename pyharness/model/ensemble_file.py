@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pyharness.model.archive import archive_of, checked_file, checked_path, read_archive
+from pyharness.model.ensemble import ENSEMBLE_ROWS
 from pyharness.model.errors import InputError
 from pyharness.model.extension import ENDS
 from pyharness.model.json_text import unique
@@ -21,9 +22,7 @@ if TYPE_CHECKING:
 _KIND = "pyharness ensemble"
 _FILE = "ensemble file"
 _WRITTEN = "a file that Ensemble.save wrote"
-# The length of a row, by attribute.
-_WIDTHS = {"omega": 3, "attitude": 4, "estimates": 2}
-_ARRAYS = (*_WIDTHS, "own", "status", "times")
+_ARRAYS = (*ENSEMBLE_ROWS, "own", "status", "times")
 # Counts of events, shape (functions, bodies), -1 for a body without a result; times and states of
 # all events, one after the other.
 _EVENTS = ("event_counts", "t_events", "y_events")
@@ -71,7 +70,8 @@ def _attributes(arrays: dict[str, Any], header: dict[str, Any]) -> dict[str, Any
     given["names"] = tuple(unique((str(name), None) for name in header["names"]))
     leaves = header.get("leaves")  # files of earlier versions have none
     given["leaves"] = None if leaves is None else str(leaves)
-    for name, width in {**_WIDTHS, "own": len(given["names"])}.items():
+    widths = {name: len(each.columns) for name, each in ENSEMBLE_ROWS.items()}
+    for name, width in {**widths, "own": len(given["names"])}.items():
         array = given[name]
         if array is not None and (array.dtype, array.shape) != ("f8", (*rows, width)):
             raise ValueError("an array of another type or shape")

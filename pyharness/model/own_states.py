@@ -4,15 +4,16 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from pyharness.model.errors import InputError, kind_of
+from pyharness.model.fields import ESTIMATES, ROWS
 from pyharness.model.values import finite
 
 _LARGE = 1e120  # products of smaller states, and of their errors, are finite
 MOST_STATES = 8  # the kernel has no place for more
 # Names of other columns of results, and of other values in expressions.
 _TAKEN = (
-    *("t", "time", "recorded_time", "omega", "omega1", "omega2", "omega3", "velocity", "velocity1"),
-    *("velocity2", "velocity3", "attitude", "q0", "q1", "q2", "q3", "ier", "axis", "component"),
-    *("body", "ended", "error", "growth"),
+    *("t", "body", "ended", "axis", "component"),
+    *(name for key, each in ROWS.items() for name in {key: None} | dict.fromkeys(each.columns)),
+    *ESTIMATES.columns,
 )
 
 

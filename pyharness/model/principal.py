@@ -1,5 +1,6 @@
 """Transformation of scenes to principal axes, and of results back."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from functools import cached_property
@@ -8,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from pyharness.model.attitude import IDENTITY, Quaternion, product, quaternion_of_axes
+from pyharness.model.fields import ROWS
 from pyharness.model.inertia import Exact, PrincipalFrame, nearest_float, principal_frame
 from pyharness.model.scene import Scene, Triple, checked_scene
 from pyharness.model.state_torque import StateTorque
@@ -104,10 +106,17 @@ def _fields(scene: Scene) -> dict[str, Any]:
 
 def in_scene_axes(found: Trajectory, axes: Array) -> Trajectory:
     """Return a trajectory transformed from principal `axes` (columns) to the body axes."""
-    attitude = found.attitude
-    if attitude is not None:
-        attitude = _attitude_in_scene_axes(attitude, axes)
-    return replace(found, omega=found.omega @ axes.T, attitude=attitude)
+    turn: dict[str, Callable[[Array], Array]] = {
+        "": lambda each: each,
+        "vector": lambda each: each @ axes.T,
+        "quaternion": lambda each: _attitude_in_scene_axes(each, axes),
+    }
+    turned: dict[str, Any] = {
+        name: turn[ROWS[name].turns](each)
+        for name, each in found.with_rows().items()
+        if name in ROWS
+    }
+    return replace(found, **turned)
 
 
 def states_in_scene_axes(states: Array, axes: Array, own: int) -> Array:

@@ -19,6 +19,7 @@ from pyharness.model.archive import archive_of, checked_file
 from pyharness.model.changing import Changing, ChangingInertia, ChangingMoments
 from pyharness.model.elementary import WITH_DERIVATIVE
 from pyharness.model.errors import InputError
+from pyharness.model.fields import FACTS, ROWS
 from pyharness.model.inertia_function import InertiaFunction
 from pyharness.model.output_files import write_files
 from pyharness.model.scene import Scene
@@ -33,16 +34,6 @@ if TYPE_CHECKING:
     from pyharness.model.trajectory import Trajectory
 
 KIND = "pyharness trajectory"  # in the header of each file
-# By array: type of the numbers, and shape of a row.
-ROWS: dict[str, tuple[str, tuple[int, ...]]] = {
-    "time": ("f8", ()),
-    "recorded_time": ("f8", ()),
-    "omega": ("f8", (3,)),
-    "velocity": ("f8", (3,)),
-    "attitude": ("f8", (4,)),
-    "ier": ("i4", ()),
-}
-NUMBERS = ("error", "growth", "tolerance")  # of the header; None for unknown
 OWN = "own"  # an array with a column for each own state, an unknown that `Scene.states` adds
 AXES = "axes"  # an array without rows, shape (3, 3)
 # The number of events of each function; the times and states of all events.
@@ -71,20 +62,18 @@ def file_content(found: "Trajectory") -> bytes:
             "written to a file; allowed: a trajectory in binary64"
         )
     header: dict[str, Any] = {"kind": KIND, "schema": SCHEMAS["trajectory file"]}
-    header |= {name: getattr(found, name) for name in NUMBERS}
-    header |= {"ended": found.ended, "reason": found.reason}
-    header |= {name: int(getattr(found, name)) for name in ("steps", "evaluations")}
+    header |= {name: getattr(found, name) for name in FACTS}
     header["stop"] = None if found.stop is None else asdict(found.stop)
     header["moments"] = _moments_record(found.moments)
     header |= {SENSITIVITIES: None, "scene": None}
     arrays: dict[str, Any] = {}
     if found.scene is not None:
         header["scene"], arrays["scene"] = _scene_record(found.scene)
-    for name, (kind, _) in ROWS.items():
+    for name, each in ROWS.items():
         # In results of a method, `recorded_time` is the array `time`.
         if name != "recorded_time" or found.recorded_time is not found.time:
             value = getattr(found, name)
-            arrays |= {} if value is None else {name: np.asarray(value, kind)}
+            arrays |= {} if value is None else {name: np.asarray(value, each.kind)}
     others = {OWN: found.own, AXES: found.axes}
     arrays |= {name: each for name, each in others.items() if each is not None}
     if found.t_events is not None and found.y_events is not None:
@@ -103,7 +92,7 @@ def file_content(found: "Trajectory") -> bytes:
         header[SENSITIVITIES] = [[name, each.shape[2]] for name, each in columns.items()]
         none = np.zeros((len(found.time), len(found.y), 0))
         arrays[SENSITIVITIES] = np.concatenate([none, *columns.values()], axis=2)
-    arrays["header"] = json.dumps(header)
+    arrays["header"] = json.dumps(header, default=np.generic.item)
     return archive_of(arrays)
 
 

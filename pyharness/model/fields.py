@@ -1,0 +1,121 @@
+"""Fields of trajectories and ensembles, each declared once.
+
+Columns in files, pandas, xarray, HTML, JSON and reports, the change to other axes and units of
+time, and the names that own states can't have come from these declarations.
+"""
+
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, get_args
+
+from numpy.typing import NDArray
+
+from pyharness.model.array_type import Array
+from pyharness.model.changing import Changing
+from pyharness.model.values import Triple
+
+if TYPE_CHECKING:
+    from pyharness.model.dense_output import DenseOutput
+    from pyharness.model.scene import Scene
+    from pyharness.model.trajectory import Stop
+
+
+class Rows(NamedTuple):
+    """What is known of a field with a row for each result."""
+
+    about: str
+    unit: str
+    columns: tuple[str, ...]  # names of the components, or one name
+    heads: tuple[str, ...]  # of these columns in a terminal; none if they are not shown
+    dimension: str = ""  # of the components in xarray; if empty, each is a variable
+    rates: int = 0  # exponent of 1/s in the unit
+    turns: str = ""  # "vector" or "quaternion" about the body axes
+    kind: str = "f8"  # type of the numbers
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return (len(self.columns),) if len(self.columns) > 1 else ()
+
+
+class Quantity(NamedTuple):
+    """A field with its values, to be shown or written."""
+
+    name: str
+    about: str
+    unit: str
+    columns: tuple[str, ...]
+    dimension: str
+    values: NDArray[Any]
+
+
+def _numbered(name: str) -> tuple[str, ...]:
+    return tuple(f"{name}{axis}" for axis in (1, 2, 3))
+
+
+_TIME = Rows("time", "s", ("time",), ("time",), rates=-1)
+_RECORDED_TIME = Rows(
+    "time in the output file of the program", "s", ("recorded_time",), ("TIME",), rates=-1
+)
+OMEGA = Rows(
+    "angular velocity about the body axes", "rad/s", _numbered("omega"), _numbered("U"),
+    "axis", rates=1, turns="vector",
+)  # fmt: skip
+_VELOCITY = Rows(
+    "translational velocity along the body axes", "m/s", _numbered("velocity"), _numbered("V"),
+    "axis", rates=1, turns="vector",
+)  # fmt: skip
+_COMPONENTS = ("q0", "q1", "q2", "q3")
+ATTITUDE = Rows(
+    "quaternion from body to space", "1", _COMPONENTS, _COMPONENTS, "component", turns="quaternion"
+)
+_IER = Rows("error code of the linear solver", "1", ("ier",), (), kind="i4")
+ESTIMATES = Rows("estimated error and error amplification", "1", ("error", "growth"), ())
+_FACT = "a value in the header of files, and in the attributes of xarray"
+
+
+def declared(owner: type) -> dict[str, Rows]:
+    """Return the fields of a dataclass with a row for each result."""
+    found = {each.name: getattr(each.type, "__metadata__", (None,))[0] for each in fields(owner)}
+    return {name: each for name, each in found.items() if isinstance(each, Rows)}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Fields:
+    """The fields of a trajectory, which `Trajectory` explains."""
+
+    time: Annotated[Array, _TIME]
+    recorded_time: Annotated[Array, _RECORDED_TIME]
+    omega: Annotated[Array, OMEGA]
+    velocity: Annotated[Array | None, _VELOCITY]
+    steps: Annotated[int, _FACT]
+    evaluations: Annotated[int, _FACT]
+    ended: Annotated[str, _FACT] = "complete"
+    stop: "Stop | None" = None
+    ier: Annotated[NDArray[Any] | None, _IER] = None
+    error: Annotated[float | None, _FACT] = None
+    growth: Annotated[float | None, _FACT] = None
+    reason: Annotated[str | None, _FACT] = field(default=None, repr=False)
+    attitude: Annotated[Array | None, ATTITUDE] = None
+    own: Array | None = None  # a row for each time, and columns from `Scene.states`
+    moments: Triple | Changing | None = None
+    axes: Array | None = None
+    exact: NDArray[Any] | None = None
+    tolerance: Annotated[float | None, _FACT] = None
+    scene: "Scene | None" = field(default=None, repr=False)
+    sol: "DenseOutput | None" = field(default=None, repr=False)
+    t_events: list[Array] | None = field(default=None, repr=False)
+    y_events: list[Array] | None = field(default=None, repr=False)
+    sensitivities: dict[str, Array] | None = field(default=None, repr=False)
+
+    def with_rows(self) -> dict[str, Any]:
+        """Return the arrays with a row for each time, by name."""
+        found = {name: getattr(self, name) for name in (*ROWS, "own")}
+        return {name: each for name, each in found.items() if each is not None}
+
+
+ROWS = declared(Fields)
+# By name, the types of facts.
+FACTS: dict[str, Any] = {
+    each.name: get_args(each.type)[0]
+    for each in fields(Fields)
+    if getattr(each.type, "__metadata__", ()) == (_FACT,)
+}

@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parent.parent
 SOURCES = tuple(f"{ROOT}/{folder}/" for folder in ("fortran", "pyharness"))
 # Each has a function `texts`, which returns the contents of files by name.
 KINDS = {
-    "tables": ("make_codes", "make_gauss", "make_cases", "make_leaves"),
+    "tables": ("make_codes", "make_gauss", "make_fixed_steps", "make_cases", "make_leaves"),
     "words": ("make_words",),
     "hot": ("unroll",),
 }

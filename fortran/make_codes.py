@@ -8,6 +8,8 @@ import runpy
 from collections.abc import Iterator
 from pathlib import Path
 
+from pyharness.model.fixed_steps import FIXED_STEPS
+
 SOURCE = Path(__file__).resolve().parents[1] / "pyharness/model/codes.py"
 
 
@@ -18,6 +20,8 @@ def texts(source: Path = SOURCE) -> dict[str, str]:
         for name, codes in runpy.run_path(str(source)).items()
         if isinstance(codes, type)
     }
+    for number, each in enumerate(FIXED_STEPS, classes["Methods"]["FIXED"] + 1):
+        classes["Methods"][each.name.upper().replace("-", "_")] = number
     found = {
         f"{name.lower()}.f90": "\n".join([*_module(name.lower(), numbers), ""])
         for name, numbers in classes.items()

@@ -4,7 +4,7 @@ module many_kinds
   use bodies, only: acts, bodies_t, coefficients_of, FREE, has_torque, i1, MOST_WAVES, &
                     NEEDS_FALLBACK, of_body, RAMPED, STEPPED, WAVED, with_attitude
   use kinds, only: dp
-  use methods, only: CLOSED_FORM, CLOSED_FORM_OR_TAYLOR, IMPROVED_EULER, RK4, SPHERE, TAYLOR
+  use methods, only: CLOSED_FORM, CLOSED_FORM_OR_TAYLOR, FIXED, SPHERE, TAYLOR
   implicit none(type, external)
   private
 
@@ -23,8 +23,7 @@ contains
     n_waves = 0
     if (code == CLOSED_FORM) then
       status = FREE
-    else if (.not. (code == TAYLOR .or. code == CLOSED_FORM_OR_TAYLOR &
-                    .or. (code >= IMPROVED_EULER .and. code <= RK4))) then
+    else if (.not. (code == TAYLOR .or. code == CLOSED_FORM_OR_TAYLOR .or. code > FIXED)) then
       status = NEEDS_FALLBACK
     else if (shares_mark(bodies, code)) then
       status = mark_of(bodies, 1, code, n_waves)
@@ -88,7 +87,7 @@ contains
       if (single_code(bodies, i, code) == SPHERE) return
     end if
     own_waves = waves_on(bodies, i)
-    if (code >= IMPROVED_EULER .and. code <= RK4) then
+    if (code > FIXED) then
       mark_of = STEPPED
       if (has_torque(bodies%rate(:, of_body(size(bodies%rate, 2), i)))) mark_of = NEEDS_FALLBACK
       if (own_waves > 0 .or. with_attitude(bodies)) mark_of = NEEDS_FALLBACK

@@ -6,8 +6,8 @@ module prepared
   use gauss_collocation, only: gauss_rows
   use kinds, only: dp
   use levels, only: quick_solve, tape_solve, taylor_solve
-  use methods, only: CLOSED_FORM, CLOSED_FORM_OR_TAYLOR, GAUSS, IMPROVED_EULER, QUICK, &
-                     QUICK_OR_TAYLOR, RK4, SPHERE, TAPE, TAYLOR
+  use methods, only: CLOSED_FORM, CLOSED_FORM_OR_TAYLOR, FIXED, GAUSS, QUICK, QUICK_OR_TAYLOR, &
+                     SPHERE, TAPE, TAYLOR
   use places, only: COEFFICIENTS, COEFFICIENTS_LOW, CONSTANT, EFFORT, METHOD, MOMENTS, &
                     MOMENTS_LOW, N_COSINES, N_SINES, RATE, STEP, TOLERANCE, WAVES
   use prepared_scale, only: bring_near_one, is_result, LARGE, scale_back
@@ -141,7 +141,7 @@ contains
           call sphere_rows(problem, request, solution)
         case (CLOSED_FORM_OR_TAYLOR, TAYLOR, QUICK, QUICK_OR_TAYLOR)
           call solve_by_series(problem, request, code, solution, found)
-        case (IMPROVED_EULER:RK4)
+        case (FIXED + 1:)
           call fixed_step_rows(problem, request, code, packed(STEP), solution)
         case (GAUSS + 1:GAUSS + 8)
           call gauss_rows(problem, request, code - GAUSS, packed(STEP), solution, reached)

@@ -2,7 +2,7 @@ module prepared_scale
   !! The scale of omega in the data of a prepared solver. Products of very large or small omegas are
   !! out of range although the solution is not; such a problem is solved in other units.
   use kinds, only: dp
-  use methods, only: GAUSS, IMPROVED_EULER, RK4
+  use methods, only: GAUSS
   use places, only: CONSTANT, METHOD, N_COSINES, N_SINES, RATE, STEP, WAVES
   use statuses, only: COMPLETE, OVERFLOW, SENSITIVE
   implicit none(type, external)
@@ -48,9 +48,7 @@ contains
     copy = packed
     ! A step that the method does not use may be out of range in the new units.
     code = int(packed(METHOD))
-    if (code > GAUSS .or. (code >= IMPROVED_EULER .and. code <= RK4)) then
-      copy(STEP) = scale(packed(STEP), power)
-    end if
+    if (code > GAUSS) copy(STEP) = scale(packed(STEP), power)
     do i = 0, 2
       copy(CONSTANT + i) = scale(scale(packed(CONSTANT + i), -power), -power)
       copy(RATE + i) = scale(scale(scale(packed(RATE + i), -power), -power), -power)

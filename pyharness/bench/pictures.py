@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from pyharness.bench.measure import Finding, Workload
+from pyharness.engine.registry import FIXED_STEP
 from pyharness.model.report import Picture, Table, numbers
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ _FAMILIES: dict[str, dict[str, Any]] = {
 }
 _MARKERS = "osD^v<>pP*Xhd8"
 _PROGRAMS = ("two-term", "four-term", "runge-kutta")
-_OURS = ("auto", "taylor", "closed-form", "rk4", "improved-euler", "taylor-3")
+_OURS = ("auto", "taylor", "closed-form", *FIXED_STEP)
 _SLOPES = (2, 4, 8)
 
 

@@ -36,10 +36,9 @@ __all__ = ["external_checks", "problems"]
 
 # These methods' finest tolerances would take too long.
 _TOLERANCES = {"radau": 1e-8, "rk45": 1e-11, "quick": 1e-9}
-_SOLVED = (
-    "reference", "auto", "taylor", "closed-form", *(f"gauss-{stages}" for stages in range(1, 9)),
-    "quick", "dop853", "lsoda", "radau", "rk45",
-)  # fmt: skip
+_SOLVED = tuple(
+    name for name, each in REGISTRY.items() if not (each.is_fixed_step or each.weak_torque)
+)
 _FEWEST_STEPS, _MOST_STEPS = 4, 2**16
 _HALF_ULP = 2.0**-53
 # Two roundings: when a number is read, and when a method uses it.

@@ -37,7 +37,7 @@ from pyharness.checks.theory.conditioning import ROUNDING, Conditioning, conditi
 from pyharness.checks.theory.schemes import SCHEMES, Series, constant
 from pyharness.checks.tolerances import affordable
 from pyharness.engine.problem import closed_form
-from pyharness.engine.registry import FIXED_STEP, GAUSS, REGISTRY, SCIPY_METHODS
+from pyharness.engine.registry import FIXED_STEP, GAUSS, PREPARED, REGISTRY, SCIPY_METHODS
 from pyharness.model.basis import Basis
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
@@ -56,7 +56,7 @@ STEPS = Basis(
 
 # Methods that run at two tolerances: a medium one, and one near the finest, where rounding shows.
 OURS = ("closed-form", "taylor", "gauss-2", "gauss-4", "gauss-8")
-ALL = ("closed-form", "auto", "taylor", "quick", *GAUSS, *SCIPY_METHODS, *FIXED_STEP)
+ALL = (*PREPARED, *SCIPY_METHODS)
 _SERIES = ("taylor", "auto", "prepared-auto")
 _TOO_MANY_RADIANS = 1e8  # phase of a torque wave beyond which a Taylor series may refuse
 _ROWS = 10  # rows of a program's run compared with the true solution

@@ -9,7 +9,6 @@ import numpy as np
 from pyharness.engine.problem import normalized, trajectory_of
 from pyharness.engine.rescaled import omega_by_torque
 from pyharness.engine.sensitivity import is_sensitive, motion_growth, torque_noise
-from pyharness.model.codes import Methods
 from pyharness.model.effort import advice, waves
 from pyharness.model.errors import TimedError
 from pyharness.model.extension import COMPLETE, GAVE_UP, REFUSED, SENSITIVE, extension
@@ -138,19 +137,20 @@ def _step_counts(lengths: Array, step: float) -> Array:
 
 
 def fixed_step(
-    name: str, scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
-) -> Trajectory:
-    """Return the trajectory by ``improved-euler``, ``taylor-3`` or ``rk4``, without error control.
+    name: str, code: int, scene: Scene, times: Sequence[float], tolerance: float,
+    effort: float = 1.0,
+) -> Trajectory:  # fmt: skip
+    """Return the trajectory by a method with a fixed step, without error control.
 
     A step that would pass a requested time ends there.
     """
-    number, work = getattr(Methods, name.upper().replace("-", "_")), np.array([effort, 0.0])
+    work = np.array([effort, 0.0])
     rows, n_rows, status, steps, evaluations = extension().fixed_step_solution(
-        scene.euler_coefficients, *normalized(scene)[1:], scene.omega, times, number,
+        scene.euler_coefficients, *normalized(scene)[1:], scene.omega, times, code,
         scene.step_size, effort=work,
     )  # fmt: skip
     if status == REFUSED:
-        raise NotImplementedError(f"{name} has no kernel in fortran/modern/fixed_step.f90")
+        raise NotImplementedError(f"{name} has no kernel in fortran/modern/fixed_step.fypp")
     if status == GAVE_UP:
         raise TimedError(
             f"{name}: {abs(times[-1]) / scene.step_size:.3g} steps of {{time}} s would "

@@ -30,9 +30,9 @@ from pyharness.engine.many_scenes import (
 )
 from pyharness.engine.parameters import check_values
 from pyharness.engine.plan import FINEST
-from pyharness.engine.registry import REGISTRY, requested_tolerance
+from pyharness.engine.registry import PREPARED, REGISTRY, requested_tolerance
 from pyharness.engine.solve import ascending_times
-from pyharness.engine.solver import CODES, PREPARED
+from pyharness.engine.solver import CODES
 from pyharness.model.arrays import check_rows, count_bodies, only_one, rows_of, spread, threads_of
 from pyharness.model.attitude import rotated, scalar_first, turned_back
 from pyharness.model.codes import Methods

@@ -10,8 +10,10 @@ import numpy as np
 from pyharness.engine.problem import rows_trajectory
 from pyharness.engine.recorded import is_recorded
 from pyharness.engine.scipy_ivp import FINEST, scipy_method
+from pyharness.model.codes import Methods
 from pyharness.model.effort import Integrator
 from pyharness.model.errors import InputError
+from pyharness.model.fixed_steps import FIXED_STEPS, FixedStep
 from pyharness.model.principal import PrincipalScene
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque, is_opaque
@@ -54,6 +56,9 @@ class Method:
     weak_torque: bool = False
     scipy: str = ""  # SciPy's name; empty for our own methods
     is_fixed_step: bool = False  # uses the scene's step size, and takes no tolerance
+    code: int | None = None  # of its prepared solver
+    # Has a prepared solver for torques that depend on the state, and integrates own states.
+    own_states: bool = False
 
 
 def _reference(
@@ -112,19 +117,22 @@ def _gauss(stages: int) -> Method:
         _from("gauss", "gauss", stages),
         _DEFAULT if stages > 1 else _ONE_STAGE_DEFAULT,
         order=2 * stages,
+        code=Methods.GAUSS + stages,
     )
 
 
-def _fixed_step(name: str, title: str, source: str, order: int, evaluations: int) -> Method:
-    title, source = f"{title} in the scene's steps", f"fortran/modern/fixed_step.f90; {source}"
-    solve = _from("gauss", "fixed_step", name)
+def _fixed_step(code: int, chosen: FixedStep) -> Method:
     return Method(
-        name, title, source, 1.0, solve, 1.0, order=order, evaluations=evaluations,
-        is_fixed_step=True,
+        chosen.name, f"{chosen.title} in the scene's steps",
+        f"fortran/modern/fixed_step.fypp; {chosen.source}", 1.0,
+        _from("gauss", "fixed_step", chosen.name, code), 1.0, order=chosen.order,
+        evaluations=chosen.evaluations, is_fixed_step=True, code=code,
     )  # fmt: skip
 
 
-_SERIES: Any = dict.fromkeys(("gives_steps", "attitude", "space_torque", "state_torque"), True)
+_SERIES: Any = dict.fromkeys(
+    ("gives_steps", "attitude", "space_torque", "state_torque", "own_states"), True
+)
 REGISTRY = {
     method.name: method
     for method in (
@@ -146,6 +154,7 @@ REGISTRY = {
             "ours; Jorba and Zou 2005, Experimental Mathematics 14",
             1e-15,
             _from("taylor", "taylor"),
+            code=Methods.TAYLOR,
             **_SERIES,
         ),
         Method(
@@ -166,6 +175,7 @@ REGISTRY = {
             _from("closed_form", "known_solution"),
             any_scale=True,
             attitude=True,
+            code=Methods.CLOSED_FORM,
         ),
         Method(
             "averaged",
@@ -176,9 +186,7 @@ REGISTRY = {
             weak_torque=True,
         ),
         *map(_gauss, range(1, 9)),
-        _fixed_step("improved-euler", "improved Euler", "Jacobs 1982, eq. 29", 2, 2),
-        _fixed_step("taylor-3", "three terms of the Taylor series", "Jacobs 1982, eq. 30", 2, 2),
-        _fixed_step("rk4", "classical Runge-Kutta", "Jacobs 1982, eq. 31", 4, 4),
+        *(_fixed_step(code, each) for code, each in enumerate(FIXED_STEPS, Methods.FIXED + 1)),
         Method(
             "quick",
             "Runge-Kutta in scaled unknowns, for few digits at the end",
@@ -187,14 +195,15 @@ REGISTRY = {
             1e-12,
             _no_rows,
             gives_rows=False,
+            code=Methods.QUICK,
         ),
     )
 }
 METHODS = {name: method for name, method in REGISTRY.items() if method.gives_rows}
 FIXED_STEP = tuple(name for name, method in REGISTRY.items() if method.is_fixed_step)
 GAUSS = tuple(name for name in REGISTRY if name.startswith("gauss-"))
-# Methods with a prepared solver for torques that depend on the state; they integrate own states.
-PREPARED_FOR_STATE = ("auto", "taylor")
+PREPARED_FOR_STATE = tuple(name for name, method in REGISTRY.items() if method.own_states)
+PREPARED = tuple(name for name, each in REGISTRY.items() if each.code is not None or name == "auto")
 SCIPY_METHODS = {name: method.scipy for name, method in REGISTRY.items() if method.scipy}
 WITH_ATTITUDE = tuple(name for name, method in REGISTRY.items() if method.attitude)
 PREPARED_WITH_ATTITUDE = tuple(

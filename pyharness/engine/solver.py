@@ -12,9 +12,10 @@ from pyharness.engine.many_prepared import many_starts, many_states
 from pyharness.engine.plan import RK4_OR_TAYLOR, Plan, plan
 from pyharness.engine.recorded import is_recorded, packed_scene
 from pyharness.engine.registry import (
-    FIXED_STEP,
     GAUSS,
+    PREPARED,
     PREPARED_WITH_ATTITUDE,
+    REGISTRY,
     check_attitude,
     check_prepared,
     check_torque,
@@ -46,15 +47,10 @@ else:
 
 
 CODES = {
-    "closed-form": Methods.CLOSED_FORM,
+    **{name: each.code for name, each in REGISTRY.items() if each.code is not None},
     "sphere": Methods.SPHERE,
     RK4_OR_TAYLOR: Methods.QUICK_OR_TAYLOR,
-    "taylor": Methods.TAYLOR,
-    **{name: getattr(Methods, name.upper().replace("-", "_")) for name in FIXED_STEP},
-    "quick": Methods.QUICK,
-    **{f"gauss-{stages}": Methods.GAUSS + stages for stages in range(1, 9)},
 }
-PREPARED = ("auto", *(name for name in CODES if name not in ("sphere", RK4_OR_TAYLOR)))
 
 _FEW_WAVES = 16  # fewer waves take less time than releasing the GIL
 

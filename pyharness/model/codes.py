@@ -27,13 +27,11 @@ class Methods:
     CLOSED_FORM = 1  # for scenes without torque
     SPHERE = 2  # for bodies with three equal moments
     TAYLOR = 3
-    IMPROVED_EULER = 4
-    TAYLOR_3 = 5
-    RK4 = 6
-    QUICK = 7  # Runge-Kutta, for results of few digits
-    QUICK_OR_TAYLOR = 8  # QUICK or TAYLOR, whichever needs fewer operations
-    CLOSED_FORM_OR_TAYLOR = 9  # the Taylor series if the status of the closed form is REFUSED
+    QUICK = 4  # Runge-Kutta, for results of few digits
+    QUICK_OR_TAYLOR = 5  # QUICK or TAYLOR, whichever needs fewer operations
+    CLOSED_FORM_OR_TAYLOR = 6  # the Taylor series if the status of the closed form is REFUSED
     GAUSS = 10  # Gauss collocation has the code GAUSS plus its number of stages, 1 to 8
+    FIXED = 100  # each of pyharness/model/fixed_steps.py has FIXED plus its number, from 1
 
 
 class Places:

@@ -12,8 +12,13 @@ from pyharness.checks.compare.batch import Solver
 from pyharness.checks.scenes.random_scenes import draw
 from pyharness.cli.main import main
 from pyharness.engine.plan import plan
-from pyharness.engine.registry import METHODS, REGISTRY, SCIPY_METHODS, requested_tolerance
-from pyharness.engine.solver import PREPARED
+from pyharness.engine.registry import (
+    METHODS,
+    PREPARED,
+    REGISTRY,
+    SCIPY_METHODS,
+    requested_tolerance,
+)
 from pyharness.model.listing import Listing
 from tests.conftest import Printed
 

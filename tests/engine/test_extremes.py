@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, prepare, solve, solve_many
-from pyharness.engine.registry import FIXED_STEP
-from pyharness.engine.solver import PREPARED
+from pyharness.engine.registry import FIXED_STEP, PREPARED
 
 
 @pytest.mark.parametrize("method", PREPARED)

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from pyharness.engine.many import solve_many
 from pyharness.engine.many_scenes import scene_of_row
-from pyharness.engine.registry import PREPARED_FOR_STATE, REGISTRY, requested_tolerance
+from pyharness.engine.registry import PREPARED, PREPARED_FOR_STATE, REGISTRY, requested_tolerance
 from pyharness.engine.solve import solve
-from pyharness.engine.solver import PREPARED
 from pyharness.model.arrays import unit_quaternions
 from pyharness.model.attitude import IDENTITY, product
 from pyharness.model.codes import Statuses

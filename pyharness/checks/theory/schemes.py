@@ -14,6 +14,8 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from pyharness.checks.theory.collocation_matrices import PARTS, collocation_matrix, inverse
+from pyharness.model.fixed_steps import FIXED_STEPS, Row
+from pyharness.model.fixed_steps import FixedStep as Declared
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 
@@ -145,9 +147,21 @@ def runge_kutta_4(on: Numbers, omega: Array, punched: bool = False) -> Array:
 runge_kutta_punched = partial(runge_kutta_4, punched=True)
 
 
-def improved_euler(on: Numbers, omega: Array) -> Array:
-    first = on.times_step(on.rate(omega))
-    return np.asarray(omega + 0.5 * (first + on.times_step(on.rate(omega + first))))
+def tableau(method: Declared) -> Scheme:
+    """Return the scheme of a method that has a Runge-Kutta matrix."""
+
+    def scheme(on: Numbers, omega: Array) -> Array:
+        changes: list[Array] = []
+
+        def moved(row: Row) -> Array:
+            terms = (float(a) * change for a, change in zip(row, changes, strict=True) if a)
+            return np.asarray(omega + sum(terms))
+
+        for row in method.matrix:
+            changes.append(on.times_step(on.rate(moved(row))))
+        return moved(method.weights)
+
+    return scheme
 
 
 def taylor_3(on: Numbers, omega: Array) -> Array:
@@ -182,9 +196,10 @@ SCHEMES = {
     "two-term": FixedStep("two-term", 2, collocation("two-term"), 2.0),
     "four-term": FixedStep("four-term", 2, collocation("four-term"), 4.0),
     "runge-kutta": FixedStep("runge-kutta", 4, runge_kutta_4),
-    "improved-euler": FixedStep("improved-euler", 2, improved_euler),
-    "taylor-3": FixedStep("taylor-3", 2, taylor_3),
-    "rk4": FixedStep("rk4", 4, runge_kutta_4),
+    **{
+        each.name: FixedStep(each.name, each.order, tableau(each) if each.matrix else taylor_3)
+        for each in FIXED_STEPS
+    },
     **{f"gauss-{n}": FixedStep(f"gauss-{n}", 2 * n, gauss(n)) for n in (1, 2, 4)},
 }
 

@@ -32,6 +32,8 @@ COUNTS = tuple(round(10.0 ** (k / 2.0)) for k in range(13))
 # Time (s) of a longer search for divergence, and its smallest step size (s).
 _LONG, _SMALLEST_LONG = 100.0, 2e-3
 _SPINNING = (2, 3, 4)
+# By order, a program that amplifies small perturbations alike.
+_ALIKE = {2: "two-term", 4: "runge-kutta"}
 _CROSSING = Basis(
     "derived",
     "step size at which truncation and rounding errors are equal",
@@ -71,12 +73,13 @@ def _of_case(case: int, listing: Listing | None, place: Name) -> Iterator[Attemp
         own = replace(place, quantity=f"{TIME / count:.0e}", scene=scene)
         yield Attempt(own, partial(predicted, count))
     gauss = method.startswith("gauss")
-    # Methods of higher order have only rounding errors where rounding is visible.
-    if not (before or gauss) and SCHEMES[method].order in (2, 4):
+    if gauss or SCHEMES[method].order not in _ALIKE:
+        # Methods of higher order have only rounding errors where rounding is visible.
+        return
+    if not before:
         crossing = partial(_crossing, method, case, lambda count: error(count)[0])
         yield Attempt(replace(place, quantity="crossing", scene=None), crossing)
-    if not gauss:
-        yield Attempt(place.with_quantity("diverges"), partial(_divergence, case, listing))
+    yield Attempt(place.with_quantity("diverges"), partial(_divergence, case, listing))
 
 
 def _crossing(method: str, case: int, error: Callable[[int], float], name: Name) -> Check:
@@ -122,8 +125,7 @@ def _error(scene: Scene, name: str, case: int, listing: Listing | None) -> tuple
 
 def _divergence(case: int, listing: Listing | None, name: Name) -> Check:
     scene, method = case_scene(case), name.subject
-    alike = "runge-kutta" if SCHEMES[method].order == 4 else "two-term"
-    scheme = listing or Listing.corrected(alike)
+    scheme = listing or Listing.corrected(_ALIKE[SCHEMES[method].order])
     runner: Runner = (unstopped(listing) if listing else method_candidate(method, 1.0)).rows
     if case not in _SPINNING:
         found = smallest_divergent(scene, TIME, runner, SMALLEST * 1e2)

@@ -14,9 +14,9 @@ from pyharness.checks.check import BITS, Check, may_hold
 from pyharness.checks.compare.candidates import method_candidate, program_candidate
 from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.checks.tolerances import finest
-from pyharness.engine.registry import METHODS
+from pyharness.engine.registry import METHODS, PREPARED
 from pyharness.engine.solve import solve
-from pyharness.engine.solver import PREPARED, Solver, prepare
+from pyharness.engine.solver import Solver, prepare
 from pyharness.engine.terms import damping
 from pyharness.model.errors import InputError
 from pyharness.model.extension import extension

@@ -4,15 +4,14 @@ import argparse
 
 from pyharness.cli import options as shared
 from pyharness.engine.plan import plan
+from pyharness.engine.registry import PREPARED
 from pyharness.engine.report import plan_report
 from pyharness.engine.solve import ascending_times
-from pyharness.engine.solver import PREPARED
 
 OPTIONS = {
     **shared.BODY,
     "--method M": "Plan a solution by this method: auto (default; chooses closed-form, quick or "
-    "taylor), closed-form, taylor, quick (extrapolated Runge-Kutta), improved-euler, taylor-3, "
-    "rk4, or gauss-1 to gauss-8.",
+    f"taylor), {', '.join(name for name in PREPARED if name != 'auto')}.",
     "--tolerance E": "Largest allowed error of omega, relative to its largest component, at most "
     "1 (default: the method's own, 1e-9 for auto).",
     "--velocity": "Plan the computation of the translational velocity too.",
@@ -27,7 +26,7 @@ def run(options: argparse.Namespace) -> int:
     kinds = ("any_torque", "any_state", "changing", "states")
     scene = shared.chosen_scene(options, **dict.fromkeys(kinds, True))
     method = options.method or "auto"
-    shared.check_known("method", method, tuple(PREPARED))
+    shared.check_known("method", method, PREPARED)
     tolerance = shared.chosen_tolerance(options)
     given = () if options.times is None else shared.numbers(options.times, "--times")
     rows = bool(given) and len(ascending_times(given)[0]) > 1

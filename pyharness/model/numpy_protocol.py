@@ -14,6 +14,8 @@ import numpy as np
 ELEMENTS: dict[str, Callable[..., Any]] = {}
 # By the function of NumPy.
 FUNCTIONS: dict[Any, Callable[..., Any]] = {}
+# Types of results with the rounding of symbols, unlike numpy.float32.
+_DTYPES = {np.dtype(each) for each in (float, bool, object)}
 
 
 class Recorded:
@@ -72,6 +74,12 @@ def of_ufunc(ufunc: np.ufunc, method: str, given: Sequence[Any], named: dict[str
     function, name = ELEMENTS.get(ufunc.__name__), ufunc.__name__
     results = named.get("out") or ()
     every = (*given, *results)
+    dtype = named.get("dtype")
+    if dtype is not None and np.dtype(dtype) not in _DTYPES:
+        raise symbol_in(every).recorder.refusal(f"the argument dtype={np.dtype(dtype)}")
+    # As in math.log(2.0, base).
+    if method == "__call__" and any(not isinstance(x, np.ndarray) for x in given[ufunc.nin :]):
+        raise symbol_in(every).recorder.refusal(f"{name} with these arguments")
     if function is None and not any("O" in types for types in ufunc.types):
         raise symbol_in(every).recorder.refusal(f"{name} of the state")
     if results and (function or any(each.dtype != object for each in results)):
@@ -100,8 +108,11 @@ def _loop(ufunc: np.ufunc, function: Callable[..., Any]) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """Return an array of objects that is no `SymbolArray`, unless there is no symbol."""
-    if isinstance(value, SymbolArray):
+    """Return an array of objects that is no `SymbolArray`, unless there is no symbol.
+
+    Arrays share their elements with the result, which may be written.
+    """
+    if isinstance(value, SymbolArray) or type(value) is np.ndarray:
         return value.view(np.ndarray)
     return np.array(value, dtype=object) if has_symbol(value) else value
 

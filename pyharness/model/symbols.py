@@ -480,14 +480,19 @@ class Condition(Symbol):
 
     __slots__ = ()
 
+    def _checked(self, other: Any) -> Any:
+        if not isinstance(other, (Condition, bool, np.bool_)):
+            raise self.recorder.refusal("a number as a condition", "a comparison")
+        return other
+
     def __and__(self, other: Any) -> Any:
-        return _condition(select(self, other, False))
+        return _condition(select(self, self._checked(other), False))
 
     def __or__(self, other: Any) -> Any:
-        return _condition(select(self, True, other))
+        return _condition(select(self, True, self._checked(other)))
 
     def __xor__(self, other: Any) -> Any:
-        return _condition(select(self, negated(other), other))
+        return _condition(select(self, negated(self._checked(other)), other))
 
     def __invert__(self) -> "Condition":
         return _condition(1.0 - self)

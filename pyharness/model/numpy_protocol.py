@@ -72,7 +72,7 @@ def viewed(found: Any) -> Any:
 def of_ufunc(ufunc: np.ufunc, method: str, given: Sequence[Any], named: dict[str, Any]) -> Any:
     """Return the result of a ufunc's method for arguments of which one has symbols."""
     function, name = ELEMENTS.get(ufunc.__name__), ufunc.__name__
-    results = named.get("out") or ()
+    results = () if (out := named.get("out")) is None else out if type(out) is tuple else (out,)
     every = (*given, *results)
     dtype = named.get("dtype")
     if dtype is not None and np.dtype(dtype) not in _DTYPES:

@@ -71,6 +71,7 @@ REFUSED = {
     # A second argument of the function of `math`, which would be NumPy's argument out.
     "math.log(2, w[0] + 3)": "log with these arguments",
     "math.log(w[0] + 3, 2)": "log with these arguments",
+    "np.maximum(w, 0.2, out=np.array(w))": "the argument out",
     "math.hypot(w[0], w[1], w[2])": "hypot with these arguments",
     "np.interp(w, [0, 1], [1, 5], period=2)": "interp with these arguments",
     "np.linalg.norm(w, 1)": "the norm of order 1",
@@ -137,6 +138,14 @@ def of_number(t: Any, w: Any) -> Any:
     return found
 
 
+def of_zeros(t: Any, w: Any) -> Any:
+    found, other = np.zeros(3), np.ones(3)
+    np.matmul(2.0 * np.eye(3), w, out=found)
+    np.subtract(other, w, out=other)
+    found -= other
+    return found
+
+
 def of_copy(t: Any, w: Any) -> Any:
     found = np.array([w[0], w[1], w[2]])
     copy = found.copy()
@@ -152,7 +161,7 @@ def of_function(t: Any, w: Any) -> Any:
 
 
 @pytest.mark.parametrize(
-    "function", [of_list, of_objects, of_view, of_number, of_copy, of_function]
+    "function", [of_list, of_objects, of_view, of_number, of_zeros, of_copy, of_function]
 )
 def test_changes_in_place_are_recorded(function: Callable[[Any, Any], Any]) -> None:
     check(function)

@@ -6,6 +6,7 @@ The functions are those of the tables that record them, so that each needs sampl
 import math
 from decimal import Decimal, localcontext
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import mpmath
@@ -13,7 +14,9 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, opaque, solve, solve_many
-from pyharness.engine.recorded import kernel_tape, outputs_at, taylor_step
+from pyharness.engine import leaf_cache
+from pyharness.engine.leaf_text import structure
+from pyharness.engine.recorded import kernel_tape, listing, outputs_at, taylor_step
 from pyharness.engine.taylor_ivp import recorded_equation
 from pyharness.model.codes import Operations
 from pyharness.model.dual import with_derivatives
@@ -165,12 +168,30 @@ SINGULAR = {
 JUMPS = {"rint", "floor", "ceil", "trunc", "fmod", "remainder", "floor_divide"}
 
 
-@pytest.mark.parametrize("name", sorted({*ARGUMENTS, *OPERANDS}))
-def test_value_in_the_kernel_is_that_of_numpy(name: str) -> None:
+# Functions of several arguments without switches; test_function_slopes.py compiles the others.
+COMPILED = ("add", "subtract", "multiply", "divide", "hypot", "power", "float_power")
+
+
+@pytest.mark.parametrize(
+    ("name", "compiled"),
+    [(name, False) for name in sorted({*ARGUMENTS, *OPERANDS})]
+    + [(name, True) for name in COMPILED],
+)
+def test_value_in_the_kernel_is_that_of_numpy(
+    name: str, compiled: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The value is the rate of an unknown, where the others, which are constant, are operands."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     function, n = getattr(np, name), len(samples(name)[0])
     given: tuple[float, ...]
     tape = recorded_equation(lambda t, y: [*(0.0 * y[:n]), function(*y[:n])], n + 1)
+    array = kernel_tape(tape).copy()
+    if compiled:
+        address, how = leaf_cache.leaves_of(tape)
+        assert how == "compiled"
+        array[7:8].view(np.int64)[:] = address
+    else:
+        assert name in (*ARGUMENTS, *COMPILED) or structure(listing(tape)) is None
     for given in samples(name):
         # Beyond, derivatives overflow, and rounding errors decide on which side of a jump it is.
         sizes = [abs(x) for x in given if x]
@@ -181,7 +202,7 @@ def test_value_in_the_kernel_is_that_of_numpy(name: str) -> None:
             continue
         wanted = OTHERWISE.get((name, given), float(function(*given)))
         start, allowed_errors = np.array([*given, 0.0]), np.full(n + 1, 1e300)
-        step = taylor_step(kernel_tape(tape), 0.0, start, allowed_errors, 1e-6, 1.0, 1.0)
+        step = taylor_step(array, 0.0, start, allowed_errors, 1e-6, 1.0, 1.0)
         value = float(step.terms[1, n]) / step.h
         assert value == wanted or abs(value - wanted) <= allowed(name, given, wanted), given
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import InputError
+from pyharness import InputError, Scene, opaque, solve
 from pyharness.model.state_torque import recorded
 from pyharness.model.tape import float_outputs
 
@@ -165,6 +165,19 @@ def of_function(t: Any, w: Any) -> Any:
 )
 def test_changes_in_place_are_recorded(function: Callable[[Any, Any], Any]) -> None:
     check(function)
+
+
+def test_motion_is_that_under_the_opaque_torque() -> None:
+    def torque(t: Any, w: Any) -> Any:
+        found = np.array([w[0], w[1], w[2]])
+        found *= np.abs(w)
+        return -found
+
+    both = [
+        solve(Scene("", (0.5, -0.2, 0.9), moments=(1, 2, 3), torque=each), 5.0, tolerance=1e-12)
+        for each in (torque, opaque(torque))
+    ]
+    assert both[0].omega[0] == pytest.approx(both[1].omega[0], rel=1e-11)
 
 
 def test_a_sum_of_conditions_counts_them() -> None:

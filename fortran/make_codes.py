@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from pyharness.model.fixed_steps import FIXED_STEPS
+from pyharness.model.listing import flagged
 
 SOURCE = Path(__file__).resolve().parents[1] / "pyharness/model/codes.py"
 
@@ -30,6 +31,7 @@ def texts(source: Path = SOURCE) -> dict[str, str]:
     for_c = classes["Operations"] | classes["Storage"]
     for_c["COMPLETE"] = classes["Statuses"]["COMPLETE"]
     listed = ", ".join(f"{name} = {value}" for name, value in for_c.items())
+    found["listing.f90"] = "\n".join([*_listing(), ""])
     return found | {"codes.h": f"enum {{ {listed} }};\n"}
 
 
@@ -46,3 +48,23 @@ def _module(name: str, numbers: dict[str, int | float]) -> Iterator[str]:
         else:
             yield f"  integer, parameter, public :: {each} = {value}"
     yield f"end module {name}"
+
+
+def _listing() -> Iterator[str]:
+    names = {each["id"].replace("-", "_"): each["flag"] for each in flagged()}
+    yield "module listing_flags"
+    yield "  !! Active defects, readings and conjectures of the appendix, one bit each. Written by"
+    yield "  !! fortran/make_codes.py from `flag` in pyharness/data/apparatus.toml."
+    yield "  implicit none(type, external)"
+    yield "  private"
+    yield "  type, public :: listing_t"
+    yield from (f"    logical :: {name}" for name in names)
+    yield "  end type listing_t"
+    yield "  public :: listing_from_bits"
+    yield "contains"
+    yield "  pure function listing_from_bits(bits) result(listing)"
+    yield "    integer, intent(in) :: bits !! sum of 2**flag over the active names"
+    yield "    type(listing_t) :: listing"
+    yield from (f"    listing%{name} = btest(bits, {flag})" for name, flag in names.items())
+    yield "  end function listing_from_bits"
+    yield "end module listing_flags"

@@ -36,8 +36,13 @@ __all__ = ["external_checks", "problems"]
 
 # These methods' finest tolerances would take too long.
 _TOLERANCES = {"radau": 1e-8, "rk45": 1e-11, "quick": 1e-9}
-_SOLVED = tuple(
-    name for name, each in REGISTRY.items() if not (each.is_fixed_step or each.weak_torque)
+_SOLVED = (
+    "reference",
+    *(
+        name
+        for name, each in REGISTRY.items()
+        if name != "reference" and not (each.is_fixed_step or each.weak_torque)
+    ),
 )
 _FEWEST_STEPS, _MOST_STEPS = 4, 2**16
 _HALF_ULP = 2.0**-53

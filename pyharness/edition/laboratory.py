@@ -15,6 +15,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.scene_report import ending, heading
 from pyharness.thesis.cards import deck, numbers
+from pyharness.thesis.decks import alterations
 from pyharness.thesis.printer import formats_of, page
 from pyharness.thesis.programs import run_program
 from pyharness.truth.reference import reference
@@ -89,7 +90,7 @@ def _deck_data() -> dict[str, Any]:
             passes.append({**each, "from": first, "to": last, "set": each.get("set", {})})
         cards = _statements(program, passes[0]["from"], passes[-1]["to"])
         found[program] = {"torque": order[program]["torque"], "passes": passes, "cards": cards}
-    altered = [x for x in facts("cards/alterations")["alteration"] if "dialect" not in x]
+    altered = [x for x in alterations() if "dialect" not in x]
     deleted = [{"delete": numbers(each["delete"])} if "delete" in each else {} for each in altered]
     found["alterations"] = [x | more for x, more in zip(altered, deleted, strict=True)]
     return found

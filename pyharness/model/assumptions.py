@@ -18,7 +18,15 @@ Runs = Iterable[tuple[Scene, Iterable[Listing]]]
 
 
 def assumptions() -> list[dict[str, Any]]:
-    return list(facts("assumptions")["assumption"])
+    entries = facts("apparatus")["entry"]
+    found = [
+        {"id": each["id"], "on": "listing", "entry": each["id"]} | each["assumption"]
+        for each in sorted(entries, key=lambda each: str(each["kind"]))
+        if "assumption" in each
+    ]
+    given = facts("assumptions")["assumption"]
+    after = [each for each in given if each["on"] == "claim"]
+    return [*(each for each in given if each not in after), *found, *after]
 
 
 def open_starts() -> dict[int, str]:

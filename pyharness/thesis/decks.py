@@ -64,7 +64,7 @@ def deck_text(
     if scene is not None:
         cards |= _case_cards(listing.program, scene)
     marked = set()
-    for each in facts("cards/alterations")["alteration"]:
+    for each in alterations():
         if terms is not None and "dialect" not in each:
             continue
         if _is_made(each, listing, dialect, scene.case if scene else None):
@@ -78,6 +78,16 @@ def deck_text(
                 marked |= set(new)
     # Column 73 marks the dialect's cards; columns 74 to 80 have the card number.
     return "".join(f"{cards[n]:72}{_MARK if n in marked else '':1}{n:7d}\n" for n in sorted(cards))
+
+
+def alterations() -> list[dict[str, Any]]:
+    """Return the alterations by entries of the apparatus, then by dialects."""
+    by_entries = [
+        {"keeps" if each.get("active") else "corrects": entry["id"]} | each
+        for entry in facts("apparatus")["entry"]
+        for each in entry.get("alteration", [])
+    ]
+    return [*by_entries, *facts("cards/alterations")["alteration"]]
 
 
 def card_steps(program: str) -> int:
@@ -94,7 +104,7 @@ def corrected_cards(program: str) -> dict[int, str]:
 def corrections(program: str) -> dict[int, list[str]]:
     """Return the defects whose correction changes a card, by card number."""
     found: dict[int, list[str]] = {}
-    for each in facts("cards/alterations")["alteration"]:
+    for each in alterations():
         if each["program"] == program and "corrects" in each and "case" not in each:
             new = [number for number, _ in each.get("replace", []) + each.get("insert", [])]
             for number in {*numbers(each.get("delete", "")), *new}:
@@ -131,7 +141,7 @@ def _is_made(
         and not ("corrects" in alteration and listing.has(named("corrects", "")))
         and named("listing", listing.label) == listing.label
         and not any(name == listing.label or listing.has(name) for name in named("unless", ()))
-        and all(listing.has(alteration[key]) for key in ("keeps", "reading") if key in alteration)
+        and ("keeps" not in alteration or listing.has(alteration["keeps"]))
     )
 
 

@@ -7,12 +7,11 @@ from pyharness.checks.cells import decks
 from pyharness.checks.check import Selection
 from pyharness.cli.main import main
 from pyharness.history.claims.laboratory import Laboratory
-from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
 from pyharness.model.scene_file import case_scene
 from pyharness.thesis import decks as punched
 from pyharness.thesis.cards import deck
-from pyharness.thesis.decks import compiler, deck_text, run_deck
+from pyharness.thesis.decks import alterations, compiler, deck_text, run_deck
 
 
 def _cards(text: str) -> dict[int, str]:
@@ -31,7 +30,7 @@ def test_corrected_deck_differs_by_the_alterations_alone(program: str) -> None:
     listings = (Listing.original(program), Listing.corrected(program))
     before, after = (_cards(deck_text(listing)) for listing in listings)
     altered = [
-        each for each in facts("cards/alterations")["alteration"]
+        each for each in alterations()
         if each["program"] == program and "dialect" not in each
         and ("corrects" in each or each.get("listing") == "corrected")
     ]  # fmt: skip

@@ -25,7 +25,7 @@ export function deckOf(data, state) {
     if (each.program !== state.program) continue;
     if (each.corrects && active.includes(each.corrects)) continue;
     if (each.listing === "corrected" && active.length > 0) continue;
-    if ([each.keeps, each.reading].some((name) => name && !active.includes(name))) continue;
+    if (each.keeps && !active.includes(each.keeps)) continue;
     for (const number of each.delete ?? []) cards.delete(number);
     for (const [number, text] of each.replace ?? []) cards.set(number, { text, replaced: true });
     for (const [number, text] of each.insert ?? []) cards.set(number, { text, inserted: true });

@@ -11,13 +11,13 @@ import numpy as np
 
 from pyharness.engine.rescaled import scaled
 from pyharness.engine.rotated import rotated
-from pyharness.model.listing import PROGRAMS, Listing, names_of, switches
+from pyharness.model.listing import PROGRAMS, Listing, flagged, names_of, switches
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw
 
 COARSEST = 1e-3
-# Defects drawn last, so that a seed gives the same draws as before they were added.
-_LATER = ("three-masses",)
+# Defects from this flag on are drawn last, so that a seed gives the draws of earlier versions.
+_FIRST_LATER = 11
 _LIPSCHITZ = (500.0, 60.0, 1.0, 1e-3)
 MODERATE = ("free", "constant", "wave")
 """Kinds of moderate scenes: torque-free, constant torque, waves with a linear torque."""
@@ -60,7 +60,8 @@ def draw(seed: str, number: int) -> Draw:
         name = source.choice(list(NASTY))
         scene = replace(NASTY[name](source), name=name)
     program = source.choice(PROGRAMS)
-    early = [name for name in switches(program) if name not in _LATER]
+    later = [each["id"] for each in flagged() if each["flag"] >= _FIRST_LATER]
+    early = [name for name in switches(program) if name not in later]
     defects = frozenset(name for name in early if source.random() < 0.5)
     readings = frozenset(x for x in names_of("reading", program) if source.random() < 0.3)
     found = Draw(
@@ -72,8 +73,8 @@ def draw(seed: str, number: int) -> Draw:
         backward=source.random() < 0.5,
         stages=source.randint(1, 8),
     )
-    later = [name for name in _LATER if name in switches(program) and source.random() < 0.5]
-    return replace(found, listing=Listing(program, defects.union(later), readings))
+    drawn = [name for name in later if name in switches(program) and source.random() < 0.5]
+    return replace(found, listing=Listing(program, defects.union(drawn), readings))
 
 
 def text_generator(seed: str) -> np.random.Generator:

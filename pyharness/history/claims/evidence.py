@@ -17,7 +17,7 @@ import numpy as np
 from pyharness.history.claims.laboratory import Assumptions, Laboratory, starts
 from pyharness.history.claims.ledger import claim, claims, outcome
 from pyharness.history.claims.verdicts import IN_PART, NOT_TESTABLE, REPRODUCED
-from pyharness.model.listing import names_of
+from pyharness.model.listing import flagged, names_of
 from pyharness.model.report import (
     Column,
     Field,
@@ -37,9 +37,14 @@ KINDS = ("result", "design")
 """The kinds of claims that are scored."""
 _SHOWN = 12
 _SHORT = {
-    "omega(0)": "omega(0)", "reading c1-for-c": "C1", "reading do-variable": "DO",
-    "conjecture torque-held": "held", "conjecture initial-torque": "first", "steps": "steps",
-}  # fmt: skip
+    "omega(0)": "omega(0)",
+    **{
+        f"{each['kind']} {each['id']}": each["assumption"]["short"]
+        for each in sorted(flagged(), key=lambda each: str(each["kind"]), reverse=True)
+        if "assumption" in each
+    },
+    "steps": "steps",
+}
 _RULE = (
     "Every combination of starts (one for all cases in which none is given, or those adopted), "
     "readings, conjectures and steps, scored by the claims about results and design of the "

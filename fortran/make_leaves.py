@@ -6,10 +6,11 @@ zeros, except some wheels and drag.
 
 from typing import Any
 
-from pyharness import Scene, TorqueLaw, torques
+from pyharness import Scene, TorqueLaw
 from pyharness.engine.leaf_text import key, structure
 from pyharness.engine.leaves import names, source
 from pyharness.engine.recorded import listing, system_of
+from pyharness.engine.term_file import KINDS
 from pyharness.model.constant_body import with_constant_body
 
 
@@ -17,22 +18,8 @@ def texts() -> dict[str, str]:
     """Return the C source of all leaves with a table of them, and the header, by file."""
     three = (0.1, 0.2, 0.3)
     waves = [(three, 0.4), (three, 0.5), (three, 0.6)]
-    turning = TorqueLaw(three, sines=waves[:1], frame="space")
     terms: list[Any] = [
-        torques.damping(three),
-        torques.drag([0.1]),
-        torques.drag([0.0, 0.1]),
-        torques.drag([0.1, 0.2]),
-        torques.attitude_control(0.1, 0.2),
-        torques.wheels(three),
-        torques.wheels(three, three),
-        *(torques.wheels(three, axis) for axis in ((0.1, 0, 0), (0, 0.1, 0), (0, 0, 0.1))),
-        torques.gravity_gradient((1.0, 1.2, 1.5), 0.3),
-        torques.magnetic_dipole(three, three),
-        torques.magnetic_dipole(three, turning),
-        torques.magnetic_damping(0.1, three),
-        torques.magnetic_damping(0.1, turning),
-        torques.in_space(three),
+        *(each.function(**each.sample | own) for each in KINDS.values() for own in each.leaves),
         *(TorqueLaw(three, three, waves[:n], frame="space") for n in range(4)),
     ]
     structures = {}

@@ -4,28 +4,11 @@ A sum of terms, torque laws and Python functions is a torque for `pyharness.Scen
 each + must be a term, or a sum with a term.
 """
 
-from pyharness.engine.field_terms import (
-    gravity_gradient,
-    in_space,
-    magnetic_damping,
-    magnetic_dipole,
-)
-from pyharness.engine.table_terms import pulses, table
-from pyharness.engine.terms import attitude_control, damping, drag, rate_control, wheels
+from pyharness.engine import field_terms, table_terms, terms
+from pyharness.engine.field_terms import *  # noqa: F403
+from pyharness.engine.table_terms import *  # noqa: F403
+from pyharness.engine.terms import *  # noqa: F403
 from pyharness.model.state_torque import opaque, recorded
 
-__all__ = [
-    "attitude_control",
-    "damping",
-    "drag",
-    "gravity_gradient",
-    "in_space",
-    "magnetic_damping",
-    "magnetic_dipole",
-    "opaque",
-    "pulses",
-    "rate_control",
-    "recorded",
-    "table",
-    "wheels",
-]
+__all__ = ["opaque", "recorded"]
+__all__ += terms.__all__ + field_terms.__all__ + table_terms.__all__

@@ -21,10 +21,9 @@ from pyharness.bench.ensemble_peers import ensemble_peers
 from pyharness.bench.measure import Workload
 from pyharness.bench.peers import Formula, heyoka_maker, peers
 from pyharness.checks.scenes.random_scenes import text_generator
-from pyharness.engine import field_terms, terms
 from pyharness.engine.solver import prepare
+from pyharness.engine.term_file import KINDS
 from pyharness.model.scene import Scene
-from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.values import Triple
 from pyharness.truth.reference import reference
 
@@ -42,17 +41,7 @@ _OMEGA: Triple = (0.3, 0.2, 0.9)  # rad/s
 _SPREAD = 0.2  # largest deviation of a component of a body's initial omega from _OMEGA, rad/s
 _ATTITUDE = (0.6, 0.0, 0.8, 0.0)
 
-# Arguments of the ready-made terms, which occur in the formulas too.
-_D = (0.05, 0.1, 0.15)
-_CUBIC = 0.1
 _TARGET = (0.1, 0.2, 0.5)
-_STIFFNESS, _GAIN = 0.5, 0.2
-_MOMENTUM, _MOTOR = (0.1, 0.3, 0.2), (0.0, 0.002, 0.0)
-_ORBIT = 0.3
-_DIPOLE, _FIELD = (0.1, 0.2, 0.3), (0.6, 0.3, 0.2)
-_SWING, _FREQUENCY = (0.2, 0.0, 0.1), 0.7
-_COILS = 0.1
-_PUSH = (0.05, 0.02, 0.1)
 
 
 @dataclass(frozen=True)
@@ -80,19 +69,12 @@ class TermBodies(EnsembleLoad):
 
 
 def term_scenes() -> list[TermScene]:
-    turning = TorqueLaw(_FIELD, sines=[(_SWING, _FREQUENCY)], frame="space")
-    ready: dict[str, tuple[Any, Formula]] = {
-        "damping": (terms.damping(_D), _damping),
-        "cubic drag": (terms.drag([0.0, _CUBIC]), _drag),
-        "rate control": (terms.rate_control(_GAIN, _TARGET), _rate_control),
-        "attitude control": (terms.attitude_control(_STIFFNESS, _GAIN), _attitude_control),
-        "wheels": (terms.wheels(_MOMENTUM, _MOTOR), _wheels),
-        "gravity gradient": (field_terms.gravity_gradient(_MOMENTS, _ORBIT), _gravity_gradient),
-        "magnetic dipole": (field_terms.magnetic_dipole(_DIPOLE, turning), _magnetic_dipole),
-        "magnetic damping": (field_terms.magnetic_damping(_COILS, _FIELD), _magnetic_damping),
-        "in_space": (field_terms.in_space(_PUSH), _in_space),
-    }
-    found = [TermScene(READY, _scene(name, x), formula) for name, (x, formula) in ready.items()]
+    found = []
+    for name, ready in KINDS.items():
+        if ready.leaves:
+            formula = FORMULAS.get(name)
+            scene = _scene(name.replace("_", " "), ready.function(**ready.sample))
+            found.append(TermScene(READY, scene, formula and partial(formula, **ready.sample)))
     return found + [TermScene(EXPRESSION, _scene(*each)) for each in EXPRESSIONS.items()]
 
 
@@ -151,7 +133,7 @@ EXPRESSIONS: dict[str, Callable[..., Any]] = {
     "beacon": _beacon,
 }
 
-# Formulas of docs/how-to/torques.md, with arguments as in `Formula`.
+# Formulas of docs/how-to/torques.md for the samples of ready torques; arguments as in `Formula`.
 
 
 def _cross(a: Sequence[Any], b: Sequence[Any]) -> list[Any]:
@@ -170,47 +152,69 @@ def _about_body(vector: Sequence[Any], q: Sequence[Any]) -> list[Any]:
     return [first * x + second * y + third * z for first, second, third in zip(*rows, strict=True)]
 
 
-def _damping(t: Any, w: Any, q: Any, sin: Any, cos: Any) -> Sequence[Any]:
-    return [-d * each for d, each in zip(_D, w, strict=True)]
+def _damping(t: Any, w: Any, q: Any, sin: Any, cos: Any, matrix: Any) -> Sequence[Any]:
+    return [-d * each for d, each in zip(matrix, w, strict=True)]
 
 
-def _drag(t: Any, w: Any, q: Any, sin: Any, cos: Any) -> Sequence[Any]:
+def _drag(
+    t: Any, w: Any, q: Any, sin: Any, cos: Any, coefficients: Any, per_axis: bool
+) -> Sequence[Any]:
     square = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
-    return [-_CUBIC * square * each for each in w]
+    return [-coefficients[1] * square * each for each in w]
 
 
-def _rate_control(t: Any, w: Any, q: Any, sin: Any, cos: Any) -> Sequence[Any]:
-    return [-_GAIN * (each - target) for each, target in zip(w, _TARGET, strict=True)]
+def _rate_control(
+    t: Any, w: Any, q: Any, sin: Any, cos: Any, gain: Any, target: Any
+) -> Sequence[Any]:
+    return [-gain * (each - wanted) for each, wanted in zip(w, target, strict=True)]
 
 
-def _attitude_control(t: Any, w: Any, q: Any, sin: Any, cos: Any) -> Sequence[Any]:
-    return [-2.0 * _STIFFNESS * q[0] * q[i + 1] - _GAIN * w[i] for i in range(3)]
+def _attitude_control(
+    t: Any, w: Any, q: Any, sin: Any, cos: Any, stiffness: Any, gain: Any, target: Any
+) -> Sequence[Any]:
+    return [-2.0 * stiffness * q[0] * q[i + 1] - gain * w[i] for i in range(3)]
 
 
-def _wheels(t: Any, w: Any, q: Any, sin: Any, cos: Any) -> Sequence[Any]:
-    h = [start + motor * t for start, motor in zip(_MOMENTUM, _MOTOR, strict=True)]
-    return [-turn - motor for turn, motor in zip(_cross(w, h), _MOTOR, strict=True)]
+def _wheels(t: Any, w: Any, q: Any, sin: Any, cos: Any, momentum: Any, motor: Any) -> Sequence[Any]:
+    h = [start + push * t for start, push in zip(momentum, motor, strict=True)]
+    return [-turn - push for turn, push in zip(_cross(w, h), motor, strict=True)]
 
 
-def _gravity_gradient(t: Any, w: Any, q: Any, sin: Any, cos: Any) -> Sequence[Any]:
-    r = _about_body([cos(_ORBIT * t), sin(_ORBIT * t), 0.0], q)
-    weighted = [moment * each for moment, each in zip(_MOMENTS, r, strict=True)]
-    return [3.0 * _ORBIT**2 * each for each in _cross(r, weighted)]
+def _gravity_gradient(
+    t: Any, w: Any, q: Any, sin: Any, cos: Any, inertia: Any, rate: Any
+) -> Sequence[Any]:
+    r = _about_body([cos(rate * t), sin(rate * t), 0.0], q)
+    weighted = [moment * each for moment, each in zip(inertia, r, strict=True)]
+    return [3.0 * rate**2 * each for each in _cross(r, weighted)]
 
 
-def _magnetic_dipole(t: Any, w: Any, q: Any, sin: Any, cos: Any) -> Sequence[Any]:
-    wave = sin(_FREQUENCY * t)
-    field = [base + swing * wave for base, swing in zip(_FIELD, _SWING, strict=True)]
-    return _cross(_DIPOLE, _about_body(field, q))
+def _magnetic_dipole(
+    t: Any, w: Any, q: Any, sin: Any, cos: Any, moment: Any, field: Any
+) -> Sequence[Any]:
+    ((swing, frequency),) = field.sines
+    wave = sin(frequency * t)
+    value = [base + part * wave for base, part in zip(field.constant, swing, strict=True)]
+    return _cross(moment, _about_body(value, q))
 
 
-def _magnetic_damping(t: Any, w: Any, q: Any, sin: Any, cos: Any) -> Sequence[Any]:
-    b = _about_body(_FIELD, q)
-    return [_COILS * each for each in _cross(_cross(w, b), b)]
+def _magnetic_damping(
+    t: Any, w: Any, q: Any, sin: Any, cos: Any, gain: Any, field: Any
+) -> Sequence[Any]:
+    b = _about_body(field, q)
+    return [gain * each for each in _cross(_cross(w, b), b)]
 
 
-def _in_space(t: Any, w: Any, q: Any, sin: Any, cos: Any) -> Sequence[Any]:
-    return _about_body(_PUSH, q)
+def _in_space(t: Any, w: Any, q: Any, sin: Any, cos: Any, torque: Any) -> Sequence[Any]:
+    return _about_body(torque, q)
+
+
+# By the names of ready torques; without a formula, heyoka integrates the recorded torque.
+FORMULAS: dict[str, Callable[..., Sequence[Any]]] = {
+    "damping": _damping, "drag": _drag, "rate_control": _rate_control,
+    "attitude_control": _attitude_control, "wheels": _wheels,
+    "gravity_gradient": _gravity_gradient, "magnetic_dipole": _magnetic_dipole,
+    "magnetic_damping": _magnetic_damping, "in_space": _in_space,
+}  # fmt: skip
 
 
 def term_methods(compiled: bool = False) -> list[SceneContender]:

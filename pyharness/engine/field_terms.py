@@ -5,13 +5,36 @@ from typing import Any
 
 import numpy as np
 
+from pyharness.engine.ready import Argument, law, number, ready_torque, vector
 from pyharness.engine.term_input import inertia_of, is_diagonal, law_of_vector, ready_term
 from pyharness.model.changing import Changing
 from pyharness.model.state_torque import StateTorque, turned_law
 from pyharness.model.torque_law import TorqueLaw, law_derivative, law_value, to_body
 from pyharness.model.values import Number, Numbers, finite, three
 
+__all__ = ["gravity_gradient", "in_space", "magnetic_damping", "magnetic_dipole"]
+_THREE = (0.1, 0.2, 0.3)
+_FIELD = (0.6, 0.3, 0.2)
+# A constant field and one that rotates have different leaves.
+_FIELDS = tuple(
+    {"field": each} for each in (_THREE, TorqueLaw(_THREE, sines=[(_THREE, 0.4)], frame="space"))
+)
+_AXES = "field about the axes of space (T), magnetic moment about the axes of the body"
 
+
+@ready_torque(
+    "Gravity gradient in a circular orbit",
+    r"$3n^2\, r \times I r$",
+    lambda sizes: {"inertia": sizes.moments, "rate": sizes.rate},
+    note=r"$r = R^T (\cos nt, \sin nt, 0)$",
+    convention=r"the direction from the Earth to the body is $(\cos nt, \sin nt, 0)$ in space, "
+    "where n is `rate`",
+    inertia=Argument(
+        {}, "Inertia", "kg m2", (1.0, 2.0, 2.5), "moments or matrix, also changing ones",
+        "by default that of the body", is_of_body=True,
+    ),
+    rate=number("Rate of the orbit", "rad/s", 0.3, "$n$ of the circular orbit"),
+)  # fmt: skip
 def gravity_gradient(inertia: Numbers | Iterable[Numbers] | Changing, rate: Number) -> StateTorque:
     """Return the gravity-gradient torque, 3 n^2 r x I r, in a circular orbit.
 
@@ -72,6 +95,21 @@ def gravity_gradient(inertia: Numbers | Iterable[Numbers] | Changing, rate: Numb
     return ready_term("gravity_gradient", torque, inertia=given, rate=n)
 
 
+@ready_torque(
+    "Dipole in a field",
+    r"$m \times b$",
+    lambda sizes: {"moment": [sizes.speed * x for x in sizes.vector], "field": sizes.field},
+    note="$b = R^T B$",
+    convention=_AXES,
+    leaves=_FIELDS,
+    moment=vector(
+        "Dipole moment about the axes of the body", "A m2", _THREE, "$m$ about the body axes"
+    ),
+    field=law(
+        "Field about the axes of space", "T",
+        TorqueLaw(_FIELD, sines=[((0.2, 0.0, 0.1), 0.7)], frame="space"), "$B$", frame="space",
+    ),
+)  # fmt: skip
 def magnetic_dipole(moment: Numbers, field: TorqueLaw | Numbers) -> StateTorque:
     """Return the torque m x b on a magnetic dipole that is fixed in the body.
 
@@ -116,6 +154,16 @@ def magnetic_dipole(moment: Numbers, field: TorqueLaw | Numbers) -> StateTorque:
     )
 
 
+@ready_torque(
+    "Coils that oppose the rate of the field",
+    r"$-k\, b' \times b$",
+    lambda sizes: {"gain": 0.3 * sizes.part, "field": sizes.vector},
+    note="$b = R^T B$ has the rate $b'$ about the body axes",
+    convention=_AXES,
+    leaves=_FIELDS,
+    gain=number("Gain", "A m2 s/T", 0.1, "$k$"),
+    field=law("Field about the axes of space", "T", _FIELD, "$B$", frame="space"),
+)
 def magnetic_damping(gain: Number, field: TorqueLaw | Numbers) -> StateTorque:
     """Return the torque m x b of coils that damp the rotation in a magnetic field.
 
@@ -164,6 +212,12 @@ def magnetic_damping(gain: Number, field: TorqueLaw | Numbers) -> StateTorque:
     return ready_term("magnetic_damping", torque, gain=factor, field=law)
 
 
+@ready_torque(
+    "A torque about the axes of space",
+    "$R^T N$",
+    lambda sizes: {"torque": [sizes.part * sizes.speed * x for x in sizes.vector]},
+    torque=law("Torque", "N m", (0.05, 0.02, 0.1), "$N$ about the axes of space", frame="space"),
+)
 def in_space(torque: TorqueLaw | Numbers) -> StateTorque:
     """Return the torque R^T N, where N has components about the axes of space.
 

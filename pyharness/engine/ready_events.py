@@ -6,10 +6,15 @@ from typing import Any
 import numpy as np
 
 from pyharness.engine.event_functions import Event
+from pyharness.engine.ready import choice, number, ready_event, vector
 from pyharness.model.errors import InputError
 from pyharness.model.values import Number, Numbers, finite, integer, three
 
+__all__ = ["crosses", "extremum", "flip", "rest", "tilt"]
+_AXIS = choice(1, 2, 3)("Body axis", "", 2)
 
+
+@ready_event("A component of omega equals a value", axis=_AXIS, value=number("Value", "rad/s", 0.4))
 def crosses(
     axis: int, value: Number = 0.0, *, terminal: bool | int = False, direction: int = 0
 ) -> Event:
@@ -55,6 +60,7 @@ def crosses(
     )
 
 
+@ready_event("A component of omega changes its sign", axis=_AXIS)
 def flip(axis: int, *, terminal: bool | int = False, direction: int = 0) -> Event:
     """Return the event that a component of omega changes its sign.
 
@@ -98,6 +104,7 @@ def flip(axis: int, *, terminal: bool | int = False, direction: int = 0) -> Even
     )
 
 
+@ready_event("A component of omega has a maximum or a minimum", axis=_AXIS)
 def extremum(axis: int, *, terminal: bool | int = False, direction: int = 0) -> Event:
     """Return the event that a component of omega has a maximum or a minimum.
 
@@ -140,6 +147,7 @@ def extremum(axis: int, *, terminal: bool | int = False, direction: int = 0) -> 
     )
 
 
+@ready_event("The magnitude of omega falls to a value", value=number("Value", "rad/s", 2.0))
 def rest(value: Number, *, terminal: bool | int = False, direction: int = -1) -> Event:
     """Return the event that the magnitude of omega falls to a value, or rises to it.
 
@@ -184,6 +192,12 @@ def rest(value: Number, *, terminal: bool | int = False, direction: int = -1) ->
     )
 
 
+@ready_event(
+    "The angle between a body axis and a direction in space equals a value; needs `attitude=True`",
+    axis=_AXIS,
+    toward=vector("Direction in space", "", (1.0, -2.0, 0.5)),
+    angle=number("Angle", "rad", 1.2),
+)
 def tilt(
     axis: int, toward: Numbers, angle: Number, *, terminal: bool | int = False, direction: int = 0
 ) -> Event:

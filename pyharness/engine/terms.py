@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from pyharness.engine.ready import Argument, flag, law, matrix, quaternion, ready_torque, vector
 from pyharness.engine.term_input import law_of_vector, matrix_of, ready_term
 from pyharness.model.arguments import count_inputs
 from pyharness.model.array_type import Array
@@ -18,11 +19,21 @@ from pyharness.model.state_torque import StateTorque, recorded
 from pyharness.model.torque_law import TorqueLaw, law_integral, law_value
 from pyharness.model.values import Number, Numbers, boolean, number_list, three
 
+__all__ = ["attitude_control", "damping", "drag", "rate_control", "wheels"]
 # A number stands for a multiple of the identity matrix, three numbers for a diagonal matrix.
 MatrixLike = Number | Numbers | Iterable[Numbers]
 _MOST_COEFFICIENTS = 50
+_BRAKES = "positive coefficients brake the rotation"
+_THREE = (0.1, 0.2, 0.3)
 
 
+@ready_torque(
+    "Torque -D omega",
+    r"$-D\omega$",
+    lambda sizes: {"matrix": sizes.several},
+    convention=_BRAKES,
+    matrix=matrix("D", "N m s", (0.05, 0.1, 0.15), "$D$"),
+)
 def damping(matrix: MatrixLike) -> StateTorque:
     """Return the torque -D omega of linear damping.
 
@@ -59,6 +70,21 @@ def damping(matrix: MatrixLike) -> StateTorque:
     return ready_term("damping", lambda time, omega, attitude: -(found @ omega), matrix=found)
 
 
+@ready_torque(
+    "Sum of -C_n |omega|^(2n) omega",
+    r"$-\sum_n C_n \lvert\omega\rvert^{2n} \omega$",
+    lambda sizes: {"coefficients": [0.1 * sizes.part, 0.2 * sizes.part / sizes.speed**2]},
+    convention=_BRAKES,
+    leaves=tuple({"coefficients": each} for each in ([0.1], [0.0, 0.1], [0.1, 0.2])),
+    coefficients=Argument(
+        {"type": "array", "items": {"$ref": "#/$defs/matrix"}}, "C_n from n = 0",
+        "N m (s/rad)^(2n+1)", [0.0, 0.1], "list of $C_n$ from n = 0",
+    ),
+    per_axis=flag(
+        "Powers of each component of omega instead", "", False,
+        "true for powers of components instead of the magnitude",
+    ),
+)  # fmt: skip
 def drag(coefficients: Iterable[MatrixLike], per_axis: bool = False) -> StateTorque:
     """Return a drag torque that is an odd polynomial of omega.
 
@@ -105,14 +131,22 @@ def drag(coefficients: Iterable[MatrixLike], per_axis: bool = False) -> StateTor
     def torque(time: Any, omega: Any, attitude: Any) -> Any:
         square = omega * omega if per_axis else omega @ omega
         power, total = omega, -(matrices[0] @ omega)
-        for matrix in matrices[1:]:
+        for each in matrices[1:]:
             power = square * power
-            total = total - matrix @ power
+            total = total - each @ power
         return total
 
     return ready_term("drag", torque, coefficients=matrices, per_axis=per_axis)
 
 
+@ready_torque(
+    "Torque -K (omega - target)",
+    r"$-K(\omega - \omega_0)$",
+    lambda sizes: {"gain": sizes.several, "target": [sizes.speed * x for x in sizes.vector]},
+    convention=_BRAKES,
+    gain=matrix("K", "N m s", 0.2, "$K$"),
+    target=vector("Target of omega", "rad/s", (0.1, 0.2, 0.5), r"$\omega_0$ about the body axes"),
+)
 def rate_control(gain: MatrixLike, target: Numbers = (0.0, 0.0, 0.0)) -> StateTorque:
     """Return the torque -K (omega - target), which controls the angular velocity.
 
@@ -157,6 +191,19 @@ def rate_control(gain: MatrixLike, target: Numbers = (0.0, 0.0, 0.0)) -> StateTo
     )
 
 
+@ready_torque(
+    "Torque towards a target attitude, with damping",
+    r"$-2k\,e_0 e - K\omega$",
+    lambda sizes: {
+        "stiffness": sizes.part * sizes.speed, "gain": sizes.several,
+        "target": [1.0, *sizes.vector],
+    },
+    note="error $(e_0, e)$: the target's conjugate times $q$",
+    convention="the target is a quaternion from body to space, scalar first",
+    stiffness=matrix("Stiffness", "N m", 0.5, "$k$"),
+    gain=matrix("Gain of the rate", "N m s", 0.2, "$K$"),
+    target=quaternion("Target attitude", "", IDENTITY, "quaternion"),
+)  # fmt: skip
 def attitude_control(
     stiffness: MatrixLike, gain: MatrixLike, target: Numbers = IDENTITY
 ) -> StateTorque:
@@ -212,6 +259,20 @@ def attitude_control(
     return ready_term("attitude_control", torque, stiffness=spring, gain=brake, target=unit)
 
 
+@ready_torque(
+    "Momentum wheels, and motors that change their momentum",
+    r"$-\omega \times h - u$",
+    lambda sizes: {
+        "momentum": [sizes.part * x for x in sizes.vector],
+        "motor": [0.1 * sizes.part * sizes.speed, 0, 0],
+    },
+    note="the motors' torque on the wheels may be a function of (t, omega[, attitude], h); "
+    "$h' = u$",
+    convention="`motor` is the torque on the wheels; the body receives its opposite",
+    leaves=tuple({"motor": each} for each in (None, _THREE, (0.1, 0, 0), (0, 0.1, 0), (0, 0, 0.1))),
+    momentum=vector("Momentum of the wheels at time 0", "N m s", (0.1, 0.3, 0.2), "$h$ at time 0"),
+    motor=law("Torque of the motors on the wheels", "N m", (0.0, 0.002, 0.0), "$u$", frame="body"),
+)
 def wheels(
     momentum: Numbers, motor: TorqueLaw | Numbers | Callable[..., Any] | None = None
 ) -> StateTorque:

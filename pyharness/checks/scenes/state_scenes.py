@@ -5,19 +5,14 @@ End times may be negative.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from random import Random
 from typing import Any
 
 import numpy as np
 
-from pyharness.engine.field_terms import (
-    gravity_gradient,
-    in_space,
-    magnetic_damping,
-    magnetic_dipole,
-)
-from pyharness.engine.table_terms import pulses, table
-from pyharness.engine.terms import attitude_control, damping, drag, rate_control, wheels
+from pyharness.engine.term_file import KINDS
+from pyharness.model.array_type import Array
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.torque_law import TorqueLaw
@@ -30,11 +25,35 @@ TURNING = ("gradient", "field", "spring", "mixed")
 # Terms that change mostly in small ranges of time or omega.
 SUDDEN = ("switch", "friction", "bell", "peak", "burst", "flash", "sigmoid", "swings")
 
-TIMED = ("table", "pulses")  # depend on time alone
-READY = (
-    *("damping", "drag", "rate_control", "attitude_control", "wheels", "gravity_gradient"),
-    *("magnetic_dipole", "magnetic_damping", "in_space", *TIMED),
-)
+READY = tuple(KINDS)
+TIMED = tuple(name for name in READY if not KINDS[name].leaves)  # depend on time alone
+
+
+@dataclass
+class Sizes:
+    """Random numbers from which a ready torque draws its arguments; units from kg m2 and s."""
+
+    source: Random
+    moments: list[float]
+    speed: float
+
+    def __post_init__(self) -> None:
+        source, speed = self.source, self.speed
+        self.part = max(self.moments) * speed * source.uniform(0.05, 1.0)
+        self.vector = [source.uniform(-1.0, 1.0) for _ in range(3)]
+        self.several = [source.uniform(0.1, 0.5) * self.part for _ in range(3)]
+        self.rate = speed * 10.0 ** source.uniform(-1.0, 0.5)
+        waves = [([self.part, 0.0, self.part], self.rate)]
+        self.field = TorqueLaw(self.vector, sines=waves, frame="space")
+
+    def times(self) -> Array:
+        length = 1.0 / self.speed
+        found = [self.source.uniform(0.1, 3.0) * length for _ in range(12)]
+        return np.cumsum(found) - 3.0 * length
+
+    def rows(self, count: int) -> list[list[float]]:
+        size = self.part * self.speed
+        return [[self.source.uniform(-size, size) for _ in range(3)] for _ in range(count)]
 
 
 def draw(source: Random, names: tuple[str, ...] = STEADY + TURNING) -> tuple[Scene, float]:
@@ -85,33 +104,10 @@ def _moving(
 
 def ready(source: Random, name: str, moments: list[float], speed: float) -> StateTorque:
     """Return a ready-made term with random arguments, about as large as the gyroscopic torque."""
-    part = max(moments) * speed * source.uniform(0.05, 1.0)
-    vector = [source.uniform(-1.0, 1.0) for _ in range(3)]
-    several = [source.uniform(0.1, 0.5) * part for _ in range(3)]
-    rate = speed * 10.0 ** source.uniform(-1.0, 0.5)
-    field = TorqueLaw(vector, sines=[([part, 0.0, part], rate)], frame="space")
-    made: dict[str, Callable[[], StateTorque]] = {
-        "damping": lambda: damping(several),
-        "drag": lambda: drag([0.1 * part, 0.2 * part / speed**2]),
-        "rate_control": lambda: rate_control(several, [speed * x for x in vector]),
-        "attitude_control": lambda: attitude_control(part * speed, several, [1.0, *vector]),
-        "wheels": lambda: wheels([part * x for x in vector], [0.1 * part * speed, 0, 0]),
-        "gravity_gradient": lambda: gravity_gradient(moments, rate),
-        "magnetic_dipole": lambda: magnetic_dipole([speed * x for x in vector], field),
-        "magnetic_damping": lambda: magnetic_damping(0.3 * part, vector),
-        "in_space": lambda: in_space([part * speed * x for x in vector]),
-        "table": lambda: _of_time(source, part * speed, 1.0 / speed, 12),
-        "pulses": lambda: _of_time(source, part * speed, 1.0 / speed, 6),
-    }
-    return made[name]()
-
-
-def _of_time(source: Random, size: float, length: float, count: int) -> StateTorque:
-    times = np.cumsum([source.uniform(0.1, 3.0) * length for _ in range(12)]) - 3.0 * length
-    values = [[source.uniform(-size, size) for _ in range(3)] for _ in range(count)]
-    if count == 6:
-        return pulses(times[::2], times[1::2] - times[::2], values)
-    return table(times, values, source.choice(("held", "linear", "cubic")))
+    draw = KINDS[name].draw
+    assert draw is not None
+    found: StateTorque = KINDS[name].function(**draw(Sizes(source, moments, speed)))
+    return found
 
 
 def term(source: Random, name: str, size: float, speed: float) -> Term:

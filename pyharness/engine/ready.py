@@ -1,0 +1,137 @@
+"""Declarations of ready torques and events.
+
+Scene files and their schema, compiled leaves, documents, random scenes, run times and tests are
+made from them.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from inspect import Parameter, signature
+from typing import Any, TypeVar
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+Values = dict[str, Any]  # of arguments, by name
+
+
+@dataclass(frozen=True)
+class Argument:
+    """An argument; documents show its name, symbol, unit and remark."""
+
+    form: dict[str, Any]  # its JSON schema
+    about: str
+    unit: str
+    sample: Any
+    symbol: str = ""
+    remark: str = ""
+    frame: str | None = None  # axes of a vector that may be a law of time
+    is_of_body: bool = False  # whether a scene file's body is the default
+
+
+def _form(name: str) -> Callable[..., Argument]:
+    return partial(Argument, {"$ref": f"#/$defs/{name}"})
+
+
+matrix, vector, law, quaternion = map(_form, ("matrix", "vector", "law", "quaternion"))
+number, flag = (partial(Argument, {"type": name}) for name in ("number", "boolean"))
+
+
+def choice(*values: Any) -> Callable[..., Argument]:
+    return partial(Argument, {"enum": list(values)})
+
+
+def listed(form: dict[str, Any], fewest: int, most: int) -> dict[str, Any]:
+    return {"type": "array", "items": form, "minItems": fewest, "maxItems": most}
+
+
+@dataclass(frozen=True)
+class Ready:
+    """A ready torque or event."""
+
+    function: Callable[..., Any]
+    about: str
+    arguments: dict[str, Argument]
+    formula: str = ""  # in Markdown
+    note: str = ""  # on the formula
+    convention: str = ""
+    # From sizes of a random scene (`Sizes` of checks/scenes/state_scenes.py).
+    draw: Callable[[Any], Values] | None = None
+    # What differs from the sample in each torque whose leaves are built.
+    leaves: tuple[Values, ...] = field(default=({},))
+
+    @property
+    def sample(self) -> Values:
+        return {name: each.sample for name, each in self.arguments.items()}
+
+    @property
+    def defaults(self) -> Values:
+        given = signature(self.function).parameters
+        return {
+            name: given[name].default
+            for name in self.arguments
+            if given[name].default is not Parameter.empty
+        }
+
+    def schema(self) -> dict[str, Any]:
+        """Return the JSON schema of the table in a scene file."""
+        properties: dict[str, Any] = {"kind": {"const": self.function.__name__}}
+        for name, each in self.arguments.items():
+            about = ", ".join(filter(None, (each.about, each.unit, each.remark)))
+            properties[name] = {**each.form, "description": f"{about}."}
+        optional = {*self.defaults, *(x for x, each in self.arguments.items() if each.is_of_body)}
+        return {
+            "type": "object",
+            "description": f"{self.about}.",
+            "properties": properties,
+            "required": [name for name in properties if name not in optional],
+            "additionalProperties": False,
+        }
+
+
+TORQUES: dict[str, Ready] = {}
+EVENTS: dict[str, Ready] = {}
+
+
+def ready_torque(
+    about: str,
+    formula: str,
+    draw: Callable[[Any], Values],
+    *,
+    note: str = "",
+    convention: str = "",
+    leaves: tuple[Values, ...] = ({},),
+    **arguments: Argument,
+) -> Callable[[Function], Function]:
+    """Declare a function as a ready torque, which is a `kind` in scene files."""
+
+    def declare(function: Function) -> Function:
+        of_order = _checked(function, arguments, ())
+        TORQUES[function.__name__] = Ready(
+            function, about, of_order, formula, note, convention, draw, leaves
+        )
+        return function
+
+    return declare
+
+
+def ready_event(about: str, **arguments: Argument) -> Callable[[Function], Function]:
+    """Declare a function as a ready event, which has `terminal` and `direction` too."""
+
+    def declare(function: Function) -> Function:
+        of_order = _checked(function, arguments, ("terminal", "direction"))
+        EVENTS[function.__name__] = Ready(function, about, of_order)
+        return function
+
+    return declare
+
+
+def _checked(
+    function: Callable[..., Any], arguments: dict[str, Argument], common: tuple[str, ...]
+) -> dict[str, Argument]:
+    """Return the arguments in the order of the function's parameters."""
+    parameters = [name for name in signature(function).parameters if name not in common]
+    for name in [*parameters, *arguments]:
+        if name not in arguments or name not in parameters:
+            what = "no declaration" if name in parameters else "no parameter"
+            raise TypeError(f"{function.__name__}: {name} has {what}")
+    return {name: arguments[name] for name in parameters}

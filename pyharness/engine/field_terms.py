@@ -30,8 +30,9 @@ _AXES = "field about the axes of space (T), magnetic moment about the axes of th
     convention=r"the direction from the Earth to the body is $(\cos nt, \sin nt, 0)$ in space, "
     "where n is `rate`",
     inertia=Argument(
-        {}, "Inertia", "kg m2", (1.0, 2.0, 2.5), "moments or matrix, also changing ones",
-        "by default that of the body", is_of_body=True,
+        {}, "Inertia", "kg m2", (1.0, 2.0, 2.5),
+        "moments or matrix, also [changing](changing-inertia.md)", "by default that of the body",
+        is_of_body=True,
     ),
     rate=number("Rate of the orbit", "rad/s", 0.3, "$n$ of the circular orbit"),
 )  # fmt: skip
@@ -216,7 +217,7 @@ def magnetic_damping(gain: Number, field: TorqueLaw | Numbers) -> StateTorque:
     "A torque about the axes of space",
     "$R^T N$",
     lambda sizes: {"torque": [sizes.part * sizes.speed * x for x in sizes.vector]},
-    torque=law("Torque", "N m", (0.05, 0.02, 0.1), "$N$ about the axes of space", frame="space"),
+    torque=law("Torque", "N m", (0.05, 0.02, 0.1), "$N$", frame="space"),
 )
 def in_space(torque: TorqueLaw | Numbers) -> StateTorque:
     """Return the torque R^T N, where N has components about the axes of space.

@@ -28,12 +28,13 @@ class Argument:
     is_of_body: bool = False  # whether a scene file's body is the default
 
 
-def _form(name: str) -> Callable[..., Argument]:
-    return partial(Argument, {"$ref": f"#/$defs/{name}"})
-
-
-matrix, vector, law, quaternion = map(_form, ("matrix", "vector", "law", "quaternion"))
-number, flag = (partial(Argument, {"type": name}) for name in ("number", "boolean"))
+MATRIX, VECTOR, LAW, QUATERNION = (
+    {"$ref": f"#/$defs/{name}"} for name in ("matrix", "vector", "law", "quaternion")
+)
+NUMBER, FLAG = {"type": "number"}, {"type": "boolean"}
+matrix, vector, law, quaternion, number, flag = (
+    partial(Argument, form) for form in (MATRIX, VECTOR, LAW, QUATERNION, NUMBER, FLAG)
+)
 
 
 def choice(*values: Any) -> Callable[..., Argument]:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from pyharness.engine.event_functions import Event
+from pyharness.engine.ready import EVENTS as EVENTS
 from pyharness.engine.ready import choice, number, ready_event, vector
 from pyharness.model.errors import InputError
 from pyharness.model.values import Number, Numbers, finite, integer, three

@@ -3,8 +3,8 @@
 from dataclasses import replace
 from typing import Any
 
-from pyharness.engine import field_terms, table_terms, terms
-from pyharness.engine.ready import TORQUES, Argument, Ready
+from pyharness.engine import field_terms, table_terms, terms, wheel_terms
+from pyharness.engine.ready import FLAG, TORQUES, Argument, Ready
 from pyharness.engine.term_input import inertia_of
 from pyharness.model.changing import Changing
 from pyharness.model.errors import InputError, kind_of, unknown
@@ -13,7 +13,7 @@ from pyharness.model.state_torque import StateTorque
 from pyharness.model.values import boolean
 
 # In this order, whichever module was imported first.
-_MODULES = (terms, field_terms, table_terms)
+_MODULES = (terms, wheel_terms, field_terms, table_terms)
 KINDS: dict[str, Ready] = {
     name: each
     for module in _MODULES
@@ -73,7 +73,7 @@ def _term(table: object, where: str, body: dict[str, Any]) -> StateTorque:
 
 def _argument(where: str, value: object, argument: Argument) -> object:
     """Return a term's argument; a table becomes a law if the argument may be one."""
-    if argument.form == {"type": "boolean"}:
+    if argument.form == FLAG:
         return boolean(where, value)
     if argument.frame is None:
         return value

@@ -1,30 +1,23 @@
-"""Torque terms for damping, control and wheels, with components about the body axes."""
+"""Torque terms for damping and control, with components about the body axes."""
 
-from collections.abc import Callable, Iterable
-from dataclasses import replace
+from collections.abc import Iterable
 from itertools import islice
 from typing import Any
 
 import numpy as np
 
-from pyharness.engine.ready import Argument, flag, law, matrix, quaternion, ready_torque, vector
-from pyharness.engine.term_input import law_of_vector, matrix_of, ready_term
-from pyharness.model.arguments import count_inputs
-from pyharness.model.array_type import Array
+from pyharness.engine.ready import MATRIX, Argument, flag, matrix, quaternion, ready_torque, vector
+from pyharness.engine.term_input import matrix_of, ready_term
 from pyharness.model.attitude import IDENTITY, product, unit_quaternion
 from pyharness.model.errors import InputError
-from pyharness.model.numpy_protocol import symbol_array
-from pyharness.model.own_states import OwnState
-from pyharness.model.state_torque import StateTorque, recorded
-from pyharness.model.torque_law import TorqueLaw, law_integral, law_value
+from pyharness.model.state_torque import StateTorque
 from pyharness.model.values import Number, Numbers, boolean, number_list, three
 
-__all__ = ["attitude_control", "damping", "drag", "rate_control", "wheels"]
+__all__ = ["attitude_control", "damping", "drag", "rate_control"]
 # A number stands for a multiple of the identity matrix, three numbers for a diagonal matrix.
 MatrixLike = Number | Numbers | Iterable[Numbers]
 _MOST_COEFFICIENTS = 50
 _BRAKES = "positive coefficients brake the rotation"
-_THREE = (0.1, 0.2, 0.3)
 
 
 @ready_torque(
@@ -77,8 +70,8 @@ def damping(matrix: MatrixLike) -> StateTorque:
     convention=_BRAKES,
     leaves=tuple({"coefficients": each} for each in ([0.1], [0.0, 0.1], [0.1, 0.2])),
     coefficients=Argument(
-        {"type": "array", "items": {"$ref": "#/$defs/matrix"}}, "C_n from n = 0",
-        "N m (s/rad)^(2n+1)", [0.0, 0.1], "list of $C_n$ from n = 0",
+        {"type": "array", "items": MATRIX}, "C_n from n = 0",
+        "N m (s/rad)^(2n+1)", [0.0, 0.1], "$C_n$ from n = 0",
     ),
     per_axis=flag(
         "Powers of each component of omega instead", "", False,
@@ -202,7 +195,7 @@ def rate_control(gain: MatrixLike, target: Numbers = (0.0, 0.0, 0.0)) -> StateTo
     convention="the target is a quaternion from body to space, scalar first",
     stiffness=matrix("Stiffness", "N m", 0.5, "$k$"),
     gain=matrix("Gain of the rate", "N m s", 0.2, "$K$"),
-    target=quaternion("Target attitude", "", IDENTITY, "quaternion"),
+    target=quaternion("Target attitude", "", IDENTITY),
 )  # fmt: skip
 def attitude_control(
     stiffness: MatrixLike, gain: MatrixLike, target: Numbers = IDENTITY
@@ -257,85 +250,3 @@ def attitude_control(
         return -2.0 * (spring @ half_sine) - brake @ omega
 
     return ready_term("attitude_control", torque, stiffness=spring, gain=brake, target=unit)
-
-
-@ready_torque(
-    "Momentum wheels, and motors that change their momentum",
-    r"$-\omega \times h - u$",
-    lambda sizes: {
-        "momentum": [sizes.part * x for x in sizes.vector],
-        "motor": [0.1 * sizes.part * sizes.speed, 0, 0],
-    },
-    note="the motors' torque on the wheels may be a function of (t, omega[, attitude], h); "
-    "$h' = u$",
-    convention="`motor` is the torque on the wheels; the body receives its opposite",
-    leaves=tuple({"motor": each} for each in (None, _THREE, (0.1, 0, 0), (0, 0.1, 0), (0, 0, 0.1))),
-    momentum=vector("Momentum of the wheels at time 0", "N m s", (0.1, 0.3, 0.2), "$h$ at time 0"),
-    motor=law("Torque of the motors on the wheels", "N m", (0.0, 0.002, 0.0), "$u$", frame="body"),
-)
-def wheels(
-    momentum: Numbers, motor: TorqueLaw | Numbers | Callable[..., Any] | None = None
-) -> StateTorque:
-    """Return the torque -omega x h - u that wheels with the angular momentum h exert on their body.
-
-    u is h', the rate of h. Without motors, h is constant.
-
-    If h is the absolute angular momentum of the wheels about their axes, u is the motors' torque,
-    and the inertia of the body must exclude the moments of the wheels about these axes. If h is
-    relative to the body, the inertia must include these moments, and the motors' torque is u plus
-    the moments times omega'.
-
-    Parameters
-    ----------
-    momentum : three numbers
-        The angular momentum h at time 0, about the body axes (N m s).
-    motor : TorqueLaw, three numbers, or function of (t, omega[, attitude], h), optional
-        The torque u (N m), about the body axes. If it is a function, h is an unknown: a scene with
-        this torque gets the states ``wheel1`` to ``wheel3`` (N m s), unless it defines them.
-
-    Returns
-    -------
-    StateTorque
-        The torque about the body axes (N m).
-
-    Raises
-    ------
-    InputError
-        If an argument has another form, a number is not finite, or `motor` is about the axes of
-        space.
-
-    References
-    ----------
-    P. C. Hughes, Spacecraft Attitude Dynamics, 1986, chapters 3 and 6.
-
-    Examples
-    --------
-    >>> from pyharness.torques import wheels
-    >>> wheels((1.0, 0.0, 2.0)).at(0.0, (1.0, 3.0, 0.0), (1.0, 0.0, 0.0, 0.0))
-    (-6.0, 2.0, 3.0)
-    """
-    start = np.array(three("[torque] wheels momentum", momentum))
-    if callable(motor):
-        return _wheels_under_a_law(start, motor)
-    law = TorqueLaw() if motor is None else law_of_vector("[torque] wheels motor", motor, "body")
-
-    def torque(time: Any, omega: Any, attitude: Any) -> Any:
-        stored = start + law_integral(law, time)
-        return np.cross(stored, omega) - law_value(law, time)
-
-    motors = {} if motor is None else {"motor": law}
-    return ready_term("wheels", torque, momentum=start, **motors)
-
-
-def _wheels_under_a_law(start: Array, motor: Callable[..., Any]) -> StateTorque:
-    names = [f"wheel{axis}" for axis in (1, 2, 3)]
-    allowed = "allowed: a function of (t, omega, h) or (t, omega, attitude, h)"
-    takes_attitude = count_inputs(motor, "[torque] wheels motor", allowed, 3, 4) == 4
-
-    def law(t: Any, omega: Any, attitude: Any, states: Any) -> Any:
-        h = symbol_array([states[name] for name in names])
-        push = np.asarray(motor(t, omega, *([attitude] if takes_attitude else []), h), dtype=object)
-        return -np.cross(omega, h) - push, dict(zip(names, np.broadcast_to(push, 3), strict=True))
-
-    torque = recorded(law, names)
-    return replace(torque, starts=tuple(map(OwnState, names, start.tolist())))

@@ -31,10 +31,10 @@ def pages() -> list[tuple[str, str]]:
         ("docs/how-to/results.md", "function | event | arguments", _functions(EVENTS)),
         ("docs/reference/conventions.md", "torque | convention", _conventions()),
     ):
-        found = re.compile(rf"^\| {re.escape(head)} \|\n(?:\|.*\n)+", re.MULTILINE)
-        text, count = found.subn(lambda _, x=(head, rows): table(*x), (ROOT / page).read_text())
-        assert count == 1, f"{page}: no table {head}"
-        made[page] = text
+        old = rf"^\| {re.escape(head)} \|\n(?:\|.*\n)+"
+        parts = re.split(old, (ROOT / page).read_text(), flags=re.MULTILINE)
+        assert len(parts) == 2, f"{page}: no table {head}"
+        made[page] = table(head, rows).join(parts)
     return list(made.items())
 
 

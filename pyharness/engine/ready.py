@@ -132,7 +132,8 @@ def _checked(
     """Return the arguments in the order of the function's parameters."""
     parameters = [name for name in signature(function).parameters if name not in common]
     for name in [*parameters, *arguments]:
-        if name not in arguments or name not in parameters:
-            what = "no declaration" if name in parameters else "no parameter"
-            raise TypeError(f"{function.__name__}: {name} has {what}")
+        if name not in arguments:
+            raise TypeError(f"{function.__name__}: {name} is a parameter, but not declared")
+        if name not in parameters:
+            raise TypeError(f"{function.__name__}: {name} is declared, but no parameter")
     return {name: arguments[name] for name in parameters}

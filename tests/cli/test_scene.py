@@ -76,7 +76,7 @@ def test_the_schema_has_the_keys_of_the_reader() -> None:
     assert {each["properties"]["kind"]["const"] for each in kinds} == KINDS.keys(), mend
     for each in kinds:
         name = each["properties"]["kind"]["const"]
-        parameters = signature(KINDS[name]).parameters
+        parameters = signature(KINDS[name].function).parameters
         assert each["properties"].keys() == {"kind", *parameters}, f"{name}: {mend}"
         required = {key for key, own in parameters.items() if own.default is Parameter.empty} - (
             {"inertia"} if "inertia" in parameters else set()

@@ -1,30 +1,25 @@
-"""Each torque term equals an independent formula, about the axes of the body."""
+"""Each ready torque equals an independent formula, in every form of its arguments."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 from numpydoc.validate import validate
+from scipy.interpolate import KroghInterpolator
 from scipy.spatial.transform import Rotation
 
-from pyharness import Scene, StateTorque, TorqueLaw, principal, torques
+from pyharness import Scene, StateTorque, TorqueLaw, events, principal, torques
+from pyharness.engine.ready import LAW as LAW_FORM
+from pyharness.engine.ready import MATRIX, QUATERNION, VECTOR, Argument
 from pyharness.engine.recorded import slopes_of
+from pyharness.engine.term_file import KINDS
 from pyharness.model.scene_file import scene_text
 from pyharness.model.trajectory import Array
-from pyharness.torques import (
-    attitude_control,
-    damping,
-    drag,
-    gravity_gradient,
-    in_space,
-    magnetic_damping,
-    magnetic_dipole,
-    rate_control,
-    wheels,
-)
+from pyharness.torques import damping, gravity_gradient, wheels
 
-Formula = Callable[[float, Array, Array], Array]  # of time, omega and the matrix R
+Formula = Callable[..., Array]  # of time, omega, the matrix R, and arguments by name
 SOURCE = np.random.default_rng(60)
 D = SOURCE.normal(size=(3, 3))
 K = SOURCE.normal(size=(3, 3))
@@ -42,19 +37,28 @@ LAW_IN_SPACE = TorqueLaw(C0, RATE, **WAVES, frame="space")
 ORBIT = 1.3
 
 
-def vector(t: float) -> Array:
-    """Return the value of LAW."""
-    found: Array = C0 + RATE * t + S1 * np.sin(1.5 * t) + S2 * np.sin(0.7 * t)
-    found += C1 * np.cos(2.0 * t) + C2
+def vector(t: float, law: Any = LAW) -> Array:
+    """Return the value of a law, or of three numbers."""
+    if not isinstance(law, TorqueLaw):
+        return np.array([0.0] * 3 if law is None else law)
+    waves = [np.multiply(a, np.sin(f * t)) for a, f in law.sines]
+    waves += [np.multiply(a, np.cos(f * t)) for a, f in law.cosines]
+    found: Array = np.array(law.constant) + np.multiply(law.rate, t) + sum(waves, np.zeros(3))
     return found
 
 
-def momentum(t: float) -> Array:
-    """Return H plus the integral of LAW from 0 to t, by quadrature."""
+def stored(t: float, start: Any = H, law: Any = LAW) -> Array:
+    """Return `start` plus the integral of a law from 0 to t, by quadrature."""
     nodes, weights = np.polynomial.legendre.leggauss(40)
-    values = np.array([vector(t * (1.0 + x) / 2.0) for x in nodes])
-    found: Array = H + t / 2.0 * (weights @ values)
+    values = np.array([vector(t * (1.0 + x) / 2.0, law) for x in nodes])
+    found: Array = start + t / 2.0 * (weights @ values)
     return found
+
+
+def full(value: Any) -> Array:
+    """Return a matrix that is specified by a number, its diagonal, or its rows."""
+    found: Array = np.array(value, dtype=float)
+    return found if found.ndim == 2 else found * np.eye(3)
 
 
 def matrix(quaternion: Any) -> Array:
@@ -63,70 +67,131 @@ def matrix(quaternion: Any) -> Array:
     return found
 
 
-def control(t: float, omega: Array, r: Array) -> Array:
-    """Return the attitude control with the matrices D and K, from the error as a matrix."""
-    error = matrix(TARGET).T @ r
+def control(t: float, omega: Array, r: Array, stiffness: Any, gain: Any, target: Any) -> Array:
+    """Return the attitude control, from the error as a matrix."""
+    error = matrix(target).T @ r
     # The vector 2 e0 e is the axis times the sine of the angle: the antisymmetric part.
     sine = 0.5 * np.array(
         [error[2, 1] - error[1, 2], error[0, 2] - error[2, 0], error[1, 0] - error[0, 1]]
     )
-    return -D @ sine - K @ omega
+    return -full(stiffness) @ sine - full(gain) @ omega
 
 
-def gradient(inertia: Array) -> Formula:
-    def torque(t: float, omega: Array, r: Array) -> Array:
-        up = r.T @ [np.cos(ORBIT * t), np.sin(ORBIT * t), 0.0]
-        return 3.0 * ORBIT**2 * np.cross(up, inertia @ up)
+def power_of_speed(
+    t: float, omega: Array, r: Array, coefficients: Any, per_axis: bool = False
+) -> Array:
+    sizes = omega if per_axis else np.linalg.norm(omega)
+    terms = [full(c) @ (sizes ** (2 * n) * omega) for n, c in enumerate(coefficients)]
+    return np.array(-np.sum(terms, axis=0))
 
-    return torque
+
+def gradient(t: float, omega: Array, r: Array, inertia: Any, rate: float) -> Array:
+    up = r.T @ [np.cos(rate * t), np.sin(rate * t), 0.0]
+    return 3.0 * rate**2 * np.cross(up, full(inertia) @ up)
 
 
-def coils(t: float, omega: Array, r: Array) -> Array:
-    """Return the torque of the coils, with the rate of the field by a difference quotient."""
+def coils(t: float, omega: Array, r: Array, gain: float, field: Any) -> Array:
+    """Return the torque of the coils, with the rate of a law by a difference quotient."""
+    if not isinstance(field, TorqueLaw):
+        b = r.T @ field
+        return np.array(-gain * (b @ b * omega - (omega @ b) * b))
     step = 1e-5
 
-    def field(dt: float) -> Array:
+    def about_body(dt: float) -> Array:
         turn = Rotation.from_rotvec(omega * dt).as_matrix()
-        found: Array = (r @ turn).T @ vector(t + dt)
+        found: Array = (r @ turn).T @ vector(t + dt, field)
         return found
 
-    rate = (field(step) - field(-step)) / (2.0 * step)
-    return np.cross(-0.8 * rate, field(0.0))
+    rate = (about_body(step) - about_body(-step)) / (2.0 * step)
+    return np.cross(-gain * rate, about_body(0.0))
+
+
+def interpolated(
+    t: float, omega: Array, r: Array, times: Any, values: Any, interpolation: str = "linear"
+) -> Array:
+    t = np.clip(t, times[0], times[-1])
+    if interpolation == "held":
+        return np.array(values[np.searchsorted(times, t, "right") - 1])
+    if interpolation == "linear":
+        return np.array([np.interp(t, times, column) for column in np.transpose(values)])
+    # With four times at most, the spline is one polynomial.
+    assert len(times) <= 4
+    return np.array(KroghInterpolator(times, values)(t))
+
+
+def within_pulses(
+    t: float, omega: Array, r: Array, starts: Any, durations: Any, torque: Any
+) -> Array:
+    acting = (np.array(starts) <= t) & (t < np.add(starts, durations))
+    return np.array(acting @ np.broadcast_to(torque, (len(starts), 3)))
+
+
+def spinning(t: float, omega: Array, r: Array, momentum: Any, motor: Any = None) -> Array:
+    return -np.cross(omega, stored(t, momentum, motor)) - vector(t, motor)
+
+
+FORMULAS: dict[str, Formula] = {
+    "damping": lambda t, w, r, matrix: -full(matrix) @ w,
+    "drag": power_of_speed,
+    "rate_control": lambda t, w, r, gain, target=(0, 0, 0): -full(gain) @ (w - target),
+    "attitude_control": lambda t, w, r, stiffness, gain, target=(1, 0, 0, 0): control(
+        t, w, r, stiffness, gain, target
+    ),
+    "wheels": spinning,
+    "gravity_gradient": gradient,
+    "magnetic_dipole": lambda t, w, r, moment, field: np.cross(moment, r.T @ vector(t, field)),
+    "magnetic_damping": coils,
+    "in_space": lambda t, w, r, torque: r.T @ vector(t, torque),
+    "table": interpolated,
+    "pulses": within_pulses,
+}
+
+
+def forms(argument: Argument, form: Any) -> list[Any]:
+    """Return values of an argument's form."""
+    if "enum" in form:
+        return list(form["enum"])
+    if "anyOf" in form:
+        return [value for each in form["anyOf"] for value in forms(argument, each)]
+    if form.get("items") == MATRIX:
+        return [forms(argument, MATRIX)]
+    if form.get("items") == VECTOR and argument.form != form:
+        return [[V.tolist(), M.tolist()]]
+    if argument.is_of_body:
+        return [MOMENTS, INERTIA.tolist()]
+    found: dict[str, list[Any]] = {
+        str(VECTOR): [V.tolist()],
+        str(MATRIX): [0.3, V.tolist(), D.tolist()],
+        str(LAW_FORM): [V.tolist(), LAW_IN_SPACE if argument.frame == "space" else LAW],
+        str(QUATERNION): [TARGET],
+        "boolean": [True],
+    }
+    return found.get(form.get("type", str(form)), [])
+
+
+def samples() -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield names of ready torques with arguments in all forms, and without the optional ones."""
+    for name, ready in KINDS.items():
+        yield name, ready.sample
+        yield name, {key: x for key, x in ready.sample.items() if key not in ready.defaults}
+        for key, argument in ready.arguments.items():
+            for value in forms(argument, argument.form):
+                yield name, ready.sample | {key: value}
 
 
 CASES: dict[str, tuple[StateTorque, Formula]] = {
-    "damping": (damping(D), lambda t, w, r: -D @ w),
-    "damping by a number": (damping(0.3), lambda t, w, r: -0.3 * w),
-    "damping by axes": (damping(V), lambda t, w, r: -V * w),
-    "drag": (drag([0.2, D, V]), lambda t, w, r: -0.2 * w - D @ w * (w @ w) - V * w * (w @ w) ** 2),
-    "cubic drag": (drag([0, 2]), lambda t, w, r: -2.0 * np.linalg.norm(w) ** 2 * w),
-    "drag by axes": (
-        drag([0.2, D, V], per_axis=True),
-        lambda t, w, r: -0.2 * w - D @ w**3 - V * w**5,
-    ),
-    "rate control": (rate_control(K, V), lambda t, w, r: -K @ (w - V)),
-    "attitude control": (attitude_control(D, K, TARGET), control),
-    "wheels": (wheels(H), lambda t, w, r: -np.cross(w, H)),
-    "wheels with motors": (wheels(H, LAW), lambda t, w, r: -np.cross(w, momentum(t)) - vector(t)),
-    "wheels with a constant motor": (wheels(H, V), lambda t, w, r: -np.cross(w, H + t * V) - V),
-    "gravity gradient, moments": (gravity_gradient(MOMENTS, ORBIT), gradient(np.diag(MOMENTS))),
-    "gravity gradient, matrix": (gravity_gradient(INERTIA, ORBIT), gradient(INERTIA)),
-    "dipole": (magnetic_dipole(M, V), lambda t, w, r: np.cross(M, r.T @ V)),
-    "dipole in a field of time": (
-        magnetic_dipole(M, LAW_IN_SPACE),
-        lambda t, w, r: np.cross(M, r.T @ vector(t)),
-    ),
-    "coils": (magnetic_damping(0.8, LAW_IN_SPACE), coils),
-    "coils in a constant field": (
-        magnetic_damping(0.8, V),
-        lambda t, w, r: -0.8 * (V @ V * w - (w @ (r.T @ V)) * (r.T @ V)),
-    ),
-    "in space": (in_space(LAW_IN_SPACE), lambda t, w, r: r.T @ vector(t)),
-    "constant in space": (in_space(V), lambda t, w, r: r.T @ V),
+    f"{name} {number}": (KINDS[name].function(**given), partial(FORMULAS[name], **given))
+    for number, (name, given) in enumerate(samples())
 }
-# A difference quotient is less accurate than the other formulas.
-LIMITS = {"coils": 1e-8}
-IN_BODY = ("damping", "drag", "rate control", "wheels")
+
+
+def limit(formula: Any) -> float:
+    """Return the error of a formula; a difference quotient is less accurate than others."""
+    return (
+        1e-8
+        if formula.func is coils and isinstance(formula.keywords["field"], TorqueLaw)
+        else 1e-13
+    )
 
 
 def states(count: int) -> list[tuple[float, Any, Any]]:
@@ -142,11 +207,12 @@ def test_a_term_equals_its_formula(name: str) -> None:
     torque, formula = CASES[name]
     for t, omega, attitude in states(20):
         wanted = formula(t, omega, matrix(attitude))
-        limit = LIMITS.get(name, 1e-13) * (1.0 + np.abs(wanted).max())
-        assert np.abs(torque.at(t, omega, attitude) - wanted).max() < limit
+        error = np.abs(torque.at(t, omega, attitude) - wanted).max()
+        assert error < limit(formula) * (1.0 + np.abs(wanted).max())
         # The negative of a quaternion is the same attitude.
         assert torque.at(t, omega, -attitude) == torque.at(t, omega, attitude)
-    assert torque.needs_attitude is not any(each in name for each in IN_BODY)
+        turns = np.abs(formula(t, omega, matrix(attitude[::-1])) - wanted).max() > 0.0
+        assert torque.needs_attitude == turns
 
 
 def test_the_file_of_wheels_has_the_motor_that_was_given() -> None:
@@ -210,7 +276,12 @@ def test_the_components_are_about_the_axes_of_the_body_not_the_principal_ones() 
 # The documentation.
 
 
-@pytest.mark.parametrize("name", [n for n in torques.__all__ if n != "opaque"])
+@pytest.mark.parametrize(
+    "name",
+    [f"torques.{n}" for n in torques.__all__ if n != "opaque"]
+    + [f"events.{n}" for n in events.__all__ if n != "Event"],
+)
 def test_docstrings_are_complete(name: str) -> None:
-    errors = validate(f"pyharness.torques.{name}")["errors"]
-    assert [each for each in errors if each[0] not in ("SA01", "SA04")] == []
+    errors = validate(f"pyharness.{name}")["errors"]
+    allowed = ("SA01", "SA04") + ("ES01",) * name.startswith("events.")
+    assert [each for each in errors if each[0] not in allowed] == []

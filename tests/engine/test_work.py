@@ -8,21 +8,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pyharness import Scene, TorqueLaw, opaque, solve
+from pyharness.engine.term_file import KINDS
 from pyharness.model.trajectory import Array
-from pyharness.torques import (
-    attitude_control,
-    damping,
-    drag,
-    gravity_gradient,
-    in_space,
-    magnetic_damping,
-    magnetic_dipole,
-    pulses,
-    rate_control,
-    table,
-    wheels,
-)
-from tests.engine.test_terms import INERTIA, LAW, LAW_IN_SPACE, TARGET, H, M, V, matrix, momentum
+from pyharness.torques import damping, gravity_gradient, wheels
+from tests.engine.test_terms import INERTIA, LAW, H, matrix, stored
 
 MOMENTS = (3.0, 4.0, 5.0)
 OMEGA = (0.3, -0.5, 0.8)
@@ -44,17 +33,8 @@ def switched(t: float, omega: Array) -> list[float]:
 TORQUES: dict[str, Any] = {
     "law": GENTLE,
     "law in space": TorqueLaw(GENTLE.constant, GENTLE.rate, GENTLE.sines, frame="space"),
-    "damping": damping(0.3),
-    "drag": drag([0.1, 0.2]),
-    "rate control": rate_control(0.5, (0.1, 0.2, 0.3)),
-    "attitude control": attitude_control(0.8, 0.2, TARGET),
-    "wheels": wheels(0.3 * H, GENTLE),
-    "gravity gradient": gravity_gradient(INERTIA, 0.7),
-    "dipole": magnetic_dipole(M, LAW_IN_SPACE),
-    "coils": magnetic_damping(0.2, V),
-    "in space": in_space(V),
-    "table": table([-1.0, 0.5, 1.0], [(0.1, 0.2, 0.3), (0.5, -0.2, 0.1), (0.0, 0.3, 0.2)]),
-    "pulses": pulses([-1.0, 0.5], [0.3, 0.2], (0.5, -1.0, 0.7)),
+    **{name: each.function(**each.sample) for name, each in KINDS.items()},
+    "wheels under a law": wheels(0.3 * H, GENTLE),
     "sum": gravity_gradient(INERTIA, 0.7) + damping(0.1) + GENTLE,
     "function": written,
     "opaque": opaque(switched),
@@ -122,7 +102,7 @@ def test_work_is_the_integral_of_the_power(name: str, full: bool) -> None:
     assert np.abs(work).max() > 1e-3
     energy = found.energy()
     assert work == pytest.approx(energy - energy[2], abs=1e-14)
-    if name in ("damping", "drag", "coils"):
+    if name in ("damping", "drag", "magnetic_damping"):
         assert (power < 0.0).all()
         assert (np.diff(work) < 0.0).all()
 
@@ -156,8 +136,8 @@ def test_momentum_of_body_and_wheels_is_constant_in_space(
 ) -> None:
     scene = scene_with(wheels(H, motor), full)
     found: Any = solve(scene, TIMES, attitude=True)
-    stored = [H if motor is None else momentum(t) for t in TIMES]
-    wheel = [matrix(q) @ h for q, h in zip(found.attitude, stored, strict=True)]
+    momenta = [H if motor is None else stored(t) for t in TIMES]
+    wheel = [matrix(q) @ h for q, h in zip(found.attitude, momenta, strict=True)]
     total = found.angular_momentum("space") + np.array(wheel)
     assert np.abs(found.angular_momentum("space") - total).max() > 0.5
     assert total == pytest.approx(np.tile(total[2], (len(TIMES), 1)), abs=2e-11)

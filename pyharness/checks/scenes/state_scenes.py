@@ -26,7 +26,7 @@ TURNING = ("gradient", "field", "spring", "mixed")
 SUDDEN = ("switch", "friction", "bell", "peak", "burst", "flash", "sigmoid", "swings")
 
 READY = tuple(KINDS)
-TIMED = tuple(name for name in READY if not KINDS[name].leaves)  # depend on time alone
+TIMED = ("table", "pulses")  # depend on time alone
 
 
 @dataclass

@@ -138,4 +138,4 @@ def _default(ready: Ready, key: str) -> str:
     value: Any = ready.defaults[key]
     if value is None or (isinstance(value, tuple) and not any(value)):
         value = 0
-    return f"by default {json.dumps(value).replace('.0', '')}"
+    return "by default " + re.sub(r"\.0\b", "", json.dumps(value))

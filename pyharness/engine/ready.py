@@ -5,7 +5,7 @@ made from them.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from inspect import Parameter, signature
 from typing import Any, TypeVar
@@ -25,7 +25,7 @@ class Argument:
     symbol: str = ""
     remark: str = ""
     frame: str | None = None  # axes of a vector that may be a law of time
-    is_of_body: bool = False  # whether a scene file's body is the default
+    is_of_body: bool = False  # whether the inertia of a scene file's body is the default
 
 
 MATRIX, VECTOR, LAW, QUATERNION = (
@@ -58,7 +58,7 @@ class Ready:
     # From sizes of a random scene (`Sizes` of checks/scenes/state_scenes.py).
     draw: Callable[[Any], Values] | None = None
     # What differs from the sample in each torque whose leaves are built.
-    leaves: tuple[Values, ...] = field(default=({},))
+    leaves: tuple[Values, ...] = ({},)
 
     @property
     def sample(self) -> Values:
@@ -104,36 +104,30 @@ def ready_torque(
     **arguments: Argument,
 ) -> Callable[[Function], Function]:
     """Declare a function as a ready torque, which is a `kind` in scene files."""
-
-    def declare(function: Function) -> Function:
-        of_order = _checked(function, arguments, ())
-        TORQUES[function.__name__] = Ready(
-            function, about, of_order, formula, note, convention, draw, leaves
-        )
-        return function
-
-    return declare
+    return _declared(
+        TORQUES, (), arguments, about=about, formula=formula, draw=draw, note=note,
+        convention=convention, leaves=leaves,
+    )  # fmt: skip
 
 
 def ready_event(about: str, **arguments: Argument) -> Callable[[Function], Function]:
     """Declare a function as a ready event, which has `terminal` and `direction` too."""
+    return _declared(EVENTS, ("terminal", "direction"), arguments, about=about)
 
+
+def _declared(
+    ready: dict[str, Ready], common: tuple[str, ...], arguments: dict[str, Argument], **more: Any
+) -> Callable[[Function], Function]:
     def declare(function: Function) -> Function:
-        of_order = _checked(function, arguments, ("terminal", "direction"))
-        EVENTS[function.__name__] = Ready(function, about, of_order)
+        name = function.__name__
+        parameters = [each for each in signature(function).parameters if each not in common]
+        for each in [*parameters, *arguments]:
+            if each not in arguments:
+                raise TypeError(f"{name}: {each} is a parameter, but not declared")
+            if each not in parameters:
+                raise TypeError(f"{name}: {each} is declared, but no parameter")
+        ordered = {each: arguments[each] for each in parameters}
+        ready[name] = Ready(function, arguments=ordered, **more)
         return function
 
     return declare
-
-
-def _checked(
-    function: Callable[..., Any], arguments: dict[str, Argument], common: tuple[str, ...]
-) -> dict[str, Argument]:
-    """Return the arguments in the order of the function's parameters."""
-    parameters = [name for name in signature(function).parameters if name not in common]
-    for name in [*parameters, *arguments]:
-        if name not in arguments:
-            raise TypeError(f"{function.__name__}: {name} is a parameter, but not declared")
-        if name not in parameters:
-            raise TypeError(f"{function.__name__}: {name} is declared, but no parameter")
-    return {name: arguments[name] for name in parameters}

@@ -13,7 +13,7 @@ from jsonschema import Draft202012Validator
 from scipy.optimize import brentq
 
 from pyharness import Scene, events, solve
-from pyharness.engine.ready import TORQUES, Ready, number, ready_event, ready_torque
+from pyharness.engine.ready import LAW, TORQUES, Ready, number, ready_event, ready_torque
 from pyharness.engine.ready_events import EVENTS
 from pyharness.engine.term_file import KINDS
 from pyharness.model.facts import facts_folder
@@ -82,6 +82,8 @@ def test_samples_and_formulas_are_there(ready: Ready) -> None:
     validator = Draft202012Validator({**ready.schema(), "$defs": file["$defs"]})
     given = json.loads(json.dumps({key: written(x) for key, x in ready.sample.items()}))
     assert [each.message for each in validator.iter_errors({"kind": name, **given})] == []
+    for each in ready.arguments.values():
+        assert (each.form == LAW) == (each.frame is not None)
     assert ready.about[0].isupper()
     assert not ready.about.endswith(".")
 

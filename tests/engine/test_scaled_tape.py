@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from pyharness import ChangingMoments, Scene, TorqueLaw, opaque, prepare, solve, solve_many, torques
+from pyharness.engine import term_file
 from pyharness.engine.rescaled import rescaling_factor, scaled_tape
 from pyharness.model.codes import Statuses
 from pyharness.model.constant_body import with_constant_body
@@ -36,15 +37,10 @@ def tapes() -> dict[str, Tape]:
     """Return recorded torques with every operation of a tape."""
     found = {"expressions": tape_of(parsed(EVERY, {}))}
     waves = TorqueLaw((0.1, 0.2, 0.3), sines=[((0.3, 0.1, 0.2), 0.7)], frame="space")
-    ready = {
-        "drag": torques.drag([0.1, (0.2, 0.3, 0.1)], per_axis=True),
-        "rate control": torques.rate_control(0.3, (0.1, 0.2, 0.3)),
-        "attitude control": torques.attitude_control(0.2, 0.1, (0.5, 0.5, 0.5, 0.5)),
-        "gravity gradient": torques.gravity_gradient(MOMENTS, 0.3),
-        "dipole": torques.magnetic_dipole((0.1, 0.2, 0.3), waves),
-        "magnetic damping": torques.magnetic_damping(0.3, waves),
-        "sum": torques.in_space(waves) + torques.pulses([1.0], [0.5], (0.1, 0.2, 0.3)),
-    }
+    ready = {name: each.function(**each.sample) for name, each in term_file.KINDS.items()}
+    ready["drag by axes"] = torques.drag([0.1, (0.2, 0.3, 0.1)], per_axis=True)
+    ready["coils"] = torques.magnetic_damping(0.3, waves)
+    ready["sum"] = torques.in_space(waves) + torques.pulses([1.0], [0.5], (0.1, 0.2, 0.3))
     found |= {name: tape_of(torque) for name, torque in ready.items()}
     moments = ChangingMoments([[3.0, 0.1, -0.01], [2.0], [1.5, 0.0, 0.0, 0.001]])
     changing = Scene("changing", OMEGA, moments=moments, torque=torques.damping(0.2))

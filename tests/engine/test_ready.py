@@ -201,7 +201,7 @@ print(json.dumps({
     "refused": refused,
     "event": len(solve(scene, 5.0, events=events.spin(0.7)).t_events[0]),
     "bench": [each.scene.name for each in term_scenes()],
-    "drawn": ["stirring" in READY, ready(Random(1), "stirring", [1.0, 2.0, 2.5], 1.0).terms],
+    "drawn": [READY, ready(Random(1), "stirring", [1.0, 2.0, 2.5], 1.0).terms],
     "pages": dict(pages()),
     "keys": keys,
 }))
@@ -226,7 +226,7 @@ def test_an_added_torque_is_everywhere(added: dict[str, Any]) -> None:
     assert 'kind = "stirring"\nstrength = 0.5\n' in added["text"]
     assert added["refused"] == "[[torque.terms]] 1, stirring: strength is missing; keys: strength"
     assert "stirring" in added["bench"]
-    assert added["drawn"][0]
+    assert sorted(added["drawn"][0]) == sorted([*KINDS, "stirring"])
     assert added["drawn"][1][0][0] == ["kind", "stirring"]
     schema = json.loads(added["pages"]["pyharness/data/scene.schema.json"])
     kinds = schema["properties"]["torque"]["properties"]["terms"]["items"]["oneOf"]

@@ -12,4 +12,7 @@ from pyharness.engine.wheel_terms import *  # noqa: F403
 from pyharness.model.state_torque import opaque, recorded
 
 __all__ = ["opaque", "recorded"]
-__all__ += terms.__all__ + wheel_terms.__all__ + field_terms.__all__ + table_terms.__all__
+__all__ += terms.__all__
+__all__ += wheel_terms.__all__
+__all__ += field_terms.__all__
+__all__ += table_terms.__all__

@@ -196,7 +196,7 @@ def rest(value: Number, *, terminal: bool | int = False, direction: int = -1) ->
 @ready_event(
     "The angle between a body axis and a direction in space equals a value; needs `attitude=True`",
     axis=_AXIS,
-    toward=vector("Direction in space", "", (1.0, -2.0, 0.5)),
+    toward=vector("Direction in space", "", (1.0, -2.0, 0.5), "direction in space"),
     angle=number("Angle", "rad", 1.2),
 )
 def tilt(

@@ -17,13 +17,12 @@ from docs.campaign import page as promises
 from docs.certificates import page as proofs
 from docs.gallery import build as gallery
 from docs.gallery.execution import executed, is_current, picture_file, picture_of, shown_output
-from docs.reference import ready_tables
+from docs.reference import made_tables
 from docs.text import page as about_text
 from pyharness import read_scene
 from pyharness.cli import options
 from pyharness.cli.json_help import fields
 from pyharness.cli.main import VERBS, main
-from pyharness.engine.registry import METHODS, SCIPY_METHODS
 from pyharness.history import figures
 from pyharness.model.report import Report
 from pyharness.views import render as views
@@ -42,7 +41,7 @@ BUILT = (
     (f"docs/{proofs.PAGE}", proofs.proofs_page()),
     (f"docs/{promises.PAGE}", promises.promises_page()),
     (f"docs/{gallery.PAGE}", gallery.gallery_page()),
-    *ready_tables.pages(),
+    *made_tables.pages(),
 )
 
 
@@ -199,20 +198,6 @@ def test_scene_file_in_the_reference_is_one(tmp_path: Path) -> None:
     keys = {f"{name}.{key}" for name, table in every.items() if name != "name" for key in table}
     named = set(re.findall(r"`(\w+\.\w+)`", SCENES.read_text()))
     assert keys <= named
-
-
-def test_reference_lists_every_method_with_its_tolerances() -> None:
-    page = "docs/reference/methods.md"
-    text = (ROOT / page).read_text()
-    for name, method in METHODS.items():
-        rows = re.findall(rf"^\| `{name}` \| (.*) \|$", text, re.MULTILINE)
-        assert len(rows) == 1, f"{page} has {len(rows)} rows for {name}"
-        title, _, default, finest = rows[0].split(" | ")
-        assert title == method.title
-        wanted = "none" if method.is_fixed_step else f"{method.default:.0e}"
-        assert default == wanted, name
-        own = "none" if method.is_fixed_step else f"{method.finest:.0e}"
-        assert finest == ("by the scene" if name in SCIPY_METHODS else own), name
 
 
 @pytest.mark.sampled

@@ -10,7 +10,7 @@ import numpy as np
 from pyharness.engine.problem import rows_trajectory
 from pyharness.engine.recorded import is_recorded
 from pyharness.engine.scipy_ivp import FINEST, scipy_method
-from pyharness.model.codes import Methods
+from pyharness.model.codes import Methods, Series
 from pyharness.model.effort import Integrator
 from pyharness.model.errors import InputError
 from pyharness.model.fixed_steps import FIXED_STEPS, FixedStep
@@ -46,6 +46,7 @@ class Method:
     # Takes a fifth argument, whether `sol` has the steps.
     gives_steps: bool = False
     order: int = 0  # of the global error in the step size; 0 if it varies
+    orders: str = ""  # in documents, if not `order` or "adapted"
     evaluations: int = 0  # right-hand sides per step; 0 if the number varies
     any_scale: bool = False  # rescales the scene itself, or forms no products in binary64
     attitude: bool = False  # propagates the attitude together with omega
@@ -100,11 +101,11 @@ def _from(room: str, name: str, *arguments: str | int) -> Integrator:
     return solve
 
 
-def _scipy(scipy: str, title: str, source: str) -> Method:
+def _scipy(scipy: str, title: str, orders: str, source: str) -> Method:
     source, solve = f"scipy.integrate.solve_ivp; {source}", scipy_method(scipy)
     return Method(
         scipy.lower(), title, source, FINEST[scipy], solve, _SCIPY_DEFAULT, scipy=scipy,
-        gives_steps=True, attitude=True, state_torque=True,
+        gives_steps=True, orders=orders, attitude=True, state_torque=True,
     )  # fmt: skip
 
 
@@ -144,16 +145,17 @@ REGISTRY = {
             _from("plan", "by_plan"),
             **_SERIES,
         ),
-        _scipy("DOP853", "Runge-Kutta 8(5,3)", "Hairer, Norsett and Wanner 1993, II.5"),
-        _scipy("RK45", "Runge-Kutta 5(4)", "Dormand and Prince 1980"),
-        _scipy("LSODA", "Adams and BDF with switching", "Petzold 1983"),
-        _scipy("Radau", "implicit Runge-Kutta of order 5", "Hairer and Wanner 1996, IV.8"),
+        _scipy("DOP853", "Runge-Kutta 8(5,3)", "8", "Hairer, Norsett and Wanner 1993, II.5"),
+        _scipy("RK45", "Runge-Kutta 5(4)", "5", "Dormand and Prince 1980"),
+        _scipy("LSODA", "Adams and BDF with switching", "1 to 12", "Petzold 1983"),
+        _scipy("Radau", "implicit Runge-Kutta of order 5", "5", "Hairer and Wanner 1996, IV.8"),
         Method(
             "taylor",
             "Taylor series by recurrence, step and order adapted",
             "ours; Jorba and Zou 2005, Experimental Mathematics 14",
             1e-15,
             _from("taylor", "taylor"),
+            orders=f"{Series.LEAST_ORDER} to {Series.MOST_ORDER}",
             code=Methods.TAYLOR,
             **_SERIES,
         ),
@@ -173,6 +175,7 @@ REGISTRY = {
             "fortran/modern/torque_free.f90, sphere.f90; Jacobi 1849",
             1e-14,
             _from("closed_form", "known_solution"),
+            orders="exact",
             any_scale=True,
             attitude=True,
             code=Methods.CLOSED_FORM,

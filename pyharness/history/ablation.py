@@ -62,7 +62,10 @@ class CaseEffects:
 
 
 def entries(kind: str | None = None) -> list[dict[str, Any]]:
-    everything: list[dict[str, Any]] = facts("apparatus")["entry"]
+    everything = [
+        {name: each for name, each in entry.items() if name not in ("alteration", "assumption")}
+        for entry in facts("apparatus")["entry"]
+    ]
     kinds = sorted({entry["kind"] for entry in everything})
     if kind is not None and kind not in kinds:
         raise unknown("kind", kind, kinds, "--kind")

@@ -2,14 +2,14 @@
 
 import os
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pyharness.model.arrays import buffer_of, check_rows, only_one, rows_of, spread
 from pyharness.model.distribution import check_package, checked_axes
 from pyharness.model.errors import InputError, known
-from pyharness.model.fields import ATTITUDE, ESTIMATES, OMEGA, declared
+from pyharness.model.fields import ENSEMBLE_ROWS
 from pyharness.model.inertia import SYMMETRIC, symmetric_matrix
 from pyharness.model.torque_law import FRAMES
 from pyharness.model.trajectory import Array, BatchResult, turned_to_space
@@ -67,9 +67,8 @@ class Ensemble(BatchResult):
     array([ True,  True])
     """
 
-    omega: Annotated[Array, OMEGA]
-    attitude: Annotated[Array | None, ATTITUDE] = None
-    estimates: Annotated[Array | None, ESTIMATES] = None
+    attitude: Array | None = None
+    estimates: Array | None = None
     t_events: list[list[Array | None]] | None = field(default=None, repr=False)
     y_events: list[list[Array | None]] | None = field(default=None, repr=False)
     sensitivities: dict[str, Array] | None = field(default=None, repr=False)
@@ -315,7 +314,6 @@ class Ensemble(BatchResult):
         return _NO_ESTIMATES if self.estimates is None else self.estimates[piece].T
 
 
-ENSEMBLE_ROWS = declared(Ensemble)
 _NO_ESTIMATES = np.empty((2, 0), order="F")
 
 

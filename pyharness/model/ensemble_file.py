@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pyharness.model.archive import archive_of, checked_file, checked_path, read_archive
-from pyharness.model.ensemble import ENSEMBLE_ROWS
 from pyharness.model.errors import InputError
 from pyharness.model.extension import ENDS
+from pyharness.model.fields import ENSEMBLE_ROWS
 from pyharness.model.json_text import unique
 from pyharness.model.output_files import write_files
 from pyharness.model.schema import SCHEMAS

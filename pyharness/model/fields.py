@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Rows(NamedTuple):
-    """What is known of a field with a row for each result."""
+    """Facts about a field with a row for each result."""
 
     about: str
     unit: str
@@ -55,7 +55,7 @@ _TIME = Rows("time", "s", ("time",), ("time",), rates=-1)
 _RECORDED_TIME = Rows(
     "time in the output file of the program", "s", ("recorded_time",), ("TIME",), rates=-1
 )
-OMEGA = Rows(
+_OMEGA = Rows(
     "angular velocity about the body axes", "rad/s", _numbered("omega"), _numbered("U"),
     "axis", rates=1, turns="vector",
 )  # fmt: skip
@@ -64,7 +64,7 @@ _VELOCITY = Rows(
     "axis", rates=1, turns="vector",
 )  # fmt: skip
 _COMPONENTS = ("q0", "q1", "q2", "q3")
-ATTITUDE = Rows(
+_ATTITUDE = Rows(
     "quaternion from body to space", "1", _COMPONENTS, _COMPONENTS, "component", turns="quaternion"
 )
 _IER = Rows("error code of the linear solver", "1", ("ier",), (), kind="i4")
@@ -72,7 +72,7 @@ ESTIMATES = Rows("estimated error and error amplification", "1", ("error", "grow
 _FACT = "a value in the header of files, and in the attributes of xarray"
 
 
-def declared(owner: type) -> dict[str, Rows]:
+def _declared(owner: type) -> dict[str, Rows]:
     """Return the fields of a dataclass with a row for each result."""
     found = {each.name: getattr(each.type, "__metadata__", (None,))[0] for each in fields(owner)}
     return {name: each for name, each in found.items() if isinstance(each, Rows)}
@@ -84,7 +84,7 @@ class Fields:
 
     time: Annotated[Array, _TIME]
     recorded_time: Annotated[Array, _RECORDED_TIME]
-    omega: Annotated[Array, OMEGA]
+    omega: Annotated[Array, _OMEGA]
     velocity: Annotated[Array | None, _VELOCITY]
     steps: Annotated[int, _FACT]
     evaluations: Annotated[int, _FACT]
@@ -94,7 +94,7 @@ class Fields:
     error: Annotated[float | None, _FACT] = None
     growth: Annotated[float | None, _FACT] = None
     reason: Annotated[str | None, _FACT] = field(default=None, repr=False)
-    attitude: Annotated[Array | None, ATTITUDE] = None
+    attitude: Annotated[Array | None, _ATTITUDE] = None
     own: Array | None = None  # a row for each time, and columns from `Scene.states`
     moments: Triple | Changing | None = None
     axes: Array | None = None
@@ -112,7 +112,8 @@ class Fields:
         return {name: each for name, each in found.items() if each is not None}
 
 
-ROWS = declared(Fields)
+ROWS = _declared(Fields)
+ENSEMBLE_ROWS = {"omega": _OMEGA, "attitude": _ATTITUDE, "estimates": ESTIMATES}
 # By name, the types of facts.
 FACTS: dict[str, Any] = {
     each.name: get_args(each.type)[0]

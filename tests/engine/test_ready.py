@@ -175,7 +175,7 @@ from pyharness.checks.scenes.state_scenes import READY, ready
 from pyharness.engine.scene_reader import scene_of
 from pyharness.engine.term_file import KINDS
 from pyharness.model.scene_file import scene_text
-from docs.reference.ready_tables import pages
+from docs.reference.made_tables import pages
 
 sys.path.insert(0, "fortran")
 import make_leaves

@@ -1,4 +1,4 @@
-"""Tables of ready torques and events in documents, and in the schema of scene files."""
+"""Tables of methods, ready torques and ready events, and the schema of scene files."""
 
 import json
 import re
@@ -9,6 +9,7 @@ from typing import Any
 from pyharness.edition.made_pages import table
 from pyharness.engine.ready import VECTOR, Argument, Ready
 from pyharness.engine.ready_events import EVENTS
+from pyharness.engine.registry import METHODS
 from pyharness.engine.term_file import KINDS
 
 ROOT = Path(__file__).parent.parent.parent
@@ -30,6 +31,11 @@ def pages() -> list[tuple[str, str]]:
         ("docs/how-to/torques.md", "function | torque | arguments", _functions(KINDS)),
         ("docs/how-to/results.md", "function | event | arguments", _functions(EVENTS)),
         ("docs/reference/conventions.md", "torque | convention", _conventions()),
+        (
+            "docs/reference/methods.md",
+            "method | description | order | default tolerance | finest",
+            _methods(),
+        ),
     ):
         old = rf"^\| {re.escape(head)} \|\n(?:\|.*\n)+"
         parts = re.split(old, (ROOT / page).read_text(), flags=re.MULTILINE)
@@ -43,6 +49,19 @@ def _with_kinds(schema: str) -> str:
     _, _, end = rest.partition("\n      ]\n")
     kinds = ",\n".join(f"       {json.dumps(each.schema())}" for each in KINDS.values())
     return f'{begin}"items": {{\n      "oneOf": [\n{kinds}\n      ]\n{end}'
+
+
+def _methods() -> list[list[str]]:
+    rows = []
+    for name, each in METHODS.items():
+        default, finest = f"{each.default:.0e}", f"{each.finest:.0e}"
+        if each.is_fixed_step:
+            default = finest = "none"
+        elif each.scipy:
+            finest = "by the scene"
+        order = each.orders or (str(each.order) if each.order else "adapted")
+        rows.append([f"`{name}`", each.title, order, default, finest])
+    return rows
 
 
 def _kinds() -> list[list[str]]:

@@ -289,7 +289,7 @@ subroutine solve_packed(packed, n_packed, omega0, t_end, omega, status, steps, f
   integer(4), intent(out) :: status
   integer(8), intent(out) :: steps   ! or right-hand sides, of Gauss collocation;
   ! negative if the kernel chose quick instead of the series
-  real(8), intent(out) :: found(2)   ! estimated relative error, amplification; negative: unknown
+  real(8), intent(out) :: found(3)   ! relative error, amplification, steps in all; negative: unknown
 
   call solve_prepared(packed, n_packed, omega0, t_end, omega, status, steps, found)
 end subroutine solve_packed
@@ -306,7 +306,7 @@ subroutine solve_packed_attitude(packed, n_packed, start, t_end, state, status, 
   real(8), intent(out) :: state(7)   ! NaN unless the status is 0 or 6
   integer(4), intent(out) :: status
   integer(8), intent(out) :: steps   ! 0 with a closed form
-  real(8), intent(out) :: found(2)   ! as in solve_packed
+  real(8), intent(out) :: found(3)   ! as in solve_packed
 
   call solve_prepared_attitude(packed, n_packed, start, t_end, state, status, steps, found)
 end subroutine solve_packed_attitude

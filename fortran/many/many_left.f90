@@ -42,7 +42,7 @@ contains
     integer(i1), intent(inout) :: status(bodies%n)
     integer, intent(out) :: raised
     real(dp) :: own(0:WAVES + 4*(size(bodies%sines, 2) + size(bodies%cosines, 2)) - 1)
-    real(dp) :: found(2), time
+    real(dp) :: found(3), time
     integer(int64) :: steps
     logical :: is_estimated
     integer :: alone, ended, i, n_own
@@ -88,7 +88,7 @@ contains
     integer(i1), intent(inout) :: status(bodies%n)
     integer, intent(out) :: raised
     real(dp) :: own(0:WAVES + 4*(size(bodies%sines, 2) + size(bodies%cosines, 2)) - 1)
-    real(dp) :: start(7), state(7), found(2), time
+    real(dp) :: start(7), state(7), found(3), time
     integer(int64) :: steps
     logical :: is_estimated
     integer :: alone, ended, i, n_own, power
@@ -194,7 +194,7 @@ contains
     integer, intent(inout) :: status
     real(dp) :: copy(0:n_packed - 1)
     real(dp) :: enough       ! amplification beyond which the result is sensitive
-    real(dp) :: growth, omega(3), found(2)
+    real(dp) :: growth, omega(3), found(3)
     integer(int64) :: coarse_steps
     integer :: code, coarse_status
 

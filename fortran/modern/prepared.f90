@@ -33,7 +33,7 @@ contains
     real(dp), intent(out) :: omega(3)  !! rad/s
     integer, intent(out) :: status     !! code of the module statuses
     integer(int64), intent(out) :: steps !! or right-hand sides, of Gauss collocation
-    real(dp), intent(out) :: found(2)  !! estimated relative error, amplification; negative: unknown
+    real(dp), intent(out) :: found(3)  !! relative error, amplification, steps in all; negative: unknown
     real(dp) :: largest
 
     largest = max(abs(omega0(1)), abs(omega0(2)), abs(omega0(3)))
@@ -56,7 +56,7 @@ contains
     real(dp), intent(inout), target, contiguous :: state(:) !! as start
     integer, intent(out) :: status     !! code of the module statuses
     integer(int64), intent(out) :: steps
-    real(dp), intent(out) :: found(2)  !! estimated relative error, amplification; negative: unknown
+    real(dp), intent(out) :: found(3)  !! relative error, amplification, steps in all; negative: unknown
     type(solution_t) :: solution
     real(dp), target :: times(1), attitudes(4, 0:1)
     real(dp) :: largest
@@ -79,7 +79,7 @@ contains
     if (size(start) > 3) state(4:) = attitudes(:, 1)
     status = solution%status
     steps = solution%steps
-    found = [solution%error, solution%growth]
+    found = [solution%error, solution%growth, solution%spent]
   end subroutine solve_recorded
 
   subroutine solve_near_one(packed, n_packed, omega0, t_end, omega, status, steps, found)
@@ -91,7 +91,7 @@ contains
     real(dp), intent(out) :: omega(3)  !! rad/s
     integer, intent(out) :: status     !! code of the module statuses
     integer(int64), intent(out) :: steps !! or right-hand sides, of Gauss collocation
-    real(dp), intent(out) :: found(2)  !! relative, so independent of the units
+    real(dp), intent(out) :: found(3)  !! relative, so independent of the units
     real(dp), target :: copy(0:n_packed - 1)
     real(dp) :: start(3)
     real(dp) :: time       ! in the new units
@@ -115,7 +115,7 @@ contains
     real(dp), intent(out), target :: omega(3)  !! rad/s
     integer, intent(out) :: ended      !! code of the module statuses
     integer(int64), intent(out) :: count !! or right-hand sides, of Gauss collocation
-    real(dp), intent(out) :: found(2)  !! estimated relative error, amplification; negative: unknown
+    real(dp), intent(out) :: found(3)  !! relative error, amplification, steps in all; negative: unknown
     type(problem_t) :: problem
     type(solution_t) :: solution
     real(dp), target :: times(1)
@@ -165,7 +165,7 @@ contains
     type(request_t), intent(in) :: request
     integer, intent(in) :: code         !! of the module methods
     type(solution_t), intent(inout) :: solution
-    real(dp), intent(out) :: found(2)   !! estimated relative error, amplification; below 0: unknown
+    real(dp), intent(out) :: found(3)   !! relative error, amplification, steps in all; below 0: unknown
 
     found = -1.0_dp
     if (code == QUICK .or. code == QUICK_OR_TAYLOR) then
@@ -182,7 +182,7 @@ contains
       if (solution%status == COMPLETE .or. solution%status == INTERRUPTED) return
     end if
     call taylor_solve(problem, request, solution)
-    found = [solution%error, solution%growth]
+    found = [solution%error, solution%growth, solution%spent]
   end subroutine solve_by_series
 
   subroutine compare_with_series(problem, request, omega, ended, found)
@@ -192,7 +192,7 @@ contains
     type(request_t), intent(in) :: request
     real(dp), intent(in) :: omega(3)   !! the result, rad/s
     integer, intent(inout) :: ended    !! SENSITIVE, or COMPLETE if the series excludes that
-    real(dp), intent(inout) :: found(2) !! estimated relative error, amplification; below 0: unknown
+    real(dp), intent(inout) :: found(3) !! relative error, amplification, steps in all; below 0: unknown
     real(dp), target :: other(3, 1)
     type(solution_t) :: solution
 
@@ -219,7 +219,7 @@ contains
     real(dp), intent(out), target :: state(7)
     integer, intent(out) :: status     !! code of the module statuses
     integer(int64), intent(out) :: steps
-    real(dp), intent(out) :: found(2)  !! estimated relative error, amplification; negative: unknown
+    real(dp), intent(out) :: found(3)  !! relative error, amplification, steps in all; negative: unknown
     type(problem_t) :: problem
     type(solution_t) :: solution
     real(dp), target :: times(1), attitudes(4, 0:1)
@@ -268,7 +268,7 @@ contains
         status = solution%status
         call scale_back(power, state(:3), status)
         steps = solution%steps
-        found = [solution%error, solution%growth]
+        found = [solution%error, solution%growth, solution%spent]
       end if
     end if
     if (.not. is_result(status)) state = transfer(huge(0_int64), 1.0_dp)

@@ -31,7 +31,7 @@ typedef struct {
   uint64_t thread;
   int status;
   int64_t steps;
-  double found[2]; /* estimated error and amplification; negative: unknown */
+  double found[3]; /* estimated error, amplification, steps in all; negative: unknown */
   double start[3];
   double time;
 } ending;
@@ -113,7 +113,7 @@ static ending *add_ending(bound_kernel *self, uint64_t thread)
     }
   }
   self->latest = self->n_endings++;
-  self->endings[self->latest] = (ending){.thread = thread, .found = {-1.0, -1.0}};
+  self->endings[self->latest] = (ending){.thread = thread, .found = {-1.0, -1.0, -1.0}};
   return self->endings + self->latest;
 }
 
@@ -122,8 +122,8 @@ static PyObject *get_ending(PyObject *object, void *Py_UNUSED(closure))
   const ending *own =
     find_ending((bound_kernel *)object, PyThreadState_GetID(PyThreadState_Get()));
   if (own == NULL) Py_RETURN_NONE;
-  return Py_BuildValue("(iLdd(ddd)d)", own->status, (long long)own->steps, own->found[0],
-                       own->found[1], own->start[0], own->start[1], own->start[2], own->time);
+  return Py_BuildValue("(iLddd(ddd)d)", own->status, (long long)own->steps, own->found[0],
+                       own->found[1], own->found[2], own->start[0], own->start[1], own->start[2], own->time);
 }
 
 /* ---- Arguments ---------------------------------------------------------------------------- */
@@ -358,7 +358,7 @@ static int call_object(bound_kernel *self, const double *start, double *state, e
   } else if (result != NULL &&
              PyArg_ParseTuple(result, "OiLO", &values, &now->status, &steps, &found)) {
     now->steps = steps;
-    is_right = copy_numbers(values, self->width, state) && copy_numbers(found, 2, now->found);
+    is_right = copy_numbers(values, self->width, state) && copy_numbers(found, 3, now->found);
   }
   Py_XDECREF(result);
   Py_DECREF(given);

@@ -18,7 +18,7 @@ from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import WITH_ALL_ROWS, Array, Trajectory
 
 if TYPE_CHECKING:
-    from pyharness.model.inertia import Exact
+    pass
 
 _NOT_FINITE = (
     "a coefficient A, B, C or a torque divided by its moment is not finite; use moments nearer "
@@ -46,18 +46,18 @@ def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
 def remainders(scene: Scene) -> Triple:
     """Return the exact coefficients A, B, C minus their values in binary64."""
     # Without them, a closed form has an error of 1e-10 rad at a phase of 1e6 rad.
-    found, moments = scene.euler_coefficients, scene.exact_moments
+    found, moments = scene.euler_coefficients, scene.moments
     # Under a torque, no kernel uses the remainders.
     if moments is None or not scene.torque.is_zero or not all(map(math.isfinite, found)):
         return 0.0, 0.0, 0.0
-    return _exact_remainders(moments, found)
+    return _exact_remainders(moments, scene.moments_low, found)
 
 
 @lru_cache(maxsize=64)
-def _exact_remainders(moments: "Exact", found: Triple) -> Triple:
+def _exact_remainders(moments: Triple, moments_low: Triple, found: Triple) -> Triple:
     from fractions import Fraction
 
-    i1, i2, i3 = moments
+    i1, i2, i3 = (Fraction(x) + Fraction(y) for x, y in zip(moments, moments_low, strict=True))
     a, b, c = map(Fraction, found)
     return float((i2 - i3) / i1 - a), float((i3 - i1) / i2 - b), float((i1 - i2) / i3 - c)
 

@@ -3,6 +3,7 @@
 import importlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -93,9 +94,12 @@ def _no_rows(*given: object) -> Trajectory:
 def _from(room: str, name: str, *arguments: str | int) -> Integrator:
     """Return a function that imports solver `name` when called, and passes it `arguments` first."""
 
+    @cache
+    def module() -> Any:
+        return importlib.import_module(f"pyharness.engine.{room}")
+
     def solve(*given: Any) -> Trajectory:
-        solver = getattr(importlib.import_module(f"pyharness.engine.{room}"), name)
-        found: Trajectory = solver(*arguments, *given)
+        found: Trajectory = getattr(module(), name)(*arguments, *given)
         return found
 
     return solve

@@ -64,6 +64,20 @@ def growth_of_rounding(scene: Scene, growth: float | None) -> float | None:
     return 1.0
 
 
+def calm_until(scene: Scene, tolerance: float) -> float:
+    """Return a time (s) until which a closed form without torque is certainly not sensitive."""
+    moments, coefficients = scene.moments, scene.euler_coefficients
+    most = _NEGLIGIBLE_TO
+    if isinstance(scene, PrincipalScene):
+        most = _SHARE * tolerance / ROUNDING
+    if moments is None or most <= 1.0:
+        return 0.0
+    # The energy bounds |omega|, and so the Jacobian, whose norm is the rate of perturbations.
+    largest = math.hypot(*scene.omega) * math.sqrt(max(moments) / min(moments))
+    rate = math.sqrt(2.0) * max(map(abs, coefficients)) * largest
+    return math.log(most) / rate if rate > 0.0 else math.inf
+
+
 def closed_form_estimate(
     scene: Scene, omega0: Triple, t_end: float, noise: float = 0.0
 ) -> tuple[float | None, float | None]:
@@ -110,7 +124,7 @@ def judge_ending(
     scene: Scene, kind: str, tolerance: float, ending: Any
 ) -> tuple[str, float | None, float | None]:
     """Return the status, error and error amplification of a prepared solver's last call."""
-    number, steps, of_kernel, grown, omega0, t_end = ending
+    number, steps, of_kernel, grown, _, omega0, t_end = ending
     status = ENDS[number]
     if status not in WITH_ALL_ROWS:
         return status, None, None

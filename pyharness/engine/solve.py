@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from pyharness.engine.continuous import solution_of, with_events, with_events_re
 from pyharness.engine.event_functions import EventFunction, event_functions
 from pyharness.engine.events import FoundEvents
 from pyharness.engine.parameter_sensitivity import checked_names, sensitivities_at
+from pyharness.engine.prepared_scene import Problem, keep_end, kept_end, problem_of
 from pyharness.engine.registry import (
     METHODS,
     SCIPY_METHODS,
@@ -32,14 +33,11 @@ from pyharness.engine.steps import transformed_steps
 from pyharness.engine.switch_text import with_text
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY
-from pyharness.model.constant_body import integrated, with_constant_body
 from pyharness.model.errors import InputError, known
-from pyharness.model.inertia import principal_frame
 from pyharness.model.keywords import with_hints
-from pyharness.model.principal import PrincipalScene, in_scene_axes, principal, states_in_scene_axes
+from pyharness.model.principal import PrincipalScene, states_in_scene_axes
 from pyharness.model.scene import Scene, checked_scene, most_steps
 from pyharness.model.state_torque import is_opaque
-from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Trajectory
 from pyharness.model.values import (
     Number,
@@ -50,7 +48,6 @@ from pyharness.model.values import (
     number_list,
     unit_of,
 )
-from pyharness.model.waves import with_merged_waves
 
 _OF_DIFFERENCES = 1e-13  # tolerance of solutions whose differences are derivatives
 # Phase (rad) at the end of the first trial integration to a terminal event, by our methods and by
@@ -134,6 +131,10 @@ def solve(
     array([[3.5, 3.5, 3.5],
            [6. , 6. , 6. ]])
     """
+    plain = dense_output is False and events is None and sensitivities is None
+    key = method, tolerance, effort, attitude
+    if plain and (known_end := kept_end(scene, times, key)) is not None:
+        return known_end
     checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True, states=True)
     dense_output = boolean("dense_output", dense_output)
     method = known("method", method, METHODS)
@@ -159,26 +160,11 @@ def solve(
         )
     functions = None if events is None else event_functions(events, attitude, scene.states)
     names = None if sensitivities is None else checked_names(scene, sensitivities, asked, attitude)
-    given = scene
-    start = (scene.attitude or IDENTITY) if attitude else None
-    if start is not scene.attitude:
-        scene = replace(scene, attitude=start)
-    axes = None
-    moments = scene.changing or scene.moments
-    if scene.inertia is not None:
-        frame = principal_frame(scene.inertia)
-        axes, moments = frame.axes.copy(), frame.moments
-        scene = principal(scene)[0] if method == "reference" else integrated(scene)
     values, turned = ascending_times(times)
-    if scene.changing is not None:
-        scene.changing.check((values[0], values[-1]))
-        # The reference has equations of its own for such a scene.
-        scene = scene if method == "reference" else with_constant_body(scene)
-    # The reference must not round amplitudes, as merging does.
-    if method != "reference" and isinstance(scene.torque, TorqueLaw):
-        scene = with_merged_waves(scene)
+    problem = problem_of(scene, attitude, exactly=method == "reference")
+    problem.check(values[0], values[-1])
     effort = checked_effort(effort)
-    call = _Call(given, scene, moments, axes, method, tolerance, effort, dense_output, functions)
+    call = _Call(problem, method, tolerance, effort, dense_output, functions)
     if functions is None:
         found, _ = call.trajectory(values)
     else:
@@ -188,18 +174,17 @@ def solve(
     found = in_reverse(found) if turned else found
     if names is not None:
         states = partial(_states_of_changed, found.time, effort, found.attitude is not None)
-        slopes = sensitivities_at(given, found, names, effort, states)
-        found = replace(found, sensitivities=slopes)
+        slopes = sensitivities_at(scene, found, names, effort, states)
+        found = found.changed(sensitivities=slopes)
+    if plain and found.ended == "complete":
+        keep_end(problem, key, method, tolerance, effort)
     return found
 
 
 class _Call(NamedTuple):
-    """The checked arguments of `solve`; `scene` is integrated instead of `given`."""
+    """The checked arguments of `solve`."""
 
-    given: Scene
-    scene: Scene
-    moments: Any
-    axes: Array | None  # principal axes, if `given` has an inertia matrix
+    problem: Problem
     method: str
     tolerance: float
     effort: float
@@ -207,7 +192,8 @@ class _Call(NamedTuple):
     functions: list[EventFunction] | None
 
     def trajectory(self, values: list[float]) -> tuple[Trajectory, FoundEvents | None]:
-        given, scene, method, tolerance = self.given, self.scene, self.method, self.tolerance
+        problem, method, tolerance = self.problem, self.method, self.tolerance
+        given, scene = problem.given, problem.scene
         chosen = METHODS[method]
         below = [t for t in values if t < 0.0]
         sides = (below[::-1], values[len(below) :])
@@ -224,17 +210,14 @@ class _Call(NamedTuple):
             parts[0] = in_reverse(parts[0])
         found = parts[0] if len(parts) == 1 else joined(*parts)
         sol = found.sol if needs_steps else None
-        if self.axes is not None:
-            if isinstance(scene, PrincipalScene):
-                own = 7 if found.attitude is not None else 3
-                turned_to = partial(states_in_scene_axes, axes=self.axes, own=own)
-                sol, found = transformed_steps(sol, turned_to), in_scene_axes(found, self.axes)
-            found = replace(found, axes=self.axes)
+        if isinstance(scene, PrincipalScene) and problem.axes is not None:
+            own = 7 if found.attitude is not None else 3
+            sol = transformed_steps(sol, partial(states_in_scene_axes, axes=problem.axes, own=own))
+        found = problem.in_axes_of_scene(found)
         if sol is not None:
             sol = replace(sol, rates=partial(rates_of, given))
-        found = replace(
-            found,
-            moments=self.moments,
+        found = found.changed(
+            moments=problem.moments,
             tolerance=None if chosen.is_fixed_step else tolerance,
             scene=given,
             sol=sol if self.dense_output else None,
@@ -245,11 +228,11 @@ class _Call(NamedTuple):
                 "ends before the last time; allowed: a smooth torque, or opaque(function)"
             )
         if found.reason is not None:
-            found = replace(found, reason=with_text(found.reason, given))
+            found = found.changed(reason=with_text(found.reason, given))
         rows = partial(_more_rows, given, method, self.effort, found.attitude is not None)
         if needs_steps and sol is None:
             sol = solution_of(given, found, rows, method, tolerance)
-            found = replace(found, sol=sol) if self.dense_output else found
+            found = found.changed(sol=sol) if self.dense_output else found
         if self.functions is None:
             return found, None
         assert sol is not None
@@ -278,8 +261,8 @@ def _trial_ends(call: _Call, last: float) -> Iterator[float]:
     is_terminal = any(g.limit < math.inf for g in call.functions or ())
     if not is_terminal or METHODS[call.method].is_fixed_step:
         return
-    scene = call.given
-    attitude = () if call.scene.attitude is None else scene.attitude or IDENTITY
+    scene = call.problem.given
+    attitude = () if call.problem.scene.attitude is None else scene.attitude or IDENTITY
     state = np.array([[*scene.omega, *attitude, *(each.start for each in scene.states)]])
     try:
         slopes = np.abs(rates_of(scene, np.zeros(1), state)[0, :3])

@@ -43,7 +43,7 @@ static inline int pyharness_solve(const pyharness_solver *solver, const double *
 {
   int status = PYHARNESS_REFUSED;
   int64_t steps;
-  double found[2];
+  double found[3];
   if (solver->first != NULL)
     solver->kernel(solver->first, &solver->n_first, start, &t_end, state, &status, &steps, found);
   if (status != PYHARNESS_COMPLETE)

@@ -4,8 +4,9 @@ Columns in files, pandas, xarray, HTML, JSON and reports, the change to other ax
 time, and the names that own states can't have come from these declarations.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, get_args
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Self, get_args
 
 from numpy.typing import NDArray
 
@@ -106,12 +107,45 @@ class Fields:
     y_events: list[Array] | None = field(default=None, repr=False)
     sensitivities: dict[str, Array] | None = field(default=None, repr=False)
 
+    def changed(self, **values: Any) -> Self:
+        """Return a copy with other values, without a check, and without estimates' computation."""
+        found = object.__new__(type(self))
+        found.__dict__.update(self.__dict__)
+        found.__dict__.update(values)
+        return found
+
+    def estimated_later(self, estimates: Callable[[], tuple[float | None, float | None]]) -> Self:
+        """Return a copy that calls `estimates` for `error` and `growth` when one is read."""
+        found = self.changed(_estimates=estimates)
+        for name in _ESTIMATED:
+            found.__dict__.pop(name, None)
+        return found
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {each.name: getattr(self, each.name) for each in fields(self)}
+
     def with_rows(self) -> dict[str, Any]:
         """Return the arrays with a row for each time, by name."""
         found = {name: getattr(self, name) for name in (*ROWS, "own")}
         return {name: each for name, each in found.items() if each is not None}
 
 
+class _Estimate:
+    """A value that is in the instance, or computed there when it is first read."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def __get__(self, found: Any, _owner: type) -> Any:
+        content = {} if found is None else found.__dict__
+        if "_estimates" in content:
+            content.update(zip(_ESTIMATED, content["_estimates"](), strict=True))
+        return content.get(self._name)
+
+
+_ESTIMATED = ("error", "growth")
+for _each in _ESTIMATED:
+    setattr(Fields, _each, _Estimate(_each))
 ROWS = _declared(Fields)
 ENSEMBLE_ROWS = {"omega": _OMEGA, "attitude": _ATTITUDE, "estimates": ESTIMATES}
 # By name, the types of facts.

@@ -1,7 +1,7 @@
 """Transformation of scenes to principal axes, and of results back."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -109,14 +109,14 @@ def in_scene_axes(found: Trajectory, axes: Array) -> Trajectory:
     turn: dict[str, Callable[[Array], Array]] = {
         "": lambda each: each,
         "vector": lambda each: each @ axes.T,
-        "quaternion": lambda each: _attitude_in_scene_axes(each, axes),
+        "quaternion": lambda each: attitude_in_scene_axes(each, axes),
     }
     turned: dict[str, Any] = {
         name: turn[ROWS[name].turns](each)
         for name, each in found.with_rows().items()
         if name in ROWS
     }
-    return replace(found, **turned)
+    return found.changed(**turned)
 
 
 def states_in_scene_axes(states: Array, axes: Array, own: int) -> Array:
@@ -126,11 +126,11 @@ def states_in_scene_axes(states: Array, axes: Array, own: int) -> Array:
     """
     turned, rest = states[:, 3:own], states[:, own:]
     if own > 3:
-        turned = _attitude_in_scene_axes(turned, axes)
+        turned = attitude_in_scene_axes(turned, axes)
     return np.column_stack([states[:, :3] @ axes.T, turned, rest])
 
 
-def _attitude_in_scene_axes(attitude: Array, axes: Array) -> Array:
+def attitude_in_scene_axes(attitude: Array, axes: Array) -> Array:
     w, x, y, z = quaternion_of_axes(axes)
     return np.array(product(tuple(attitude.T), (w, -x, -y, -z))).T
 

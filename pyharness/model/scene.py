@@ -257,6 +257,10 @@ class Scene:
         given = {x: value for x, value in shown.items() if value != usual[x]}
         return f"Scene({', '.join(f'{x}={value!r}' for x, value in given.items())})"
 
+    def __getstate__(self) -> dict[str, Any]:
+        # Without the problems that `solve` keeps.
+        return {name: each for name, each in self.__dict__.items() if name != "_problems"}
+
     def _set(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
 

@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -110,13 +111,13 @@ class TorqueLaw:
         """Whether the torque about the body axes depends on the attitude."""
         return self.in_space
 
-    @property
+    @cached_property
     def varies(self) -> bool:
         """Whether N depends on time."""
         waves = self.sines + self.cosines
         return any(self.rate) or any(any(amplitude) for amplitude, _ in waves)
 
-    @property
+    @cached_property
     def is_zero(self) -> bool:
         """Whether N is zero at all times."""
         return not (self.varies or any(self.constant))

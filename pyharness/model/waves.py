@@ -31,7 +31,7 @@ def merged(law: TorqueLaw) -> TorqueLaw:
 
 
 def is_mergeable(law: TorqueLaw) -> bool:
-    for waves in (law.sines, law.cosines):
+    for waves in filter(None, (law.sines, law.cosines)):
         # Waves of amplitude 0 do not count.
         counts = Counter(abs(frequency) for amplitude, frequency in waves if any(amplitude))
         if 0.0 in counts or any(count > 1 for count in counts.values()):

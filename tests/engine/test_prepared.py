@@ -278,7 +278,7 @@ def test_another_kernel_may_stand_in_its_place(monkeypatch: pytest.MonkeyPatch) 
         (np.array([1.0, 2.0, 3.0]), 3, 7, "refused"),
         ([4, 5, 6], 0, 1, "complete"),
     ):
-        answers.append((found, status, steps, (1e-9, 2.0)))
+        answers.append((found, status, steps, (1e-9, 2.0, 9.0)))
         assert solver(np.ones(3), 2.0).tolist() == list(found)
         assert (solver.status, solver.steps) == (word, steps)
         assert (solver.error, solver.growth) == ((1e-9, 2.0) if status == 0 else (None, None))

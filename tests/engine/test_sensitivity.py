@@ -412,7 +412,7 @@ def test_what_the_series_finds_is_passed_on(monkeypatch: pytest.MonkeyPatch) -> 
     assert not overflow.has_all_rows
 
     def packed(*given: Any) -> Any:
-        return np.ones(3), Statuses.SENSITIVE, 7, np.array([1e-6, 3e9])
+        return np.ones(3), Statuses.SENSITIVE, 7, np.array([1e-6, 3e9, 7.0])
 
     kernel = SimpleNamespace(solve_packed=packed)
     monkeypatch.setattr(solver_module, "extension", lambda: kernel)

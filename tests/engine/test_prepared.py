@@ -282,10 +282,10 @@ def test_another_kernel_may_stand_in_its_place(monkeypatch: pytest.MonkeyPatch) 
         assert solver(np.ones(3), 2.0).tolist() == list(found)
         assert (solver.status, solver.steps) == (word, steps)
         assert (solver.error, solver.growth) == ((1e-9, 2.0) if status == 0 else (None, None))
-    good = np.ones(2)
+    good = np.ones(3)
     for answer in (
         (np.ones(4), 0, 0, good), (np.ones(3), 0, 0), None, ("abc", 0, 0, good),
-        (np.ones(3), 0, 0, np.ones(3)),
+        (np.ones(3), 0, 0, np.ones(2)),
     ):  # fmt: skip
         answers.append(answer)
         with pytest.raises((TypeError, ValueError)):

@@ -36,8 +36,7 @@ def joint(
     moments: Sequence[float], omega: Sequence[float], attitude: Sequence[float], time: float
 ) -> tuple[list[mpmath.mpf], Quaternion]:
     """Return omega and attitude at `time` (s) by integrating both; for short times."""
-    found = enclose_steps(_scene(moments, omega), [time], _PROVED)
-    assert found.attitude is not None
+    found: Any = enclose_steps(_scene(moments, omega), [time], _PROVED)
     return _rotated([*found.omega[0].middle, *found.attitude[0].middle], attitude)
 
 

@@ -109,8 +109,7 @@ def test_contender_comes_to_the_truth(contender: Any) -> None:
         ready = contender.prepare(load.scene)(load.horizon, 1e-9)
         ready.run()  # the second call must start from the initial conditions again
         assert load.truth is not None
-        error = bench.error_of(ready.read(ready.run()), load.truth, load.scale)
-        assert error is not None
+        error: Any = bench.error_of(ready.read(ready.run()), load.truth, load.scale)
         assert error < 1e-7
 
 

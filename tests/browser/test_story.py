@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -89,8 +90,7 @@ def test_a_reader_chooses_a_program_predicts_and_runs(browser: Chrome) -> None:
         assert has in _text(browser, "claim")
         for name in story.LETTERS.values():
             assert _points(browser, "claim", name) == _first_points("claim", name)
-    run = run_program(case_scene(2), subset("runge-kutta"), "python")
-    assert run.stop is not None
+    run: Any = run_program(case_scene(2), subset("runge-kutta"), "python")
     error = _largest(2, "runge-kutta", subset("runge-kutta"), slice(0, 1))
     assert _value(browser, "stop-error") == pytest.approx(error, rel=1e-12)
     curve = browser.find_element(By.CSS_SELECTOR, "#chart-stop [data-curve=runge-kutta]")
@@ -130,9 +130,7 @@ def test_faults_hide_in_case_1_and_show_in_case_5_and_in_the_race(browser: Chrom
 
 
 def test_v2_turns_and_its_quotient_leaps(browser: Chrome) -> None:
-    run = run_program(case_scene(2), subset("runge-kutta"), "python")
-    assert run.velocity is not None
-    assert run.stop is not None
+    run: Any = run_program(case_scene(2), subset("runge-kutta"), "python")
     assert _value(browser, "at-quotient") == run.stop.quotient
     assert _points(browser, "velocity", "runge-kutta") == _first_points("velocity", "runge-kutta")
     slider = browser.find_element(By.ID, "step")
@@ -142,8 +140,7 @@ def test_v2_turns_and_its_quotient_leaps(browser: Chrome) -> None:
     assert 0.0 < _value(browser, "at-quotient") < 500.0
     click(browser, "#omega-alone")
     alone = subset("runge-kutta", fix=["lipschitz-tests-velocity"])
-    stop = run_program(case_scene(2), alone, "python").stop
-    assert stop is not None
+    stop: Any = run_program(case_scene(2), alone, "python").stop
     assert _value(browser, "alone-step") == stop.step
     assert slider.get_dom_attribute("max") == str(stop.step)
     # The slider keeps its step if the run becomes shorter than it.

@@ -106,14 +106,13 @@ def _judge(
 ) -> None:  # fmt: skip
     tolerance, last = batch.arguments["tolerance"], max(one.time.tolist(), key=abs)
     samples = np.linspace(0.0, last, _SAMPLES) if last else [0.0]
-    path = solve(scene, samples, tolerance=1e-6)
+    path: Any = solve(scene, samples, tolerance=1e-6)
     limit = 2.0 * tolerance + _OF_GROWTH * (one.growth or 1.0)
     pairs: list[Any] = [("omega", found.omega, one.omega, np.abs(path.omega).max())]
     if found.attitude is not None:
         assert one.attitude is not None
         pairs.append(("attitude", found.attitude, one.attitude, 0.5))
     if found.own is not None:
-        assert path.own is not None
         pairs.append(("states", found.own, one.own, np.abs(path.own).max()))
     for name, ours, theirs, scale in pairs:
         rows = np.array([ours[row] for row in places])
@@ -125,7 +124,7 @@ def _judge_slopes(tally: driver.Tally, batch: Batch, found: Ensemble, i: int) ->
     refusals, names = found.refusals or {}, ("method", "tolerance", "effort", "sensitivities")
     given = {name: batch.arguments[name] for name in names}
     try:
-        slopes = solve(batch.alone(i), _times_of(batch, i), **given).sensitivities
+        slopes: Any = solve(batch.alone(i), _times_of(batch, i), **given).sensitivities
     except InputError as refusal:
         if i not in refusals:
             tally.fault(f"{batch.kind}: derivatives of body {i} alone: {refusal}")
@@ -133,7 +132,6 @@ def _judge_slopes(tally: driver.Tally, batch: Batch, found: Ensemble, i: int) ->
     if i in refusals:
         tally.fault(f"{batch.kind}: derivatives of body {i}: {refusals[i]}")
         return
-    assert slopes is not None
     assert found.sensitivities is not None
     for name, theirs in slopes.items():
         apart = np.abs(found.sensitivities[name][i] - theirs).max()

@@ -155,8 +155,7 @@ def results(one: Drawn, seed: str, number: int) -> Iterator[tuple[str, float, Ca
 
     def series() -> Any:
         assert isinstance(scene.torque, StateTorque)
-        tape = scene.torque.tape
-        assert tape is not None
+        tape: Any = scene.torque.tape
 
         def fun(t: Any, y: Any) -> Any:
             return [torque_of(tape, t, (0.0, 0.0, y[0]), IDENTITY)[2] / MOMENT]

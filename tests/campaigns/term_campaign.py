@@ -79,8 +79,7 @@ def addresses(tapes: list[Tape], place: Path) -> list[int]:
     """Return the addresses of leaves that only expand."""
     texts = []
     for number, tape in enumerate(tapes):
-        shape = structure(listing(tape))
-        assert shape is not None
+        shape: Any = structure(listing(tape))
         text = source(shape, f"_{number}")
         text = text[: text.index("static void set_jacobian")]
         texts.append(text if number == 0 else text[text.index("static void expand") :])

@@ -111,8 +111,7 @@ def test_body_with_coefficients_is_enclosed_until_its_pole(monkeypatch: pytest.M
 @pytest.mark.parametrize("case", [3, 5, 6, 7])
 def test_enclosures_agree_with_the_precise_reference(case: int) -> None:
     scene = case_scene(case)
-    known = reference(scene, [0.25], precise=True)
-    assert known.remainder is not None
+    known: Any = reference(scene, [0.25], precise=True)
     (row,) = enclosure(scene, [0.25], 25)
     for x, omega, rest in zip(row, known.omega[0], known.remainder[0], strict=True):
         error = known.estimate + math.ulp(rest)

@@ -258,9 +258,8 @@ def test_a_method_of_first_order_is_named() -> None:
 def test_an_explicit_method_of_order_1_may_drift() -> None:
     """With steps of 1/32 s, it overflows in this scene within 512 s."""
     euler = Drawn("", solve_of((METHODS[0][1], METHODS[-1][1])), "", 1.0)
-    found = campaign.judged(euler, problems("1/26", 1, ["free"]))
+    found: Any = campaign.judged(euler, problems("1/26", 1, ["free"]))
     assert all(check.passed for check in found.checks)
-    assert found.drift is not None
     assert 1e-2 < found.drift.named["energy"][-1] < 10.0
 
 

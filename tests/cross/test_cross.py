@@ -30,9 +30,7 @@ def test_contributing_has_the_number_of_runs_that_are_compared() -> None:
 
 
 def test_digest_sees_every_bit_and_every_counter() -> None:
-    run = compiled.run(case_scene(3), Listing.original("two-term"))
-    assert run.velocity is not None
-    assert run.ier is not None
+    run: Any = compiled.run(case_scene(3), Listing.original("two-term"))
     changed = [
         replace(run, steps=run.steps - 1),
         replace(run, evaluations=run.evaluations + 1),

@@ -5,6 +5,7 @@ import random
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -53,9 +54,7 @@ def _error(case: int, program: str, listing: str, components: slice = slice(None
 def test_numbers_of_the_first_states_are_those_of_the_twins(slots: Slots) -> None:
     found = slots
     first = slice(0, 1)
-    stopped = run_program(case_scene(2), subset("runge-kutta"), "python")
-    assert stopped.stop is not None
-    assert stopped.velocity is not None
+    stopped: Any = run_program(case_scene(2), subset("runge-kutta"), "python")
     assert found["run-step"] == found["at-step"] == stopped.stop.step == 25
     assert found["quotient"] == found["at-quotient"] == stopped.stop.quotient
     assert found["peak"] == stopped.velocity[23, 1] == stopped.velocity[:, 1].max()
@@ -65,9 +64,8 @@ def test_numbers_of_the_first_states_are_those_of_the_twins(slots: Slots) -> Non
     assert found["stop-error"] == _error(2, "runge-kutta", "original", first)
     assert found["sine-corrected"] == _error(2, "runge-kutta", "corrected", first)
     assert found["lipschitz"] == facts("cases")["deck"]["lipschitz"]
-    in_48_bits = run_program(case_scene(2), subset("runge-kutta"), "python", word="cdc48").stop
+    in_48_bits: Any = run_program(case_scene(2), subset("runge-kutta"), "python", word="cdc48").stop
     assert in_48_bits == story.context()["in_48_bits"].stop
-    assert in_48_bits is not None
     rounded = run_program(case_scene(2), subset("runge-kutta"), "python", word="cdc48-rounded").stop
     for stop in (in_48_bits, rounded):
         assert stop is not None

@@ -56,10 +56,9 @@ def test_estimate_tells_the_error() -> None:
     ratios = []
     for number in range(2, 8):
         scene = replace(case_scene(number), attitude=TURNED)
-        fine = solve(scene, [3.0], "taylor", 1e-14, attitude=True).attitude
+        fine: Any = solve(scene, [3.0], "taylor", 1e-14, attitude=True).attitude
         for tolerance in (1e-3, 1e-5, 1e-8):
             found: Any = solve(scene, [3.0], "taylor", tolerance, attitude=True)
-            assert fine is not None
             ratios.append(angle_between(found.attitude, fine)[0] / (found.error or 0.0))
     # The estimated error has been subtracted from the result.
     assert 1e-3 < min(ratios) <= max(ratios) < 2.5
@@ -104,8 +103,7 @@ def test_rows_of_a_program_have_an_attitude() -> None:
     scene = replace(case_scene(3), attitude=TURNED)
     rows = run_program(scene, subset("two-term", "corrected"))
     found = attitude_from_rows(scene, rows.time, rows.omega)
-    fine = solve(scene, rows.time.tolist(), attitude=True).attitude
-    assert fine is not None
+    fine: Any = solve(scene, rows.time.tolist(), attitude=True).attitude
     # The error comes from the program's omega alone.
     error = np.abs(rows.omega - solve(scene, rows.time.tolist()).omega).max()
     assert 1e-6 < angle_between(found, fine).max() < 2.0 * error * rows.time[-1]
@@ -181,8 +179,7 @@ def test_rows_come_in_the_order_of_their_times() -> None:
     back: Any = solve(scene, [1.0, 0.5, 0.0, -1.0], "taylor", attitude=True)
     assert back.attitude[::-1].tolist() == forth.attitude.tolist()
     assert forth.attitude[1] == pytest.approx(np.array(TURNED), abs=1e-16)
-    only = solve(scene, [0.0], "taylor", attitude=True).attitude
-    assert only is not None
+    only: Any = solve(scene, [0.0], "taylor", attitude=True).attitude
     assert only[0] == pytest.approx(np.array(TURNED), abs=1e-16)
 
 

@@ -25,9 +25,8 @@ def _top(moments: Any, arm: Any, omega: Any, attitude: Any = ATTITUDE) -> Scene:
 
 
 def _solved(scene: Scene, end: float, tolerance: float) -> tuple[Any, Any]:
-    found = solve(scene, np.linspace(0.0, end, 101), tolerance=tolerance, attitude=True)
+    found: Any = solve(scene, np.linspace(0.0, end, 101), tolerance=tolerance, attitude=True)
     assert found.has_all_rows
-    assert found.attitude is not None
     return found.omega.T, _vertical(found.attitude.T)
 
 

@@ -248,8 +248,7 @@ def test_leaves_for_other_registers_are_not_used() -> None:
 
 def test_switches_of_many_bodies_are_interpreted() -> None:
     scene = scene_of(lambda t, w: np.where(w > 0.1, -0.1, 0.1))
-    found = solve_many(scene, 1.0, omega=start_many(scene, 3), compiled=True)
-    assert found.leaves is not None
+    found: Any = solve_many(scene, 1.0, omega=start_many(scene, 3), compiled=True)
     assert found.leaves.startswith("interpreter: switches and torques of")
 
 
@@ -369,8 +368,7 @@ def of_another_processor(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def of_another_version(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    shape = structure(listing(system_of(scene_of(simple))))
-    assert shape is not None
+    shape: Any = structure(listing(system_of(scene_of(simple))))
     text = whole_source(shape) + "/* newer */"
     monkeypatch.setattr(leaf_cache, "whole_source", lambda _: text)
 

@@ -69,8 +69,7 @@ def check(found: Any, expected: Any, limit: float = 1e-9) -> None:
 def test_errors_are_within_the_limit(kind: str) -> None:
     scene, time, names = random_scene(Random(f"tested {kind}"), kind)
     # Few columns and a short time suffice here; the campaign has all.
-    found = parameter_campaign.error_of(scene, np.copysign(1.5, time), names[::2])
-    assert found is not None
+    found: Any = parameter_campaign.error_of(scene, np.copysign(1.5, time), names[::2])
     assert found[0] <= LIMIT / 100.0
 
 
@@ -482,10 +481,9 @@ def test_the_truth_of_this_file_is_known_for_a_sphere() -> None:
     )
     with decimal.localcontext() as context:
         context.prec = 40
-        truth = parameter_campaign.differences(
+        truth: Any = parameter_campaign.differences(
             replace(sphere, torque=TorqueLaw((0.4, 0, 0), (0, 0.5, 0))), ["torque.constant"], [3.0]
         )
-    assert truth is not None
     assert truth["torque.constant"][0, 0, 0] == pytest.approx(1.5, rel=1e-9)
     found = slopes(sphere, [3.0], "omega", "moments", "torque.constant")
     assert found["torque.constant"][0, 0, 0] == pytest.approx(1.5, rel=1e-14)

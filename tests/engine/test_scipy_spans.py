@@ -60,8 +60,7 @@ def test_spans_are_short_where_the_torque_is(sign: float) -> None:
         torque=lambda t, w: [0.0, 0.0, np.exp(-(((sign * t - 14.0) / 0.01) ** 2))],
     )  # fmt: skip
     times = [0.0, 15.0 * sign, 20.0 * sign]
-    beside = series_beside(scene, times, 1e-9)
-    assert beside is not None
+    beside: Any = series_beside(scene, times, 1e-9)
     assert np.abs(beside.rows - solve(scene, np.sort(times)).omega[:: int(sign)]).max() < 1e-9
     spans = beside.spans
     assert spans[-1].end == 20.0 * sign
@@ -74,8 +73,7 @@ def test_spans_are_short_where_the_torque_is(sign: float) -> None:
 def test_spans_end_where_a_table_changes(sign: float) -> None:
     values = [(0.1, 0.0, 0.0), (0.0, 2.0, 0.0), (0.3, 0.0, 0.1)]
     torque = table(np.sort(sign * np.array([1.0, 2.0, 4.0])), values)
-    beside = series_beside(replace(SPHERE, torque=torque), [5.0 * sign], 1e-9)
-    assert beside is not None
+    beside: Any = series_beside(replace(SPHERE, torque=torque), [5.0 * sign], 1e-9)
     ends = [sign * each.end for each in beside.spans]
     assert ends == sorted(ends)
     assert {1.0, 2.0, 4.0, 5.0} <= {*ends}

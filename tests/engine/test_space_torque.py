@@ -79,8 +79,7 @@ def momentum(scene: Scene, times: Array) -> Array:
 )
 def test_series_agrees_with_seven_unknowns(name: str, time: float) -> None:
     times = [0.1 * time, 0.5 * time, time]
-    found = solve(SCENES[name], times, "taylor", 1e-12, attitude=True)
-    assert found.attitude is not None
+    found: Any = solve(SCENES[name], times, "taylor", 1e-12, attitude=True)
     omega, attitude = by_scipy(SCENES[name], times)
     assert np.abs(found.omega - omega).max() < 2e-12 * np.abs(omega).max()
     # The signs are compared too, because they are continuous.

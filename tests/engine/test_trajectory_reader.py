@@ -623,9 +623,8 @@ def test_torque_of_a_file_reads_only_what_is_there(tmp_path: Path) -> None:
 
     zero = [[0.0, []]] * 3
     written_with([["sqrt", [0]]], zero)
-    scene = load(path).scene
-    assert scene is not None
-    assert isinstance(scene.torque.tape, Tape)  # type: ignore[union-attr]
+    scene: Any = load(path).scene
+    assert isinstance(scene.torque.tape, Tape)
     for operation in bad:
         written_with([operation], zero)
         with pytest.raises(InputError):

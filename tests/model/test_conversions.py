@@ -148,8 +148,7 @@ def test_diagram_shows_omega_in_the_order_of_time(pyplot: Any, times: list[float
         assert (line.get_marker() == "o") == (len(times) == 1)
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("time (s)", "angular velocity (rad/s)")
     wanted = [rf"$\omega_{axis}$" for axis in (1, 2, 3)]
-    legend = ax.get_legend()
-    assert legend is not None
+    legend: Any = ax.get_legend()
     assert [each.get_text() for each in legend.get_texts()] == wanted
     ax.figure.canvas.draw()
 

@@ -33,8 +33,7 @@ MPMATH: Functions[Any] = Functions(
 
 def check(torque: StateTorque, source: Random) -> None:
     """Compare all derivatives of a torque with differences of many digits."""
-    tape = torque.tape
-    assert tape is not None
+    tape: Any = torque.tape
     at = [source.uniform(0.1, 1.0) for _ in SLOTS]
     found = evaluate(with_derivatives(tape, SLOTS), at, FLOATS)
     assert found[:3] == pytest.approx(evaluate(tape, at, FLOATS), rel=1e-14, abs=1e-14)

@@ -289,8 +289,7 @@ def test_what_neither_disk_nor_memory_holds_is_refused_at_once(
 @pytest.mark.campaign
 def test_memory_is_refused_where_the_half_of_it_ends(tmp_path: Path, monkeypatch: Patch) -> None:
     sweep = read_sweep(written(tmp_path, text(TILT)))
-    estimate = run_sweep(sweep, str(tmp_path / "store")).estimate
-    assert estimate is not None
+    estimate: Any = run_sweep(sweep, str(tmp_path / "store")).estimate
     monkeypatch.setattr("pyharness.model.scene._BYTES_PER_STEP", 1)  # only the sweep is too large
     # Pages of one byte: exactly half of the memory, and two bytes less.
     for number, refused in ((2 * estimate.memory, False), (2 * estimate.memory - 2, True)):
@@ -309,8 +308,7 @@ def test_memory_of_the_estimate_is_what_a_chunk_takes(samples: int, tmp_path: Pa
     top = f'chunk = 20000\nreductions = ["end", "status", {{name = "flips", samples = {samples}}}]'
     axis = '[[axis]]\nfield = "tilt"\nfrom = 0.1\nto = 1.0\ncount = 20000'
     sweep = read_sweep(written(tmp_path, text(axis, top=top)))
-    estimate = run_sweep(sweep, str(tmp_path / "store")).estimate
-    assert estimate is not None
+    estimate: Any = run_sweep(sweep, str(tmp_path / "store")).estimate
     tracemalloc.start()
     try:
         solve_chunk(sweep, 0)

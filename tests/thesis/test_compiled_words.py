@@ -20,7 +20,6 @@ from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.torque_law import TorqueLaw
-from pyharness.model.trajectory import Trajectory
 from pyharness.thesis import in_word
 from pyharness.thesis.cells import all_listings
 from pyharness.thesis.in_word import compiled_words, from_bytes, to_bytes
@@ -234,9 +233,8 @@ def test_compare_holds_fortran_against_the_twin(word: str, monkeypatch: pytest.M
     assert not found.unexpected
     honest = in_word.run_compiled
 
-    def wrong(*given: Any) -> Trajectory:
-        run = honest(*given)
-        assert run.exact is not None
+    def wrong(*given: Any) -> Any:
+        run: Any = honest(*given)
         numbers = run.exact.copy()
         numbers[7, 3] = numbers[7, 3] + numbers[7, 3]
         return replace(run, exact=numbers)

@@ -157,9 +157,8 @@ def test_lipschitz_constant_and_no_stop(velocity: bool) -> None:
     """Section V.2: terminated after only 25 steps, by the velocity, whether requested or not."""
     scene = case_scene(2)
     listing = Listing.original("runge-kutta")
-    run = compiled.run(scene, listing, velocity=velocity)
+    run: Any = compiled.run(scene, listing, velocity=velocity)
     assert run.ended == "stopped"
-    assert run.stop is not None
     assert (run.stop.step, run.stop.variable) == (25, "V2")
     assert run.stop.quotient > 500.0
     assert run.steps == len(run.time) == 25
@@ -169,8 +168,7 @@ def test_lipschitz_constant_and_no_stop(velocity: bool) -> None:
     assert (run.ended, run.steps, run.stop) == ("complete", 100, None)
     together = subset("runge-kutta", "corrected", keep=["lipschitz-tests-velocity"])
     for listing, variable in ((together, "UV"), (Listing.corrected("runge-kutta"), "U")):
-        stop = compiled.run(case_scene(5), listing, lipschitz=1e-3).stop
-        assert stop is not None
+        stop: Any = compiled.run(case_scene(5), listing, lipschitz=1e-3).stop
         assert stop.variable == variable
 
 

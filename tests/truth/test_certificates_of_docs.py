@@ -81,8 +81,7 @@ def test_the_command_makes_the_same_bytes(name: str) -> None:
 @pytest.mark.sampled
 @pytest.mark.parametrize("each", PLANNED, ids=lambda each: each.name)
 def test_the_reference_is_within_its_error_of_proved_rows(each: Planned) -> None:
-    found = reference(each.scene, each.times, precise=True)
-    assert found.remainder is not None
+    found: Any = reference(each.scene, each.times, precise=True)
     proved = page.proved_rows(each.name)
     for n, time in enumerate(each.times):
         middle, radius = proved[time]

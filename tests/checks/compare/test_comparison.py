@@ -186,13 +186,11 @@ def test_drifts_need_no_squares_of_the_given_size(size: float) -> None:
 
 def test_error_of_attitudes_is_an_angle() -> None:
     scene = replace(case_scene(4), steps=2, attitude=(0.5, -0.1, 0.7, 0.5))
-    truth = reference(scene, scene.times())
-    assert truth.attitude is not None
+    truth: Any = reference(scene, scene.times())
     # A rotation about an axis of space, and a change of the quaternion's sign, which has no effect.
     turn = (math.cos(5e-4), 0.0, math.sin(5e-4), 0.0)
     turned = np.array([truth.attitude[0], [-x for x in product(turn, tuple(truth.attitude[1]))]])
-    found = accuracy(scene, replace(_trajectory(truth.omega), attitude=turned), truth)
-    assert found.turned is not None
+    found: Any = accuracy(scene, replace(_trajectory(truth.omega), attitude=turned), truth)
     assert found.turned == pytest.approx([0.0, 1e-3], abs=1e-15, rel=1e-9)
     assert found.angle == found.turned[1]
     # The angular momentum rotates with the body, in proportion to its component across the axis.
@@ -307,9 +305,7 @@ def test_a_reading_that_is_not_adopted_is_not_judged(monkeypatch: pytest.MonkeyP
 
 
 def test_bits_of_all_that_a_program_returns_are_held() -> None:
-    run = PROGRAM_REGISTRY["runge-kutta"].run(case_scene(2), Listing.original("runge-kutta"))
-    assert run.velocity is not None
-    assert run.stop is not None
+    run: Any = PROGRAM_REGISTRY["runge-kutta"].run(case_scene(2), Listing.original("runge-kutta"))
     assert differences(run, run) == []
     assert distance(run, run) == 0.0
     velocity = run.velocity.copy()
@@ -325,8 +321,7 @@ def test_bits_of_all_that_a_program_returns_are_held() -> None:
         assert distance(run, changed) == ulp
     shorter = _trajectory(np.ones((3, 3)))
     assert distance(shorter, _trajectory(np.ones((2, 3)))) == math.inf
-    printed = PROGRAM_REGISTRY["two-term"].run(case_scene(2), Listing.corrected("two-term"))
-    assert printed.ier is not None
+    printed: Any = PROGRAM_REGISTRY["two-term"].run(case_scene(2), Listing.corrected("two-term"))
     assert differences(printed, replace(printed, ier=printed.ier + 129)) == ["IER"]
 
 

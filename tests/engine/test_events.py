@@ -181,12 +181,10 @@ def test_function_that_is_0_everywhere_has_no_event() -> None:
 
 
 def test_a_kink_within_a_step_ends_an_interval_of_zeros() -> None:
-    def late(t: Any, omega: Any) -> Any:
-        return min(float(omega[0]) - 0.33, 0.0)
 
     law = TorqueLaw((0.0, 0.0, 0.0), cosines=[((0.2, 0.0, 0.0), 1.0)])
     scene = Scene("ball", (0.3, 0.2, 0.9), moments=(2.0, 2.0, 2.0), torque=law)
-    found: Any = solve(scene, [7.0], events=late)
+    found: Any = solve(scene, [7.0], events=lambda t, omega: min(float(omega[0]) - 0.33, 0.0))
     wanted = [math.asin(0.3), 2.0 * math.pi + math.asin(0.3)]
     assert found.t_events[0] == pytest.approx(wanted, abs=1e-7)
 

@@ -131,11 +131,8 @@ def test_torque_that_accepts_numbers_only_is_told_of_opaque() -> None:
     with pytest.raises(InputError, match=r"accepts numbers only, .*opaque\(function\)"):
         Scene(**BODY, attitude=(1, 0, 0, 0), torque=torque)
 
-    def mistaken(t: Any, omega: Any) -> Any:
-        return omega[3]
-
     with pytest.raises(InputError, match=r"the function raised IndexError"):
-        Scene(**BODY, torque=mistaken)
+        Scene(**BODY, torque=lambda t, omega: omega[3])
     for returned, what in ((None, "nothing"), (2.0, "one number")):
         with pytest.raises(InputError, match=f"the function returned {what}; allowed: a function"):
             Scene(**BODY, torque=lambda t, omega, returned=returned: returned)

@@ -222,10 +222,7 @@ def test_a_reported_error_that_is_too_small_is_a_fault(
 ) -> None:
     right = entries._row
 
-    def blind(*given: Any) -> Result:
-        return replace(right(*given), estimate=1e-30)
-
-    monkeypatch.setattr(entries, "_row", blind)
+    monkeypatch.setattr(entries, "_row", lambda *given: replace(right(*given), estimate=1e-30))
     assert main(["--only", "3", "--seed", "test"]) == 1
     command = COMMAND.format(seed="test", number=3)
     assert f"{command}: blind, " in capsys.readouterr().out

@@ -13,11 +13,12 @@ import pytest
 
 from docs.campaign import page as promises
 from docs.campaign.tally import Row, Tally, merged, read
-from pyharness import InputError, solve
+from pyharness import solve
 from pyharness.model.trajectory import Trajectory
 from pyharness.truth.enclosed import Balls
 from pyharness.truth.reference import Reference, reference
 from tests.campaigns import proved
+from tests.refused import refused
 
 COMMAND = "python -m tests.campaigns.proved"
 
@@ -127,11 +128,9 @@ def test_parts_of_a_campaign_make_the_whole(tmp_path: Path) -> None:
     assert read(paths[2]).rows == both.rows == whole.rows
     assert both.counts == whole.counts
     assert [run.done for run in both.runs] == [6, 4]
-    with pytest.raises(InputError, match="common scenes"):
-        merged([paths[2], paths[0]])
+    refused("common scenes", merged, [paths[2], paths[0]])
     paths[0].write_text("{}")
-    with pytest.raises(InputError, match=r"first\.json: no tally"):
-        read(paths[0])
+    refused(r"first\.json: no tally", read, paths[0])
 
 
 def test_an_interrupt_leaves_the_finished_scenes(

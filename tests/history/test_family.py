@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import InputError, Scene, TorqueLaw, case_scene
+from pyharness import Scene, TorqueLaw, case_scene
 from pyharness.checks.theory.tableau import tableau
 from pyharness.cli.main import main
 from pyharness.history.family import (
@@ -30,6 +30,7 @@ from pyharness.thesis import compiled
 from pyharness.thesis.linear_solver import SINGULAR, leqt1f
 from pyharness.truth.reference import reference
 from tests.conftest import Printed
+from tests.refused import refused
 
 Capture = pytest.CaptureFixture[str]
 
@@ -291,14 +292,12 @@ def _row(*cells: str) -> str:
 
 @pytest.mark.parametrize("arguments", [("collocation", 2, (0.5,)), ("galerkin", 2, "gauss")])
 def test_points_of_no_member_are_refused(arguments: Any) -> None:
-    with pytest.raises(InputError, match="points"):
-        Member(*arguments)
+    refused("points", Member, *arguments)
 
 
 @pytest.mark.campaign
 def test_solution_that_leaves_every_bound_is_refused() -> None:
-    with pytest.raises(InputError, match=r"0\.9"):
-        order_table(replace(GROWING, step_size=0.3, steps=4))
+    refused(r"0\.9", order_table, replace(GROWING, step_size=0.3, steps=4))
 
 
 def test_error_that_is_0_has_no_order() -> None:

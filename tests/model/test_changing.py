@@ -19,6 +19,7 @@ from pyharness.model.records import scene_record
 from pyharness.model.scene_file import scene_text
 from pyharness.model.scene_report import heading
 from pyharness.torques import gravity_gradient
+from tests.refused import refused
 
 BOOMS = ChangingMoments([[40.0, 1.5, -0.25], [30.0, 0.5], [20.0]])
 
@@ -84,10 +85,8 @@ def test_span_of_a_random_polynomial_agrees_with_its_computed_zeros(seed: int) -
 def test_times_up_to_a_zero_are_checked() -> None:
     changing = ChangingMoments([[10.0, -0.5], [8.0, 1.0], [5.0]])
     changing.check((-7.9, 0.0, 19.9))
-    with pytest.raises(InputError, match=r"\b20 s"):
-        changing.check((1.0, 20.0))
-    with pytest.raises(InputError, match=r"-8 s.*-8\.5 s"):
-        changing.check((1.0, -8.5))
+    refused(r"\b20 s", changing.check, (1.0, 20.0))
+    refused(r"-8 s.*-8\.5 s", changing.check, (1.0, -8.5))
 
 
 FIRST = [[4.0, 1.0, 0.5], [1.0, 3.0, -0.25], [0.5, -0.25, 2.0]]

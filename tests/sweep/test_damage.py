@@ -18,6 +18,7 @@ from pyharness.sweep import run, store_layout
 from pyharness.sweep.batches import solve_chunk
 from pyharness.sweep.sweep import Sweep
 from pyharness.sweep.sweep_file import read_sweep
+from tests.refused import refused
 from tests.sweep.sweeps import TILT, files, run_sweep, text, written
 
 SWEEP = text(
@@ -96,8 +97,7 @@ def test_damaged_chunk_is_one_line_and_is_repaired(
     name: str, sweep: Sweep, store: Path, intact: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     DAMAGES[name](store / CHUNK)
-    with pytest.raises(InputError, match=f"^--out '{store}': .*'{CHUNK}'.*--repair"):
-        run_sweep(sweep, str(store))
+    refused(f"^--out '{store}': .*'{CHUNK}'.*--repair", run_sweep, sweep, str(store))
     computed = []
 
     def solved(sweep: Sweep, chunk: int) -> object:
@@ -119,8 +119,7 @@ def test_swapped_chunks_are_seen_with_their_checksums_too(
     # Two constant chunks may have the same bytes; chunks of `end` differ.
     for name in ("end/c/{}/0/0", "checksums/c/{}/0"):
         swap(store / name.format(0), store / name.format(1))
-    with pytest.raises(InputError, match=r"2 of 8 .*'checksums/c.*--repair"):
-        run_sweep(sweep, str(store))
+    refused(r"2 of 8 .*'checksums/c.*--repair", run_sweep, sweep, str(store))
     assert run_sweep(sweep, str(store), repair=True).repaired == 2
     assert files(store) == files(intact / "store")
 
@@ -130,8 +129,7 @@ def test_chunk_of_another_sweep_is_seen(intact: Path, store: Path, tmp_path: Pat
     run_sweep(other, str(tmp_path / "other"))
     for name in ("end/c/0/0/0", "status/c/0/0", "checksums/c/0/0"):
         shutil.copy(store / name, tmp_path / "other" / name)
-    with pytest.raises(InputError, match="'checksums/c/0/0'"):
-        run_sweep(other, str(tmp_path / "other"))
+    refused("'checksums/c/0/0'", run_sweep, other, str(tmp_path / "other"))
 
 
 METADATA = ("zarr.json", "end/zarr.json", "tilt/c/0", "component/c/0", "checksums/metadata")
@@ -149,8 +147,7 @@ def test_damaged_metadata_are_one_line_and_are_repaired(
     name: str, file: str, sweep: Sweep, store: Path, intact: Path
 ) -> None:
     DAMAGES[name](store / file)
-    with pytest.raises(InputError, match=f"--out '{store}'"):
-        run_sweep(sweep, str(store))
+    refused(f"--out '{store}'", run_sweep, sweep, str(store))
     assert run_sweep(sweep, str(store), repair=True).computed == 0
     assert files(store) == files(intact / "store")
 
@@ -164,8 +161,7 @@ def test_another_schema_is_refused_and_stays_as_it_was(
             shutil.copytree(new, tmp_path / "store")
     before = files(tmp_path / "store")
     for repair in (False, True):
-        with pytest.raises(InputError, match="schema 3"):
-            run_sweep(sweep, str(tmp_path / "store"), repair=repair)
+        refused("schema 3", run_sweep, sweep, str(tmp_path / "store"), repair=repair)
     assert files(tmp_path / "store") == before
 
 
@@ -175,8 +171,7 @@ def test_store_of_the_first_schema_is_refused(sweep: Sweep, store: Path) -> None
     described = json.loads((store / "zarr.json").read_text())
     described["attributes"]["schema"] = 1
     (store / "zarr.json").write_text(json.dumps(described))
-    with pytest.raises(InputError, match="schema 1"):
-        run_sweep(sweep, str(store))
+    refused("schema 1", run_sweep, sweep, str(store))
 
 
 @pytest.mark.campaign

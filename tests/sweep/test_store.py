@@ -26,6 +26,7 @@ from pyharness.sweep.run import check_size, forecast
 from pyharness.sweep.store import opened
 from pyharness.sweep.sweep import Sweep, points
 from pyharness.sweep.sweep_file import read_sweep
+from tests.refused import refused
 from tests.sweep.killed import ATTITUDE, OMEGA, kill_and_resume
 from tests.sweep.sweeps import PROGRAM, SQUARE, TILT, files, run_sweep, text, written
 
@@ -102,8 +103,7 @@ def test_disk_that_fills_ends_in_a_line_and_a_store_that_resumes(
     with monkeypatch.context() as patched:
         patched.setattr(_local, "_put", full)
         patched.setattr(run, "forecast", lambda *given: 0.0)
-        with pytest.raises(InputError, match="No space left on device"):
-            run_sweep(sweep, str(tmp_path / "full"))
+        refused("No space left on device", run_sweep, sweep, str(tmp_path / "full"))
     with opened(sweep, str(tmp_path / "full")) as found_store:
         done = found_store.done()
     assert any(done)
@@ -135,16 +135,13 @@ def test_store_of_another_sweep_stays_as_it_was(tmp_path: Path) -> None:
     run_sweep(sweep, str(tmp_path / "store"))
     before = files(tmp_path / "store")
     other = read_sweep(written(tmp_path, text(TILT) + "\n# other\n"))
-    with pytest.raises(InputError, match="--out"):
-        run_sweep(other, str(tmp_path / "store"))
+    refused("--out", run_sweep, other, str(tmp_path / "store"))
     assert files(tmp_path / "store") == before
     (tmp_path / "folder").mkdir()
     (tmp_path / "folder" / "letter").write_text("dear")
-    with pytest.raises(InputError, match="--out"):
-        run_sweep(sweep, str(tmp_path / "folder"))
+    refused("--out", run_sweep, sweep, str(tmp_path / "folder"))
     assert files(tmp_path / "folder") == {"letter": b"dear"}
-    with pytest.raises(InputError, match="--out"):
-        run_sweep(sweep, str(tmp_path / "sweep.toml"))
+    refused("--out", run_sweep, sweep, str(tmp_path / "sweep.toml"))
 
 
 def test_two_sweeps_do_not_write_to_one_store(tmp_path: Path) -> None:
@@ -253,8 +250,7 @@ def test_file_of_the_longest_axis_is_within_its_limit(tmp_path: Path, monkeypatc
     """
     assert 8 * MOST_VALUES * 257 // 256 + 1024 < store_layout.LARGEST_METADATA
     monkeypatch.setattr(store_layout, "LARGEST_METADATA", 100)
-    with pytest.raises(InputError, match="100"):
-        run_sweep(read_sweep(written(tmp_path, text(TILT))), str(tmp_path / "store"))
+    refused("100", run_sweep, read_sweep(written(tmp_path, text(TILT))), str(tmp_path / "store"))
     assert [each.name for each in tmp_path.iterdir()] == ["sweep.toml"]
 
 
@@ -267,8 +263,7 @@ def test_what_neither_disk_nor_memory_holds_is_refused_at_once(
     )
     sweep = read_sweep(written(tmp_path, text(long)))
     assert sweep.n_scenes == 10**15
-    with pytest.raises(InputError, match=r"25\.1 PB"):
-        run_sweep(sweep, str(tmp_path / "store"))
+    refused(r"25\.1 PB", run_sweep, sweep, str(tmp_path / "store"))
     # Each chunk has four files, and each of them takes a block of the disk.
     top = 'chunk = 1\nreductions = ["end", "status", "growth"]'
     small = read_sweep(written(tmp_path, text(TILT.replace("count = 6", "count = 1000"), top=top)))
@@ -277,12 +272,10 @@ def test_what_neither_disk_nor_memory_holds_is_refused_at_once(
     for spare, words in (("f_bavail", "16.4 MB, and 16.4 MB are free"), ("f_favail", "4000 files")):
         full = SimpleNamespace(**{**disk, spare: 3999})
         monkeypatch.setattr(os, "statvfs", lambda path, full=full: full)
-        with pytest.raises(InputError, match=words):
-            run_sweep(small, str(tmp_path / "store"))
+        refused(words, run_sweep, small, str(tmp_path / "store"))
     monkeypatch.undo()
     monkeypatch.setattr(os, "sysconf", lambda name: 10)
-    with pytest.raises(InputError, match="memory"):
-        run_sweep(small, str(tmp_path / "store"))
+    refused("memory", run_sweep, small, str(tmp_path / "store"))
     assert [each.name for each in tmp_path.iterdir()] == ["sweep.toml"]
 
 
@@ -292,12 +285,11 @@ def test_memory_is_refused_where_the_half_of_it_ends(tmp_path: Path, monkeypatch
     estimate: Any = run_sweep(sweep, str(tmp_path / "store")).estimate
     monkeypatch.setattr("pyharness.model.scene._BYTES_PER_STEP", 1)  # only the sweep is too large
     # Pages of one byte: exactly half of the memory, and two bytes less.
-    for number, refused in ((2 * estimate.memory, False), (2 * estimate.memory - 2, True)):
+    for number, is_refused in ((2 * estimate.memory, False), (2 * estimate.memory - 2, True)):
         sizes = {"SC_PHYS_PAGES": number, "SC_PAGE_SIZE": 1}
         monkeypatch.setattr(os, "sysconf", sizes.__getitem__)
-        if refused:
-            with pytest.raises(InputError, match="memory"):
-                run_sweep(sweep, str(tmp_path / "refused"))
+        if is_refused:
+            refused("memory", run_sweep, sweep, str(tmp_path / "refused"))
         else:
             run_sweep(sweep, str(tmp_path / "kept"))
 

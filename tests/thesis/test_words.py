@@ -11,7 +11,6 @@ import pytest
 
 from pyharness import run_program
 from pyharness.checks.compare.agreement import differences
-from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene_file import case_scene
 from pyharness.thesis import in_word
@@ -20,6 +19,7 @@ from pyharness.thesis.programs import WORD_NAMES
 from pyharness.thesis.vectors import answers, from_octal, to_octal
 from pyharness.thesis.word import RULES, WORDS, Word
 from tests.campaigns.words_campaign import FLOATS, differing
+from tests.refused import refused
 from tests.thesis.exact_words import disagreements
 from tests.thesis.test_programs import NASTY
 
@@ -52,11 +52,9 @@ def test_vectors_agree(tmp_path: Path) -> None:
     path = tmp_path / "vectors.json"
     for content in ("[3]", "3"):
         path.write_text(content)
-        with pytest.raises(InputError, match="vectors"):
-            answers(path)
+        refused("vectors", answers, path)
     path.write_text('{"schema": 1, "vectors": []}')
-    with pytest.raises(InputError, match="vectors is empty; allowed: "):
-        answers(path)
+    refused("vectors is empty; allowed: ", answers, path)
 
 
 def test_octal_words_are_numbers_and_back() -> None:

@@ -12,7 +12,7 @@ from pyharness.model.attitude import product
 from pyharness.model.state_torque import of_law
 from pyharness.truth.reference import reference
 from tests.campaigns import entries
-from tests.campaigns.entries import ENTRIES, Result
+from tests.campaigns.entries import ENTRIES
 from tests.campaigns.estimates import truth
 from tests.campaigns.estimates.__main__ import COMMAND, SENSITIVE, Answer, answers, main
 from tests.campaigns.estimates.scenes import COARSEST, FINEST, KINDS, Draw, drawn

@@ -1,0 +1,17 @@
+"""Whether a call is refused as a user's mistake should be: by an InputError of one line."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from pyharness import InputError
+
+
+def refused(words: str, call: Callable[..., object], *given: Any, **named: Any) -> str:
+    """Call a function that must refuse its arguments in such words, and return its message."""
+    with pytest.raises(InputError, match=words) as caught:
+        call(*given, **named)
+    message = str(caught.value)
+    assert "\n" not in message
+    return message

@@ -206,7 +206,7 @@ def test_choices_that_do_not_jump_are_recorded() -> None:
     ({"moments": inertia_table([0, 1], [BODY, BODY + np.eye(3)])}, "write inertia="),
 ])  # fmt: skip
 def test_what_is_no_inertia_is_refused(given: Any, message: str) -> None:
-    refused(message, solve, Scene(omega=START, **given), 5.0)
+    refused(message, lambda: solve(Scene(omega=START, **given), 5.0))
 
 
 @pytest.mark.parametrize("text", [

@@ -20,17 +20,14 @@ TESTS = {
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize(
-    ("path", "wanted"),
-    [
-        ("pyharness/engine/taylor.py", ["test_taylor", "test_plan"]),
-        ("fortran/modern/taylor_march.f90", ["test_other", "test_plan", "test_taylor"]),
-        ("tests/truth/test_other.py", ["test_other"]),
-        ("docs/index.md", []),
-        ("pyharness/engine/registry.py", ["test_taylor", "test_plan"]),
-        ("fortran/modern/solve_all.c", ["test_taylor", "test_plan"]),
-    ],
-)
+@pytest.mark.parametrize(("path", "wanted"), [
+    ("pyharness/engine/taylor.py", ["test_taylor", "test_plan"]),
+    ("fortran/modern/taylor_march.f90", ["test_other", "test_plan", "test_taylor"]),
+    ("tests/truth/test_other.py", ["test_other"]),
+    ("docs/index.md", []),
+    ("pyharness/engine/registry.py", ["test_taylor", "test_plan"]),
+    ("fortran/modern/solve_all.c", ["test_taylor", "test_plan"]),
+])  # fmt: skip
 def test_nearest_tests_come_first(path: str, wanted: list[str]) -> None:
     assert [Path(each).stem for each in nearest([path], TESTS)] == wanted
 

@@ -39,20 +39,17 @@ def test_expressions_are_found_in_prose_alone(
     assert [line for line, *_ in findings(path)] == lines
 
 
-@pytest.mark.parametrize(
-    ("text", "found"),
-    [
-        (
-            "from pyharness.bench.random_loads import _LENGTHS",
-            ["pyharness.bench.random_loads._LENGTHS"],
-        ),
-        ("def f():\n    from tests.attitude_errors import _draw", ["tests.attitude_errors._draw"]),
-        ("from pyharness.bench._own import name", ["pyharness.bench._own._own"]),
-        ("from pyharness.checks.judge import _own", []),
-        ("from pyharness import _kernels", []),
-        ("from collections import _private", []),
-    ],
-)
+@pytest.mark.parametrize(("text", "found"), [
+    (
+        "from pyharness.bench.random_loads import _LENGTHS",
+        ["pyharness.bench.random_loads._LENGTHS"],
+    ),
+    ("def f():\n    from tests.attitude_errors import _draw", ["tests.attitude_errors._draw"]),
+    ("from pyharness.bench._own import name", ["pyharness.bench._own._own"]),
+    ("from pyharness.checks.judge import _own", []),
+    ("from pyharness import _kernels", []),
+    ("from collections import _private", []),
+])  # fmt: skip
 def test_private_names_of_other_packages_are_found(text: str, found: list[str]) -> None:
     assert [name for _, name in private_imports(text, "pyharness.checks")] == found
 

@@ -63,16 +63,13 @@ def test_a_wrong_port_ends_with_1_and_has_its_reports(tmp_path: Path) -> None:
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({"PORT_COMMAND": ""}, "--port: no command is given"),
-        ({}, "--port: no command is given"),
-        ({"PORT_COMMAND": "cat", "PORT_CELLS": "--help"}, "--cell --help: there is no such cell"),
-        ({"PORT_COMMAND": "cat", "PORT_DRAWS": "$(touch made)"}, "--draws: '$(touch made)' where"),
-        ({"PORT_COMMAND": "cat", "PORT_CELLS": "x; touch made"}, "--cell x; touch made: there is"),
-    ],
-)
+@pytest.mark.parametrize(("given", "message"), [
+    ({"PORT_COMMAND": ""}, "--port: no command is given"),
+    ({}, "--port: no command is given"),
+    ({"PORT_COMMAND": "cat", "PORT_CELLS": "--help"}, "--cell --help: there is no such cell"),
+    ({"PORT_COMMAND": "cat", "PORT_DRAWS": "$(touch made)"}, "--draws: '$(touch made)' where"),
+    ({"PORT_COMMAND": "cat", "PORT_CELLS": "x; touch made"}, "--cell x; touch made: there is"),
+])  # fmt: skip
 def test_values_are_never_read_by_a_shell(
     given: dict[str, str], message: str, tmp_path: Path
 ) -> None:

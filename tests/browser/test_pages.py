@@ -205,17 +205,14 @@ def test_no_page_has_a_barrier(browser: Chrome, site: Path) -> None:
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize(
-    ("bad", "rule"),
-    [
-        ("<ul><li><a href='x'>a</a></li><li><a href='x'></a></li></ul>", "link-name"),
-        ("<ul><li><a href='x'>a</a></li><p>b</p></ul>", "list"),
-        ("<div><div><img src='x' alt=''><img src='x'></div></div>", "image-alt"),
-        ("<table><tr><td>a<td>b</tr><tr><td>a<td><input></tr></table>", "label"),
-        ("<section><p>a</p><p role='nonsense'>b</p></section>", "aria-roles"),
-        ("<h2>t</h2><p>a</p><h5>u</h5>", "heading-order"),
-    ],
-)
+@pytest.mark.parametrize(("bad", "rule"), [
+    ("<ul><li><a href='x'>a</a></li><li><a href='x'></a></li></ul>", "link-name"),
+    ("<ul><li><a href='x'>a</a></li><p>b</p></ul>", "list"),
+    ("<div><div><img src='x' alt=''><img src='x'></div></div>", "image-alt"),
+    ("<table><tr><td>a<td>b</tr><tr><td>a<td><input></tr></table>", "label"),
+    ("<section><p>a</p><p role='nonsense'>b</p></section>", "aria-roles"),
+    ("<h2>t</h2><p>a</p><h5>u</h5>", "heading-order"),
+])  # fmt: skip
 def test_a_new_barrier_is_found(browser: Chrome, tmp_path: Path, bad: str, rule: str) -> None:
     examined = Examined()
     good = (

@@ -66,17 +66,14 @@ def test_no_promise_is_broken_in_a_few_scenes() -> None:
 
 
 @pytest.mark.sampled
-@pytest.mark.parametrize(
-    ("name", "fault", "result"),
-    [
-        ("solve", _omega, "short auto estimate"),
-        ("solve", _turned, "short closed-form angle estimate"),
-        ("solve", _negative, "short auto angle"),
-        ("solve", _sure, "short taylor estimate"),
-        ("reference", _reference, "short reference"),
-        ("reference", _precise, "short precise"),
-    ],
-)
+@pytest.mark.parametrize(("name", "fault", "result"), [
+    ("solve", _omega, "short auto estimate"),
+    ("solve", _turned, "short closed-form angle estimate"),
+    ("solve", _negative, "short auto angle"),
+    ("solve", _sure, "short taylor estimate"),
+    ("reference", _reference, "short reference"),
+    ("reference", _precise, "short precise"),
+])  # fmt: skip
 def test_a_planted_fault_is_found(
     name: str, fault: Callable[[Any], Any], result: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

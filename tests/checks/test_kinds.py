@@ -337,19 +337,16 @@ def _off(run: Trajectory) -> Trajectory:
 
 
 @pytest.mark.sampled
-@pytest.mark.parametrize(
-    ("change", "only", "note"),
-    [
-        (_shorter, "schemes", "complete, or no velocity"),
-        (_shorter, "stops", "complete, or no velocity"),
-        (partial(replace, velocity=None), "schemes", "complete, or no velocity"),
-        (partial(_other_stop, variable="V3"), "stops/case-3", "due Stop("),
-        (_later, "stops/case-3", "due Stop("),
-        (_off, "schemes/runge-kutta/case-3", "most at step 100, U2"),
-        (lambda run: replace(run, evaluations=run.evaluations - 1), "cells/two-term/case-3", "due"),
-        (lambda run: replace(run, evaluations=run.evaluations + 1), "cells/two-term/case-3", "due"),
-    ],
-)
+@pytest.mark.parametrize(("change", "only", "note"), [
+    (_shorter, "schemes", "complete, or no velocity"),
+    (_shorter, "stops", "complete, or no velocity"),
+    (partial(replace, velocity=None), "schemes", "complete, or no velocity"),
+    (partial(_other_stop, variable="V3"), "stops/case-3", "due Stop("),
+    (_later, "stops/case-3", "due Stop("),
+    (_off, "schemes/runge-kutta/case-3", "most at step 100, U2"),
+    (lambda run: replace(run, evaluations=run.evaluations - 1), "cells/two-term/case-3", "due"),
+    (lambda run: replace(run, evaluations=run.evaluations + 1), "cells/two-term/case-3", "due"),
+])  # fmt: skip
 def test_what_is_not_as_due_in_both_languages_is_named(
     change: Callable[[Trajectory], Trajectory], only: str, note: str
 ) -> None:

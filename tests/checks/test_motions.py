@@ -27,18 +27,15 @@ def test_the_axial_top_is_the_reference() -> None:
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize(
-    "only",
-    [
-        "torque/taylor/fast-1e6,torque/taylor/axial-1e6,torque/gauss-2/huge-from-rest",
-        "torque/dop853/tiny-5e-324,torque/quick/averaged-1e16,torque/prepared-auto/resonant",
-        "torque/closed-form,torque/runge-kutta/axial-1e6",
-        "length/closed-form,length/dop853,length/two-term/case-4/corrected",
-        "invariance/taylor,invariance/gauss-4,invariance/runge-kutta,invariance/quick",
-        "attitude/closed-form/montgomery,attitude/auto/needle,attitude/taylor/space,attitude/angles",
-        "threads/taylor,threads/prepared-auto,threads/refusals,threads/two-term",
-    ],
-)
+@pytest.mark.parametrize("only", [
+    "torque/taylor/fast-1e6,torque/taylor/axial-1e6,torque/gauss-2/huge-from-rest",
+    "torque/dop853/tiny-5e-324,torque/quick/averaged-1e16,torque/prepared-auto/resonant",
+    "torque/closed-form,torque/runge-kutta/axial-1e6",
+    "length/closed-form,length/dop853,length/two-term/case-4/corrected",
+    "invariance/taylor,invariance/gauss-4,invariance/runge-kutta,invariance/quick",
+    "attitude/closed-form/montgomery,attitude/auto/needle,attitude/taylor/space,attitude/angles",
+    "threads/taylor,threads/prepared-auto,threads/refusals,threads/two-term",
+])  # fmt: skip
 def test_bounds_hold(only: str) -> None:
     asked = only.split(",")
     checks = list(stress(asked))

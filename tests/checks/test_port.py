@@ -95,33 +95,30 @@ def test_numbers_are_read_in_every_form() -> None:
     assert stopped.stop.quotient == math.inf
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"rows": [ROW]}, "1 rows of a run of 2 steps that ended 'complete'"),
-        ({"rows": [ROW] * 3}, "3 rows of a run of 2 steps"),
-        ({"rows": None}, "rows: nothing where a list belongs"),
-        ({"rows": [ROW, 3]}, "row 2: a whole number where a list belongs"),
-        ({"rows": [ROW, ROW[:6]]}, "row 2 has 6 numbers; it takes 7: TIME U1"),
-        ({"rows": [ROW, [*ROW[:6], None]]}, "row 2: nothing where a number belongs"),
-        ({"rows": [ROW, [*ROW[:6], True]]}, "row 2: true or false where a number belongs"),
-        ({"rows": [ROW, [*ROW[:6], "one"]]}, 'row 2: "one" is no number'),
-        ({"rows": [ROW, [*ROW[:6], "0xgg"]]}, 'row 2: "0xgg" is no number'),
-        ({"rows": [ROW, [*ROW[:6], "1_0"]]}, 'row 2: "1_0" is no number'),
-        ({"rows": [ROW, [*ROW[:6], 10**400]]}, "is no number of binary64"),
-        ({"ended": "done"}, 'ended is "done"; allowed: complete, stopped, overflow'),
-        ({"ended": ["complete"]}, "ended is"),
-        ({"ended": "stopped"}, "ended 'stopped' with no stop"),
-        ({"stop": STOP}, "ended 'complete' with a stop"),
-        ({"ended": "stopped", "stop": {**STOP, "variable": "W1"}}, 'stop variable "W1"'),
-        ({"ended": "stopped", "stop": {**STOP, "variable": []}}, "stop variable []"),
-        ({"ended": "stopped", "stop": {**STOP, "step": "2"}}, "stop step: text where a whole"),
-        ({"ended": "stopped", "stop": {"step": 2}}, "stop is no object with step"),
-        ({"ended": "stopped", "stop": 3}, "stop is no object with step"),
-        ({"ier": [0]}, "1 values of ier with 2 rows"),
-        ({"ier": [0, 0.5]}, "ier: a number where a whole number belongs"),
-    ],
-)
+@pytest.mark.parametrize(("change", "words"), [
+    ({"rows": [ROW]}, "1 rows of a run of 2 steps that ended 'complete'"),
+    ({"rows": [ROW] * 3}, "3 rows of a run of 2 steps"),
+    ({"rows": None}, "rows: nothing where a list belongs"),
+    ({"rows": [ROW, 3]}, "row 2: a whole number where a list belongs"),
+    ({"rows": [ROW, ROW[:6]]}, "row 2 has 6 numbers; it takes 7: TIME U1"),
+    ({"rows": [ROW, [*ROW[:6], None]]}, "row 2: nothing where a number belongs"),
+    ({"rows": [ROW, [*ROW[:6], True]]}, "row 2: true or false where a number belongs"),
+    ({"rows": [ROW, [*ROW[:6], "one"]]}, 'row 2: "one" is no number'),
+    ({"rows": [ROW, [*ROW[:6], "0xgg"]]}, 'row 2: "0xgg" is no number'),
+    ({"rows": [ROW, [*ROW[:6], "1_0"]]}, 'row 2: "1_0" is no number'),
+    ({"rows": [ROW, [*ROW[:6], 10**400]]}, "is no number of binary64"),
+    ({"ended": "done"}, 'ended is "done"; allowed: complete, stopped, overflow'),
+    ({"ended": ["complete"]}, "ended is"),
+    ({"ended": "stopped"}, "ended 'stopped' with no stop"),
+    ({"stop": STOP}, "ended 'complete' with a stop"),
+    ({"ended": "stopped", "stop": {**STOP, "variable": "W1"}}, 'stop variable "W1"'),
+    ({"ended": "stopped", "stop": {**STOP, "variable": []}}, "stop variable []"),
+    ({"ended": "stopped", "stop": {**STOP, "step": "2"}}, "stop step: text where a whole"),
+    ({"ended": "stopped", "stop": {"step": 2}}, "stop is no object with step"),
+    ({"ended": "stopped", "stop": 3}, "stop is no object with step"),
+    ({"ier": [0]}, "1 values of ier with 2 rows"),
+    ({"ier": [0, 0.5]}, "ier: a number where a whole number belongs"),
+])  # fmt: skip
 def test_what_is_no_answer_is_told_in_a_line(change: dict[str, Any], words: str) -> None:
     with pytest.raises(PortError, match=re.escape(words)):
         read_answer(json.dumps({**FINE, **change}).encode(), 2)
@@ -145,19 +142,16 @@ def test_what_is_no_object_is_told_in_a_line(line: bytes, words: str) -> None:
 
 
 @pytest.mark.sampled
-@pytest.mark.parametrize(
-    ("script", "words"),
-    [
-        ("input(); print('hello', flush=True); input()", "no JSON: 'hello'"),
-        ("input(); print('{}\\n{}', flush=True); input()", "more than one line for one run"),
-        ("import time; time.sleep(60)", "no answer within 2 s"),
-        ("input(); raise ValueError('lost')", "1 before it had answered: ValueError: lost"),
-        ("raise SystemExit(0)", "it ended with exit code 0 before it had answered"),
-        ("import os; os.kill(os.getpid(), 9)", "it ended by signal 9 before it had answered"),
-        ("import os, time; os.close(1); time.sleep(60)", "it closed its input or output"),
-        ("while True: print('x' * 4096, end='')", "more than 64 MB for one run"),
-    ],
-)
+@pytest.mark.parametrize(("script", "words"), [
+    ("input(); print('hello', flush=True); input()", "no JSON: 'hello'"),
+    ("input(); print('{}\\n{}', flush=True); input()", "more than one line for one run"),
+    ("import time; time.sleep(60)", "no answer within 2 s"),
+    ("input(); raise ValueError('lost')", "1 before it had answered: ValueError: lost"),
+    ("raise SystemExit(0)", "it ended with exit code 0 before it had answered"),
+    ("import os; os.kill(os.getpid(), 9)", "it ended by signal 9 before it had answered"),
+    ("import os, time; os.close(1); time.sleep(60)", "it closed its input or output"),
+    ("while True: print('x' * 4096, end='')", "more than 64 MB for one run"),
+])  # fmt: skip
 def test_a_port_that_does_not_answer(script: str, words: str, tmp_path: Path) -> None:
     *_, check = port(_python(tmp_path / "port.py", script), sample(), patience=2.0)
     assert (check.passed, check.value) == (False, None)

@@ -232,30 +232,24 @@ def test_run_for_people_fits_the_terminal(printed: Printed) -> None:
         assert max(map(len, lines)) <= 100
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ("3 --program two-term --steps 1 --step-size 20", "1 step of 20 s"),
-        ("3 --program two-term --steps 1 --step-size 20", "(1 step, "),
-        ("3 --program four-term", "complete (100 steps, 500 right-hand sides)"),
-        ("2 --program runge-kutta", "stopped at step 25 by V2: Lipschitz quotient 3.3e3 ("),
-        ("3 --method taylor --times 0.1", "tolerance 1e-09"),
-        ("3 --method gauss-1 --times 0.1", "tolerance 1e-06"),
-    ],
-)
+@pytest.mark.parametrize(("options", "words"), [
+    ("3 --program two-term --steps 1 --step-size 20", "1 step of 20 s"),
+    ("3 --program two-term --steps 1 --step-size 20", "(1 step, "),
+    ("3 --program four-term", "complete (100 steps, 500 right-hand sides)"),
+    ("2 --program runge-kutta", "stopped at step 25 by V2: Lipschitz quotient 3.3e3 ("),
+    ("3 --method taylor --times 0.1", "tolerance 1e-09"),
+    ("3 --method gauss-1 --times 0.1", "tolerance 1e-06"),
+])  # fmt: skip
 def test_run_says(options: str, words: str, printed: Printed) -> None:
     assert words in printed(f"run --case {options}")
 
 
-@pytest.mark.parametrize(
-    ("line", "told"),
-    [
-        ("plan --case 3 --times 1,2,1", "times: not strictly monotonic"),
-        ("deck --program two-term --terms 5", "terms: not for this program; allowed: with"),
-        ("deck --program runge-kutta --terms 5", "terms: not for this program; allowed: with"),
-        ("deck --program four-term --terms 4", "terms is 4; allowed: 3 or 5"),
-    ],
-)
+@pytest.mark.parametrize(("line", "told"), [
+    ("plan --case 3 --times 1,2,1", "times: not strictly monotonic"),
+    ("deck --program two-term --terms 5", "terms: not for this program; allowed: with"),
+    ("deck --program runge-kutta --terms 5", "terms: not for this program; allowed: with"),
+    ("deck --program four-term --terms 4", "terms is 4; allowed: 3 or 5"),
+])  # fmt: skip
 def test_an_unsuitable_value_is_refused(line: str, told: str, capsys: Capture) -> None:
     assert main(line.split()) == 2
     assert told in capsys.readouterr().err

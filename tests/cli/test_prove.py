@@ -42,15 +42,12 @@ def test_table_has_the_proved_values(printed: Printed) -> None:
     assert all(value in text for value in row["omega"])
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        f"{DIGITS} --certificate new.json",
-        "prove --case 7 --times=-0.05 --digits 5",
-        "prove --case 3 --times 0.01 --digits 5 --velocity",
-        "prove --scene damped.toml --times 0,0.1 --digits 5 --transition",
-    ],
-)
+@pytest.mark.parametrize("command", [
+    f"{DIGITS} --certificate new.json",
+    "prove --case 7 --times=-0.05 --digits 5",
+    "prove --case 3 --times 0.01 --digits 5 --velocity",
+    "prove --scene damped.toml --times 0,0.1 --digits 5 --transition",
+])  # fmt: skip
 def test_json_has_the_documented_fields(printed: Printed, command: str) -> None:
     if "new.json" not in command and "case" not in command:
         pytest.importorskip("flint")

@@ -90,18 +90,15 @@ def test_listed_divergence_passes_and_one_that_no_longer_occurs_fails(
     assert found.passed == passed
 
 
-@pytest.mark.parametrize(
-    ("command", "record", "words"),
-    [
-        ("gfortran -O2 -O3 -ffp-contract=off", {}, None),
-        ("gfortran -O3 -O2 -ffp-contract=off", {}, "with ['-O2'], not -O3"),
-        ("gfortran -O3 -ffp-contract=off -ffp-contract=fast", {}, "not -ffp-contract=off"),
-        ("flang -O3 -ffp-contract=off", {}, "meson ran flang"),
-        ("gfortran -O3 -ffp-contract=off", {"extension": "/elsewhere/_kernels.so"}, "loaded from"),
-        ("gfortran -O3 -ffp-contract=off", {"compiler": "llvm-flang 19"}, "not by gcc"),
-        ("gfortran -O3 -ffp-contract=off", {"flags": "-O3"}, "does not tell of -ffp-contract=off"),
-    ],
-)
+@pytest.mark.parametrize(("command", "record", "words"), [
+    ("gfortran -O2 -O3 -ffp-contract=off", {}, None),
+    ("gfortran -O3 -O2 -ffp-contract=off", {}, "with ['-O2'], not -O3"),
+    ("gfortran -O3 -ffp-contract=off -ffp-contract=fast", {}, "not -ffp-contract=off"),
+    ("flang -O3 -ffp-contract=off", {}, "meson ran flang"),
+    ("gfortran -O3 -ffp-contract=off", {"extension": "/elsewhere/_kernels.so"}, "loaded from"),
+    ("gfortran -O3 -ffp-contract=off", {"compiler": "llvm-flang 19"}, "not by gcc"),
+    ("gfortran -O3 -ffp-contract=off", {"flags": "-O3"}, "does not tell of -ffp-contract=off"),
+])  # fmt: skip
 def test_build_that_is_not_what_it_claims_is_named(
     command: str, record: dict[str, str], words: str | None, tmp_path: Path
 ) -> None:
@@ -143,23 +140,20 @@ def _untold(call: Callable[..., Any], *given: Any) -> bool:
     return False
 
 
-@pytest.mark.parametrize(
-    ("raised", "status", "quotient", "is_told"),
-    [
-        (0, COMPLETE, 0.0, True),
-        (TOO_LARGE, OVERFLOW, 0.0, True),
-        (TOO_LARGE | INVALID, OVERFLOW, 0.0, True),
-        (TOO_LARGE | INVALID, GAVE_UP, 0.0, True),
-        (DIVIDE, COMPLETE, np.inf, True),
-        (TOO_LARGE, COMPLETE, 0.0, False),
-        (INVALID, COMPLETE, 0.0, False),
-        (INVALID, OVERFLOW, 0.0, False),
-        (DIVIDE, COMPLETE, 0.0, False),
-        (DIVIDE, OVERFLOW, 0.0, False),
-        (DIVIDE | TOO_LARGE, OVERFLOW, 0.0, True),
-        (TOO_LARGE, COMPLETE, np.inf, False),
-    ],
-)
+@pytest.mark.parametrize(("raised", "status", "quotient", "is_told"), [
+    (0, COMPLETE, 0.0, True),
+    (TOO_LARGE, OVERFLOW, 0.0, True),
+    (TOO_LARGE | INVALID, OVERFLOW, 0.0, True),
+    (TOO_LARGE | INVALID, GAVE_UP, 0.0, True),
+    (DIVIDE, COMPLETE, np.inf, True),
+    (TOO_LARGE, COMPLETE, 0.0, False),
+    (INVALID, COMPLETE, 0.0, False),
+    (INVALID, OVERFLOW, 0.0, False),
+    (DIVIDE, COMPLETE, 0.0, False),
+    (DIVIDE, OVERFLOW, 0.0, False),
+    (DIVIDE | TOO_LARGE, OVERFLOW, 0.0, True),
+    (TOO_LARGE, COMPLETE, np.inf, False),
+])  # fmt: skip
 def test_guard_lets_through_what_the_answer_tells_of(
     raised: int, status: int, quotient: float, is_told: bool, guarded_entry: Guarded
 ) -> None:
@@ -178,19 +172,16 @@ def test_guard_knows_an_attempt_that_is_refused(
     assert _untold(guarded_entry(TOO_LARGE, COMPLETE, name="solve_packed"), packed) != is_told
 
 
-@pytest.mark.parametrize(
-    ("raised", "status", "operation", "is_told"),
-    [
-        (DIVIDE, OVERFLOW, Operations.PRODUCT, True),
-        (INVALID, OVERFLOW, Operations.PRODUCT, True),
-        (INVALID, Statuses.STALLED, Operations.PRODUCT, True),
-        (TOO_LARGE, COMPLETE, Operations.PRODUCT, True),
-        (DIVIDE, COMPLETE, Operations.PRODUCT, False),
-        (INVALID, COMPLETE, Operations.PRODUCT, False),
-        (INVALID, COMPLETE, Operations.SQRT, True),
-        (DIVIDE, COMPLETE, Operations.QUOTIENT, True),
-    ],
-)
+@pytest.mark.parametrize(("raised", "status", "operation", "is_told"), [
+    (DIVIDE, OVERFLOW, Operations.PRODUCT, True),
+    (INVALID, OVERFLOW, Operations.PRODUCT, True),
+    (INVALID, Statuses.STALLED, Operations.PRODUCT, True),
+    (TOO_LARGE, COMPLETE, Operations.PRODUCT, True),
+    (DIVIDE, COMPLETE, Operations.PRODUCT, False),
+    (INVALID, COMPLETE, Operations.PRODUCT, False),
+    (INVALID, COMPLETE, Operations.SQRT, True),
+    (DIVIDE, COMPLETE, Operations.QUOTIENT, True),
+])  # fmt: skip
 def test_guard_knows_that_a_users_torque_may_be_singular(
     raised: int, status: int, operation: int, is_told: bool, guarded_entry: Guarded
 ) -> None:

@@ -34,15 +34,12 @@ def test_no_link_is_dead(built_site: dict[str, bytes]) -> None:
     assert found == []
 
 
-@pytest.mark.parametrize(
-    ("page", "old", "new"),
-    [
-        ("index.html", b'href="thesis.html"', b'href="these.html"'),
-        ("claims.html", b'href="#evidence"', b'href="#evident"'),
-        ("docs/article/article.html", b'src="../figures/', b'src="../figure/'),
-        ("listing/two-term.html", b"../apparatus.html#", b"../apparatus.html#no-"),
-    ],
-)
+@pytest.mark.parametrize(("page", "old", "new"), [
+    ("index.html", b'href="thesis.html"', b'href="these.html"'),
+    ("claims.html", b'href="#evidence"', b'href="#evident"'),
+    ("docs/article/article.html", b'src="../figures/', b'src="../figure/'),
+    ("listing/two-term.html", b"../apparatus.html#", b"../apparatus.html#no-"),
+])  # fmt: skip
 def test_a_dead_link(built_site: dict[str, bytes], page: str, old: bytes, new: bytes) -> None:
     assert old in built_site[page]
     broken = built_site | {page: built_site[page].replace(old, new)}
@@ -307,19 +304,16 @@ def test_verdicts_are_counted_for_both() -> None:
     assert sum(second for _, second in found.values()) == len(judged) - 1
 
 
-@pytest.mark.parametrize(
-    ("name", "target", "found"),
-    [
-        ("atlas/README.md", "../article/article.md#results", "../article/article.html#results"),
-        ("explanation/methods.md", "../figures/growth.svg", "../figures/growth.svg"),
-        ("explanation/methods.md", "../../README.md", None),
-        ("explanation/methods.md", "../contributing/testing.md", None),
-        ("explanation/methods.md", "../atlas/stops.csv", "../atlas/stops.csv"),
-        ("explanation/methods.md", "missing.md", None),
-        ("explanation/methods.md", "../space-torque.toml", None),
-        ("explanation/methods.md", "#which-one", "#which-one"),
-        ("explanation/methods.md", "https://example.org/a.md", "https://example.org/a.md"),
-    ],
-)
+@pytest.mark.parametrize(("name", "target", "found"), [
+    ("atlas/README.md", "../article/article.md#results", "../article/article.html#results"),
+    ("explanation/methods.md", "../figures/growth.svg", "../figures/growth.svg"),
+    ("explanation/methods.md", "../../README.md", None),
+    ("explanation/methods.md", "../contributing/testing.md", None),
+    ("explanation/methods.md", "../atlas/stops.csv", "../atlas/stops.csv"),
+    ("explanation/methods.md", "missing.md", None),
+    ("explanation/methods.md", "../space-torque.toml", None),
+    ("explanation/methods.md", "#which-one", "#which-one"),
+    ("explanation/methods.md", "https://example.org/a.md", "https://example.org/a.md"),
+])  # fmt: skip
 def test_links_of_documents(name: str, target: str, found: str | None) -> None:
     assert documents._link(shipped("docs"), name, target) == found

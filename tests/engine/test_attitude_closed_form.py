@@ -206,20 +206,17 @@ def test_where_no_digit_is_left() -> None:
         closed_form_attitude(_BODY, _START, _IDENTITY, [1.0, 1e17])
 
 
-@pytest.mark.parametrize(
-    ("moments", "omega", "attitude", "status"),
-    [
-        ((1.0, 2.0, 0.0), _START, _IDENTITY, 3),
-        ((1.0, 2.0, math.inf), _START, _IDENTITY, 3),
-        ((1.0, 2.0, 1e-40), _START, _IDENTITY, 3),
-        (_BODY, (1.0, math.inf, 1.0), _IDENTITY, 3),
-        (_BODY, _START, (0.0, 0.0, 0.0, 0.0), 3),
-        (_BODY, _START, (0.0, -math.inf, 0.0, 1.0), 3),
-        (_BODY, (1e-130, 1.0, 0.0), _IDENTITY, 3),
-        (_BODY, (0.0, 1.0, 1e-170), _IDENTITY, 3),
-        ((1e-20, 1.0, 2.0), (1e303, 1e308, 1.7e308), _IDENTITY, 2),
-    ],
-)
+@pytest.mark.parametrize(("moments", "omega", "attitude", "status"), [
+    ((1.0, 2.0, 0.0), _START, _IDENTITY, 3),
+    ((1.0, 2.0, math.inf), _START, _IDENTITY, 3),
+    ((1.0, 2.0, 1e-40), _START, _IDENTITY, 3),
+    (_BODY, (1.0, math.inf, 1.0), _IDENTITY, 3),
+    (_BODY, _START, (0.0, 0.0, 0.0, 0.0), 3),
+    (_BODY, _START, (0.0, -math.inf, 0.0, 1.0), 3),
+    (_BODY, (1e-130, 1.0, 0.0), _IDENTITY, 3),
+    (_BODY, (0.0, 1.0, 1e-170), _IDENTITY, 3),
+    ((1e-20, 1.0, 2.0), (1e303, 1e308, 1.7e308), _IDENTITY, 2),
+])  # fmt: skip
 def test_what_can_not_be_done_is_said(
     moments: tuple[float, ...], omega: tuple[float, ...], attitude: tuple[float, ...], status: int
 ) -> None:

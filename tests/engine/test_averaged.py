@@ -80,14 +80,11 @@ def test_difficult_scenes_are_solved_or_refused() -> None:
 
 @pytest.mark.campaign
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-@pytest.mark.parametrize(
-    "law",
-    [
-        PUSH,
-        TorqueLaw((1e-6, 0.0, 0.0), (1e-9, -2e-9, 1e-9)),
-        TorqueLaw(sines=[((1e-6, 0.0, 2e-6), 2e-3)], cosines=[((0.0, 3e-6, 1e-6), 1e-3)]),
-    ],
-)
+@pytest.mark.parametrize("law", [
+    PUSH,
+    TorqueLaw((1e-6, 0.0, 0.0), (1e-9, -2e-9, 1e-9)),
+    TorqueLaw(sines=[((1e-6, 0.0, 2e-6), 2e-3)], cosines=[((0.0, 3e-6, 1e-6), 1e-3)]),
+])  # fmt: skip
 def test_error_against_many_digits_is_below_its_estimate(law: TorqueLaw, sign: float) -> None:
     times = [sign * each for each in (1.0, 123.0, 700.0)]
     scene = replace(SCENE, torque=law)
@@ -96,16 +93,13 @@ def test_error_against_many_digits_is_below_its_estimate(law: TorqueLaw, sign: f
     assert found.ended == "complete"
 
 
-@pytest.mark.parametrize(
-    ("moments", "omega"),
-    [
-        ((2.0, 2.0, 1.0), (0.3, 0.4, 1.0)),  # symmetric
-        ((1.0, 2.0, 2.0), (-1.0, 0.4, 0.3)),
-        (MOMENTS, (0.0, 0.0, 1.0)),  # exactly about the axis of the least moment
-        (MOMENTS, (-1.0, 1e-9, 0.0)),  # nearly about the axis of the largest moment
-        ((3.0, 2.0, 1.2), (1e-150, 0.0, -2e-3)),
-    ],
-)
+@pytest.mark.parametrize(("moments", "omega"), [
+    ((2.0, 2.0, 1.0), (0.3, 0.4, 1.0)),  # symmetric
+    ((1.0, 2.0, 2.0), (-1.0, 0.4, 0.3)),
+    (MOMENTS, (0.0, 0.0, 1.0)),  # exactly about the axis of the least moment
+    (MOMENTS, (-1.0, 1e-9, 0.0)),  # nearly about the axis of the largest moment
+    ((3.0, 2.0, 1.2), (1e-150, 0.0, -2e-3)),
+])  # fmt: skip
 def test_rotation_about_an_axis_and_symmetric_body(
     moments: tuple[float, float, float], omega: tuple[float, float, float]
 ) -> None:
@@ -277,15 +271,12 @@ def test_dense_output_and_events_use_the_method() -> None:
     assert np.abs(truth[:, 0]).max() < 1e-8
 
 
-@pytest.mark.parametrize(
-    ("torque", "varies"),
-    [
-        (PUSH, False),
-        (TorqueLaw((1e-6, 0.0, 0.0), (0.0, 1e-9, 0.0)), True),
-        (TorqueLaw(sines=[((1e-6, 0.0, 2e-6), 2e-3)]), True),
-        (TorqueLaw(cosines=[((1e-6, 0.0, 2e-6), 2e-3)]), True),
-    ],
-)
+@pytest.mark.parametrize(("torque", "varies"), [
+    (PUSH, False),
+    (TorqueLaw((1e-6, 0.0, 0.0), (0.0, 1e-9, 0.0)), True),
+    (TorqueLaw(sines=[((1e-6, 0.0, 2e-6), 2e-3)]), True),
+    (TorqueLaw(cosines=[((1e-6, 0.0, 2e-6), 2e-3)]), True),
+])  # fmt: skip
 def test_time_is_an_unknown_only_if_the_torque_varies(torque: TorqueLaw, varies: bool) -> None:
     assert torque_of(replace(SCENE, torque=torque))[1] is varies
 

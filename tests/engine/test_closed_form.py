@@ -101,15 +101,12 @@ def test_powers_of_two_scale_to_the_last_bit(power: int) -> None:
     np.testing.assert_array_equal(found, _at(a, w, 3.0) * factor)
 
 
-@pytest.mark.parametrize(
-    ("coefficients", "wanted"),
-    [
-        ((0.0, 0.0, 0.0), (1.0, 2.0, 3.0)),
-        ((0.5, 0.0, 0.0), (31.0, 2.0, 3.0)),
-        ((0.0, 0.5, 0.0), (1.0, 17.0, 3.0)),
-        ((0.0, 0.0, -0.5), (1.0, 2.0, -7.0)),
-    ],
-)
+@pytest.mark.parametrize(("coefficients", "wanted"), [
+    ((0.0, 0.0, 0.0), (1.0, 2.0, 3.0)),
+    ((0.5, 0.0, 0.0), (31.0, 2.0, 3.0)),
+    ((0.0, 0.5, 0.0), (1.0, 17.0, 3.0)),
+    ((0.0, 0.0, -0.5), (1.0, 2.0, -7.0)),
+])  # fmt: skip
 def test_a_single_coefficient_is_linear(coefficients: Triple, wanted: Triple) -> None:
     np.testing.assert_array_equal(_at(coefficients, (1.0, 2.0, 3.0), 10.0), wanted)
 
@@ -131,21 +128,18 @@ def test_symmetric_body_about_every_axis(axis: int, signs: tuple[float, float]) 
     assert _error(_at((a[0], a[1], a[2]), w, 40.0), exact, w) <= _BOUND
 
 
-@pytest.mark.parametrize(
-    ("coefficients", "omega", "time", "status"),
-    [
-        ((1.0, 1.0, 1.0), (1.0, 1.0, 1.0), 0.5, 3),
-        ((-1.0, -0.1, -1.0), (1.0, 1.0, 1.0), 0.5, 3),
-        ((0.0, 1.0, 1.0), (1.0, 1.0, 1.0), 0.5, 3),
-        ((1.0, -1.0, 0.5), (1e-200, 1.0, 0.0), 0.5, 3),
-        ((1.0, -1.0, 0.5), (1e-130, 1.0, 0.0), 0.5, 3),
-        ((1.0, -1.0, 0.5), (1.0, 1.0, 2.0), 1e17, 4),
-        ((1.0, -1.0, 0.5), (1e150, 1e150, 2e150), 1.0, 4),
-        ((1.0, -1.0, 0.5), (1e300, 1e300, 2e300), 1e300, 4),
-        ((1.0, 0.0, 0.0), (1.0, 1e200, 1e200), 1.0, 2),
-        ((1.0, -1e-6, 1e-4), (1.0, 1e308, 1e307), 1e-302, 2),
-    ],
-)
+@pytest.mark.parametrize(("coefficients", "omega", "time", "status"), [
+    ((1.0, 1.0, 1.0), (1.0, 1.0, 1.0), 0.5, 3),
+    ((-1.0, -0.1, -1.0), (1.0, 1.0, 1.0), 0.5, 3),
+    ((0.0, 1.0, 1.0), (1.0, 1.0, 1.0), 0.5, 3),
+    ((1.0, -1.0, 0.5), (1e-200, 1.0, 0.0), 0.5, 3),
+    ((1.0, -1.0, 0.5), (1e-130, 1.0, 0.0), 0.5, 3),
+    ((1.0, -1.0, 0.5), (1.0, 1.0, 2.0), 1e17, 4),
+    ((1.0, -1.0, 0.5), (1e150, 1e150, 2e150), 1.0, 4),
+    ((1.0, -1.0, 0.5), (1e300, 1e300, 2e300), 1e300, 4),
+    ((1.0, 0.0, 0.0), (1.0, 1e200, 1e200), 1.0, 2),
+    ((1.0, -1e-6, 1e-4), (1.0, 1e308, 1e307), 1e-302, 2),
+])  # fmt: skip
 def test_what_can_not_be_done_is_said(
     coefficients: Triple, omega: Triple, time: float, status: int
 ) -> None:
@@ -272,14 +266,11 @@ def test_amplification_before_the_last_time_counts_near_the_separatrix() -> None
 
 
 @pytest.mark.filterwarnings("ignore::pyharness.ImpossibleBodyWarning")
-@pytest.mark.parametrize(
-    ("moments", "omega", "time"),
-    [
-        ((8.3e20, 7.3e210, 1.0), (0.2, 0.0, -5.4e-12), 3e-11),
-        ((3.2e-125, 1.45e23, 3.1e124), (-0.8, 0.056, 0.0), 1.1e-7),
-        ((1.6e119, 6.4e-120, 2.8e119), (-1.1e-78, 2.2, -1.2e-67), 7.5e-23),
-    ],
-)
+@pytest.mark.parametrize(("moments", "omega", "time"), [
+    ((8.3e20, 7.3e210, 1.0), (0.2, 0.0, -5.4e-12), 3e-11),
+    ((3.2e-125, 1.45e23, 3.1e124), (-0.8, 0.056, 0.0), 1.1e-7),
+    ((1.6e119, 6.4e-120, 2.8e119), (-1.1e-78, 2.2, -1.2e-67), 7.5e-23),
+])  # fmt: skip
 def test_coefficients_that_underflow_are_refused(
     moments: Triple, omega: Triple, time: float
 ) -> None:

@@ -134,16 +134,13 @@ def test_double_root_counts_once_and_for_direction_0_alone() -> None:
         )
 
 
-@pytest.mark.parametrize(
-    ("function", "expected", "rel"),
-    [
-        (lambda t: (t - 2.0) * (t - 2.000001), [2.0, 2.000001], 5e-10),
-        *((lambda t, n=n: (t - 3.25) ** n, [3.25], 0.1) for n in (3, 4, 5)),
-        (lambda t: abs(t - 3.1) - 0.5, [2.6, 3.6], 1e-6),
-        (lambda t: 1.0 if t > math.pi else -1.0, [math.pi], 1e-12),
-        (lambda t: np.tanh(1e6 * (t - 4.4)), [4.4], 1e-12),
-    ],
-)
+@pytest.mark.parametrize(("function", "expected", "rel"), [
+    (lambda t: (t - 2.0) * (t - 2.000001), [2.0, 2.000001], 5e-10),
+    *((lambda t, n=n: (t - 3.25) ** n, [3.25], 0.1) for n in (3, 4, 5)),
+    (lambda t: abs(t - 3.1) - 0.5, [2.6, 3.6], 1e-6),
+    (lambda t: 1.0 if t > math.pi else -1.0, [math.pi], 1e-12),
+    (lambda t: np.tanh(1e6 * (t - 4.4)), [4.4], 1e-12),
+])  # fmt: skip
 def test_near_multiple_and_sudden_roots(function: Any, expected: list[float], rel: float) -> None:
     found = times_of(BODY, 9.0, lambda t, omega: function(t))
     assert found == pytest.approx(expected, rel=rel)

@@ -48,29 +48,26 @@ LIGHT = Scene("", (1.0, 2.0, 3.0), (1.0, 5e-324, 1.0), torque=TorqueLaw((1.0, 1.
 LONG = Scene("", (0.01, 7.0, -9.7), (9.85, 2.99, 1800.0))
 
 
-@pytest.mark.parametrize(
-    ("scene", "times", "method", "tolerance", "end"),
-    [
-        # ValueError: the maximum of no rows.
-        *((RUNAWAY, [2.0, 3.0], f"gauss-{stages}", 1e-6, "overflow") for stages in (1, 3, 5)),
-        # The time is too long for the method, and there is no blow-up; it reported one.
-        (GROWING, [3000.0], "gauss-1", 1e-2, "refused"),
-        # ZeroDivisionError: no step is small enough.
-        (BEYOND, [0.0], "gauss-1", 1e-6, "complete"),
-        (BEYOND, [1.0], "gauss-1", 1e-6, "refused"),
-        # An intermediate row was not finite.
-        (STEEP, [-0.0, -10.0], "taylor", 1e-10, "overflow"),
-        # Radau: ValueError from a matrix of infinities; LSODA: a warning on stderr.
-        (PUSHED, [0.09], "radau", 1e-7, "complete"),
-        (PUSHED, [1e200], "radau", 1e-7, "overflow"),
-        (RAMPED, [-0.48, -2353.0], "lsoda", 5e-7, "overflow"),
-        # NumPy printed a warning of an overflow on stderr.
-        (LIGHT, [1.0], "gauss-4", 1e-12, "refused"),
-        (LIGHT, [1.0], "taylor", 1e-12, "refused"),
-        # It took minutes; callers of `pyharness.truth.reference` may still wait as long.
-        (LONG, [1000.0], "reference", 1e-10, "refused"),
-    ],
-)
+@pytest.mark.parametrize(("scene", "times", "method", "tolerance", "end"), [
+    # ValueError: the maximum of no rows.
+    *((RUNAWAY, [2.0, 3.0], f"gauss-{stages}", 1e-6, "overflow") for stages in (1, 3, 5)),
+    # The time is too long for the method, and there is no blow-up; it reported one.
+    (GROWING, [3000.0], "gauss-1", 1e-2, "refused"),
+    # ZeroDivisionError: no step is small enough.
+    (BEYOND, [0.0], "gauss-1", 1e-6, "complete"),
+    (BEYOND, [1.0], "gauss-1", 1e-6, "refused"),
+    # An intermediate row was not finite.
+    (STEEP, [-0.0, -10.0], "taylor", 1e-10, "overflow"),
+    # Radau: ValueError from a matrix of infinities; LSODA: a warning on stderr.
+    (PUSHED, [0.09], "radau", 1e-7, "complete"),
+    (PUSHED, [1e200], "radau", 1e-7, "overflow"),
+    (RAMPED, [-0.48, -2353.0], "lsoda", 5e-7, "overflow"),
+    # NumPy printed a warning of an overflow on stderr.
+    (LIGHT, [1.0], "gauss-4", 1e-12, "refused"),
+    (LIGHT, [1.0], "taylor", 1e-12, "refused"),
+    # It took minutes; callers of `pyharness.truth.reference` may still wait as long.
+    (LONG, [1000.0], "reference", 1e-10, "refused"),
+])  # fmt: skip
 def test_extreme_motion_ends_in_time_and_says_how(
     scene: Scene, times: list[float], method: str, tolerance: float, end: str,
     monkeypatch: pytest.MonkeyPatch,

@@ -134,18 +134,15 @@ def test_a_scene_file_has_states(tmp_path: Any) -> None:
     assert load(tmp_path / "wheel.npz").scene == scene
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ("rate =", "rates =", r"\[states.wheel\]: unknown key"),
-        ('rate = "k*w3 - 0.1*sin(t)"', "", r"\[states.wheel\]: rate is missing"),
-        ("[states.wheel]", "[states.w1]", "another meaning"),
-        ("[states.wheel]", "[states.k]", "another meaning"),
-        ("expression = [", "constant = [1.0]  # [", "expression is missing, which a scene with"),
-        ('rate = "k', 'rate = "u', "'u'"),
-        ("scale = 2.0", "scale = -2.0", "from 0 on"),
-    ],
-)
+@pytest.mark.parametrize(("old", "new", "words"), [
+    ("rate =", "rates =", r"\[states.wheel\]: unknown key"),
+    ('rate = "k*w3 - 0.1*sin(t)"', "", r"\[states.wheel\]: rate is missing"),
+    ("[states.wheel]", "[states.w1]", "another meaning"),
+    ("[states.wheel]", "[states.k]", "another meaning"),
+    ("expression = [", "constant = [1.0]  # [", "expression is missing, which a scene with"),
+    ('rate = "k', 'rate = "u', "'u'"),
+    ("scale = 2.0", "scale = -2.0", "from 0 on"),
+])  # fmt: skip
 def test_a_mistake_in_a_scene_file_is_told(tmp_path: Any, old: str, new: str, words: str) -> None:
     assert old in FILE
     (tmp_path / "wrong.toml").write_text(FILE.replace(old, new))

@@ -379,19 +379,16 @@ _LONE = Scene("", PUSHED.omega, coefficients=(0.0, 0.0, 1.0), torque=_SHAKEN.tor
 _FAINT = Scene("", (1e-200, 1.0, 0.0), moments=(6.0, 5.0, 2.0))
 
 
-@pytest.mark.parametrize(
-    ("scene", "asked", "tolerance", "planned", "found"),
-    [
-        (PUSHED, "auto", 1e-3, "taylor", "taylor"),
-        (PUSHED, "quick", 1e-3, "quick", "quick"),
-        (_SHAKEN, "auto", 1e-3, RK4_OR_TAYLOR, "quick"),
-        # For eight digits the series takes fewer operations; with a single product `quick` refuses.
-        (case_scene(7), "auto", 1e-8, RK4_OR_TAYLOR, "taylor"),
-        (_LONE, "auto", 1e-3, RK4_OR_TAYLOR, "taylor"),
-        (case_scene(3), "auto", 1e-6, "closed-form", "closed-form"),
-        (_FAINT, "auto", 1e-6, "closed-form", "taylor"),
-    ],
-)
+@pytest.mark.parametrize(("scene", "asked", "tolerance", "planned", "found"), [
+    (PUSHED, "auto", 1e-3, "taylor", "taylor"),
+    (PUSHED, "quick", 1e-3, "quick", "quick"),
+    (_SHAKEN, "auto", 1e-3, RK4_OR_TAYLOR, "quick"),
+    # For eight digits the series takes fewer operations; with a single product `quick` refuses.
+    (case_scene(7), "auto", 1e-8, RK4_OR_TAYLOR, "taylor"),
+    (_LONE, "auto", 1e-3, RK4_OR_TAYLOR, "taylor"),
+    (case_scene(3), "auto", 1e-6, "closed-form", "closed-form"),
+    (_FAINT, "auto", 1e-6, "closed-form", "taylor"),
+])  # fmt: skip
 def test_what_the_kernel_chose_comes_back(
     scene: Scene, asked: str, tolerance: float, planned: str, found: str
 ) -> None:

@@ -28,13 +28,10 @@ print(solver({given}))
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="mprotect is of POSIX")
-@pytest.mark.parametrize(
-    ("arguments", "given"),
-    [
-        ('"auto"', "at_the_end(0.3, -0.4, 1.2), 2.0"),
-        ('"auto", attitude=True', "[0.3, -0.4, 1.2], 2.0, at_the_end(0.5, 0.5, 0.5, 0.5)"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "given"), [
+    ('"auto"', "at_the_end(0.3, -0.4, 1.2), 2.0"),
+    ('"auto", attitude=True', "[0.3, -0.4, 1.2], 2.0, at_the_end(0.5, 0.5, 0.5, 0.5)"),
+])  # fmt: skip
 def test_no_number_is_read_behind_the_end_of_an_array(arguments: str, given: str) -> None:
     script = SCRIPT.replace("{arguments}", arguments).replace("{given}", given)
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)

@@ -111,15 +111,12 @@ def test_the_truncation_error_is_subtracted() -> None:
     assert np.median(left) < 0.1
 
 
-@pytest.mark.parametrize(
-    ("torque", "last"),
-    [
-        (lambda t, omega: omega * omega, 1.0),  # infinite at 1 s
-        (lambda t, omega: [1.0 / (1.5 - t), 0.0 * omega[0], 0.0], 1.5),
-        (lambda t, omega: [-np.sqrt(1.2 - t) + 0.0 * omega[1], 0.0, 0.0], 1.2),
-        (lambda t, omega: [1.0 / (omega[0] - 1.0), 0.0, 0.0], None),
-    ],
-)
+@pytest.mark.parametrize(("torque", "last"), [
+    (lambda t, omega: omega * omega, 1.0),  # infinite at 1 s
+    (lambda t, omega: [1.0 / (1.5 - t), 0.0 * omega[0], 0.0], 1.5),
+    (lambda t, omega: [-np.sqrt(1.2 - t) + 0.0 * omega[1], 0.0, 0.0], 1.2),
+    (lambda t, omega: [1.0 / (omega[0] - 1.0), 0.0, 0.0], None),
+])  # fmt: skip
 def test_singular_torques_end_the_rows(torque: Any, last: float | None) -> None:
     scene = scene_of(torque, omega=(1.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0))
     found = solve(scene, [0.5, 1.0 + 1e-6, 2.0])
@@ -143,20 +140,17 @@ def test_a_root_whose_argument_touches_zero_is_passed(time: float) -> None:
     assert found.omega[:, 0] == pytest.approx(wanted, abs=1e-11)
 
 
-@pytest.mark.parametrize(
-    "rate",
-    [
-        lambda x: np.sin(x),
-        lambda x: 1.0 - np.cos(x),
-        lambda x: np.exp(x) - 1.0,
-        lambda x: np.tanh(x),
-        lambda x: np.sqrt(1.0 + x) - 1.0,
-        lambda x: x / (1.0 + 0.3 * x),
-        lambda x: x - 0.4 / (2.0 - x) + 0.2,
-        lambda x: x + x * x,
-        lambda x: 0.7 * x + 0.1,
-    ],
-)
+@pytest.mark.parametrize("rate", [
+    lambda x: np.sin(x),
+    lambda x: 1.0 - np.cos(x),
+    lambda x: np.exp(x) - 1.0,
+    lambda x: np.tanh(x),
+    lambda x: np.sqrt(1.0 + x) - 1.0,
+    lambda x: x / (1.0 + 0.3 * x),
+    lambda x: x - 0.4 / (2.0 - x) + 0.2,
+    lambda x: x + x * x,
+    lambda x: 0.7 * x + 0.1,
+])  # fmt: skip
 def test_growth_is_the_derivative_by_the_start(rate: Any) -> None:
     # One component alone moves, and perturbations of it grow at all times.
     def torque(t: Any, omega: Any) -> Any:

@@ -157,21 +157,18 @@ def test_late_phases_of_a_free_body_have_the_events_of_one_integration(tolerance
         np.testing.assert_allclose(seen, whole, rtol=0.0, atol=1e-9 * end)
 
 
-@pytest.mark.parametrize(
-    "function",
-    [
-        lambda t: 0.0 * t,
-        lambda t: t,
-        lambda t: t**2,
-        lambda t: -(t**3),
-        lambda t: np.sin(t) ** 3,
-        lambda t: t - 1e-17,
-        lambda t: np.sin(math.pi + t),
-        lambda t: np.where(np.abs(t) < 1.0, 0.0, t),
-        lambda t: np.where(np.abs(t) < 1.0, 0.0, np.abs(t)),
-        lambda t: np.where(t < 1.0, 0.0, np.cos(t)),
-    ],
-)
+@pytest.mark.parametrize("function", [
+    lambda t: 0.0 * t,
+    lambda t: t,
+    lambda t: t**2,
+    lambda t: -(t**3),
+    lambda t: np.sin(t) ** 3,
+    lambda t: t - 1e-17,
+    lambda t: np.sin(math.pi + t),
+    lambda t: np.where(np.abs(t) < 1.0, 0.0, t),
+    lambda t: np.where(np.abs(t) < 1.0, 0.0, np.abs(t)),
+    lambda t: np.where(t < 1.0, 0.0, np.cos(t)),
+])  # fmt: skip
 @pytest.mark.parametrize("ends", [1.5, -1.5, [-1.5, 1.5]])
 def test_a_root_at_the_start_is_no_event(function: Callable[[Any], Any], ends: Any) -> None:
     for direction in (-1, 0, 1):

@@ -69,15 +69,12 @@ def test_value_in_floats(name: str) -> None:
         assert found == pytest.approx(wanted, rel=1e-13, abs=1e-16)
 
 
-@pytest.mark.parametrize(
-    "torque",
-    [
-        lambda t: 0.01 * np.exp(50.0 * t),
-        lambda t: 1e5 + 1e-300 * np.exp(100.0 * t),
-        lambda t: np.exp(50.0 * t) / (1.0 + np.exp(49.0 * t)),
-        lambda t: 0.01 * np.exp(50.0 * t) / np.exp(50.0 * t + 1.0),  # which is constant
-    ],
-)
+@pytest.mark.parametrize("torque", [
+    lambda t: 0.01 * np.exp(50.0 * t),
+    lambda t: 1e5 + 1e-300 * np.exp(100.0 * t),
+    lambda t: np.exp(50.0 * t) / (1.0 + np.exp(49.0 * t)),
+    lambda t: 0.01 * np.exp(50.0 * t) / np.exp(50.0 * t + 1.0),  # which is constant
+])  # fmt: skip
 def test_torque_that_depends_on_the_exponential_is_an_overflow(torque: Any) -> None:
     for method in ("auto", "dop853"):
         assert solve(_scene(torque), 25.0, method, 1e-6).ended == "overflow"

@@ -136,18 +136,15 @@ def _one(component: Any) -> list[Any]:
 
 @pytest.mark.sampled
 @pytest.mark.parametrize("name", METHODS)
-@pytest.mark.parametrize(
-    ("torque", "rows"),
-    [
-        (replayed(lambda t, w, q: _one(w[0] * w[0] * 3.0)), 1),  # omega becomes infinite
-        (replayed(lambda t, w, q: _one(1.0 / (t - 2.0))), 2),
-        (replayed(lambda t, w, q: _one(np.sqrt(0.9 - t))), 1),
-        (replayed(lambda t, w, q: _one(1.0 / t)), 0),
-        (opaque(lambda t, w: _one(math.inf if t > 0.7 else 0.1)), 1),
-        (opaque(lambda t, w: _one(-math.inf)), 0),
-        (opaque(lambda t, w: _one(np.float64(1.0) / np.float64(t))), 0),
-    ],
-)
+@pytest.mark.parametrize(("torque", "rows"), [
+    (replayed(lambda t, w, q: _one(w[0] * w[0] * 3.0)), 1),  # omega becomes infinite
+    (replayed(lambda t, w, q: _one(1.0 / (t - 2.0))), 2),
+    (replayed(lambda t, w, q: _one(np.sqrt(0.9 - t))), 1),
+    (replayed(lambda t, w, q: _one(1.0 / t)), 0),
+    (opaque(lambda t, w: _one(math.inf if t > 0.7 else 0.1)), 1),
+    (opaque(lambda t, w: _one(-math.inf)), 0),
+    (opaque(lambda t, w: _one(np.float64(1.0) / np.float64(t))), 0),
+])  # fmt: skip
 def test_the_rows_end_where_the_torque_is_singular(
     name: str, torque: StateTorque, rows: int
 ) -> None:

@@ -96,14 +96,11 @@ def test_a_body_at_rest_under_control_waits_for_a_push() -> None:
     assert found.steps < 400
 
 
-@pytest.mark.parametrize(
-    "push",
-    [
-        lambda t: np.where(t > 20.0, 1.0, 0.0),
-        lambda t: np.exp(-3.0 * (t - 20.0) ** 2),
-        lambda t: 1.0 + np.tanh(8.0 * (t - 20.0)),
-    ],
-)
+@pytest.mark.parametrize("push", [
+    lambda t: np.where(t > 20.0, 1.0, 0.0),
+    lambda t: np.exp(-3.0 * (t - 20.0) ** 2),
+    lambda t: 1.0 + np.tanh(8.0 * (t - 20.0)),
+])  # fmt: skip
 def test_a_body_at_rest_waits_for_a_push_without_damping(push: Callable[[Any], Any]) -> None:
     def torque(time: Any, omega: Any, q: Any) -> list[Any]:
         return [0.1 * push(time) - q[1], -q[2], -q[3]]
@@ -116,14 +113,11 @@ def test_a_body_at_rest_waits_for_a_push_without_damping(push: Callable[[Any], A
     assert np.abs(found.omega - truth.omega).max() <= 1e-9 * largest
 
 
-@pytest.mark.parametrize(
-    ("push", "impulse"),
-    [
-        (lambda t: t**6 / (1.0 + t**6), 1.953624981341453),
-        (lambda t: 1.0 - np.exp(-(t**12)), 2.041714317827167),
-        (lambda t: np.sin(4.4 * t) ** 8, 0.781203549776875),
-    ],
-)
+@pytest.mark.parametrize(("push", "impulse"), [
+    (lambda t: t**6 / (1.0 + t**6), 1.953624981341453),
+    (lambda t: 1.0 - np.exp(-(t**12)), 2.041714317827167),
+    (lambda t: np.sin(4.4 * t) ** 8, 0.781203549776875),
+])  # fmt: skip
 def test_a_push_that_begins_slowly_is_judged_by_the_omega_that_it_causes(
     push: Callable[[Any], Any], impulse: float
 ) -> None:
@@ -168,17 +162,14 @@ def test_growth_of_a_steady_motion_follows_a_torque_that_it_does_not_feel(
     assert many.growth[0] == pytest.approx(1.1, abs=0.1)
 
 
-@pytest.mark.parametrize(
-    "function",
-    [
-        lambda t: np.cos(t) ** 20,
-        lambda t: 0.4 * np.cos(5.0 * t) ** 13,
-        lambda t: np.exp(-20.0 * t),
-        lambda t: 1e-40 * np.cos(1e3 * t),
-        lambda t: np.cos(10.0 * t * t),
-        lambda t: 0.1 * sum(np.cos((1.0 + 0.1 * k) * t) for k in range(10)),
-    ],
-)
+@pytest.mark.parametrize("function", [
+    lambda t: np.cos(t) ** 20,
+    lambda t: 0.4 * np.cos(5.0 * t) ** 13,
+    lambda t: np.exp(-20.0 * t),
+    lambda t: 1e-40 * np.cos(1e3 * t),
+    lambda t: np.cos(10.0 * t * t),
+    lambda t: 0.1 * sum(np.cos((1.0 + 0.1 * k) * t) for k in range(10)),
+])  # fmt: skip
 def test_a_steady_motion_takes_no_more_steps_than_another(function: Callable[[Any], Any]) -> None:
     def torque(time: Any, omega: Any) -> list[Any]:
         return [0.5 * function(time) * omega[1], 0.5 * function(time) * omega[0], 0.0]
@@ -191,13 +182,10 @@ def test_a_steady_motion_takes_no_more_steps_than_another(function: Callable[[An
     assert steps[0.0, 0.0, 1.0] <= steps[0.3, -0.5, 1.0]
 
 
-@pytest.mark.parametrize(
-    ("function", "coupling", "spin", "time", "wanted"),
-    [
-        (lambda t: 0.5 * np.cos(t) ** 20, 1.0, 1.0, 50.0, 1.42),
-        (lambda t: 0.2 * np.cos(5.0 * t) ** 13, 0.0, 0.0, 20.0, 1.0),
-    ],
-)
+@pytest.mark.parametrize(("function", "coupling", "spin", "time", "wanted"), [
+    (lambda t: 0.5 * np.cos(t) ** 20, 1.0, 1.0, 50.0, 1.42),
+    (lambda t: 0.2 * np.cos(5.0 * t) ** 13, 0.0, 0.0, 20.0, 1.0),
+])  # fmt: skip
 def test_growth_of_a_steady_motion_follows_pulses(
     function: Callable[[Any], Any], coupling: float, spin: float, time: float, wanted: float
 ) -> None:

@@ -54,16 +54,13 @@ def test_undefined_torque_ends_with_operation_time_and_advice(name: str, method:
 
 @pytest.mark.sampled
 @pytest.mark.parametrize("method", ["auto", "dop853", "reference"])
-@pytest.mark.parametrize(
-    "torque",
-    [
-        lambda t, w: [0.01 / (0.5 - t), 0.0, 0.0],
-        lambda t, w: [40.0 * w[0] * w[0], 0.0, 0.0],
-        # Neither the root of a small number nor 0 over a small number is the reason.
-        lambda t, w: [np.sqrt(np.exp(-60.0 * t)), 0.0, 0.01 / (0.5 - t)],
-        lambda t, w: [0.0, 0.01 * (w[1] - w[1] ** 2 / 0.2) / (0.5 - t), 0.01 / (0.5 - t)],
-    ],
-)
+@pytest.mark.parametrize("torque", [
+    lambda t, w: [0.01 / (0.5 - t), 0.0, 0.0],
+    lambda t, w: [40.0 * w[0] * w[0], 0.0, 0.0],
+    # Neither the root of a small number nor 0 over a small number is the reason.
+    lambda t, w: [np.sqrt(np.exp(-60.0 * t)), 0.0, 0.01 / (0.5 - t)],
+    lambda t, w: [0.0, 0.01 * (w[1] - w[1] ** 2 / 0.2) / (0.5 - t), 0.01 / (0.5 - t)],
+])  # fmt: skip
 def test_infinite_torque_or_omega_is_an_overflow(torque: Any, method: str) -> None:
     found = solve(_scene(torque), [0.2, 1.0], method, 1e-6)
     assert (found.ended, len(found.time), found.reason) == ("overflow", 1, None)

@@ -101,18 +101,15 @@ def test_blow_up_ends_the_rows(level: int) -> None:
     assert (n_rows, status) == (0, 2)
 
 
-@pytest.mark.parametrize(
-    ("name", "time", "counts"),
-    [
-        ("case 5", 3.0, (13, 18, 21, 23, 28)),
-        ("case 6", 3.0, (51, 60, 74, 89, 109)),
-        ("case 7", 3.0, (67, 75, 92, 93, 113)),
-        ("case 3", 100.0, (302, 395, 433, 518, 631)),
-        ("sine and cosine of two speeds", 20.0, (41, 50, 63, 67, 81)),
-        ("waves", 2.0, (7, 9, 9, 10, 12)),
-        ("rate from rest", 2.0, (5, 6, 7, 8, 9)),
-    ],
-)
+@pytest.mark.parametrize(("name", "time", "counts"), [
+    ("case 5", 3.0, (13, 18, 21, 23, 28)),
+    ("case 6", 3.0, (51, 60, 74, 89, 109)),
+    ("case 7", 3.0, (67, 75, 92, 93, 113)),
+    ("case 3", 100.0, (302, 395, 433, 518, 631)),
+    ("sine and cosine of two speeds", 20.0, (41, 50, 63, 67, 81)),
+    ("waves", 2.0, (7, 9, 9, 10, 12)),
+    ("rate from rest", 2.0, (5, 6, 7, 8, 9)),
+])  # fmt: skip
 def test_steps_are_few(name: str, time: float, counts: tuple[int, ...]) -> None:
     """Take at most a quarter more steps than recorded here, and one integration."""
     for count, tolerance in zip(counts, (1e-3, 1e-6, 1e-9, 1e-12, 1e-14), strict=True):

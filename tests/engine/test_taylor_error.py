@@ -155,21 +155,18 @@ def _beside(small: float) -> Scene:
     return Scene("", (small, 2.0, 0.3 * small), BODY)
 
 
-@pytest.mark.parametrize(
-    ("small", "time", "tolerance"),
-    [
-        (1.0, 800.0, 1e-4),
-        (1.0, 800.0, 1e-12),
-        (0.1, -100.0, 1e-8),
-        (0.1, 800.0, 1e-8),
-        (0.1, 800.0, 1e-12),
-        (1e-3, 800.0, 1e-8),
-        (1e-6, 800.0, 1e-8),
-        (1e-6, -100.0, 1e-4),
-        (1e-12, 20.0, 1e-9),
-        (1e-12, 60.0, 1e-9),
-    ],
-)
+@pytest.mark.parametrize(("small", "time", "tolerance"), [
+    (1.0, 800.0, 1e-4),
+    (1.0, 800.0, 1e-12),
+    (0.1, -100.0, 1e-8),
+    (0.1, 800.0, 1e-8),
+    (0.1, 800.0, 1e-12),
+    (1e-3, 800.0, 1e-8),
+    (1e-6, 800.0, 1e-8),
+    (1e-6, -100.0, 1e-4),
+    (1e-12, 20.0, 1e-9),
+    (1e-12, 60.0, 1e-9),
+])  # fmt: skip
 def test_growth_over_thousands_of_steps(small: float, time: float, tolerance: float) -> None:
     """Blocks of steps are merged, also if the growth exceeds the precision of binary64."""
     known = truth.truth_of(_beside(small), [time]).growth

@@ -262,16 +262,13 @@ def test_the_truth_of_the_tests_is_independent_of_the_unknowns_order() -> None:
     np.testing.assert_allclose(solution(turn), kepler.y0, atol=1e-13)
 
 
-@pytest.mark.parametrize(
-    "fun",
-    [
-        lambda t, y: -y[0],
-        lambda t, y: -y,
-        lambda t, y: -y.sum(),
-        lambda t, y: [-np.mean(y)],
-        lambda t, y: -(y @ y) / y[0],
-    ],
-)
+@pytest.mark.parametrize("fun", [
+    lambda t, y: -y[0],
+    lambda t, y: -y,
+    lambda t, y: -y.sum(),
+    lambda t, y: [-np.mean(y)],
+    lambda t, y: -(y @ y) / y[0],
+])  # fmt: skip
 def test_a_single_equation_may_return_a_number(fun: Any) -> None:
     found = solve_ivp(fun, (0.0, 1.0), [1.0], method=Taylor, rtol=1e-10, atol=1e-10)
     assert found.y[0, -1] == pytest.approx(math.exp(-1.0), rel=1e-10)

@@ -111,15 +111,11 @@ def test_both_together_tend_to_the_limit_that_is_told(case: int) -> None:
 RESET = "            point[1] = result\n"
 
 
-@pytest.mark.parametrize(
-    ("reset", "told", "step", "exceeds"),
-    [
-        ("[*result[:3], *point[1][3:]]", "step 25", 25, False),
-        ("[*point[1][:3], *result[3:]]", "step 29", 29, True),
-        ("result", "of both at step 13", 13, False),
-    ],
-    ids=["U alone", "V alone", "both"],
-)
+@pytest.mark.parametrize(("reset", "told", "step", "exceeds"), [
+    ("[*result[:3], *point[1][3:]]", "step 25", 25, False),
+    ("[*point[1][:3], *result[3:]]", "step 29", 29, True),
+    ("result", "of both at step 13", 13, False),
+], ids=["U alone", "V alone", "both"])  # fmt: skip
 def test_growing_tells_that_u_is_not_reset(reset: str, told: str, step: int, exceeds: bool) -> None:
     source = (ROOT / "pyharness/thesis/runge_kutta.py").read_text()
     assert source.count(RESET) == 1

@@ -39,13 +39,10 @@ def test_with_one_mass_whichever_case_2_stops_at_step_26() -> None:
     assert "step 26" in entry("three-masses")["why"]
 
 
-@pytest.mark.parametrize(
-    ("kept", "told", "weights"),
-    [
-        (["x3-reads-acl2"], "(ACL1 + ACL2)/2 in place of ACL1", (0.5, 0.5)),
-        (["x3-reads-acl2", "dt-accumulates"], "with dt-accumulates by 2 ACL1 - ACL2", (2.0, -1.0)),
-    ],
-)
+@pytest.mark.parametrize(("kept", "told", "weights"), [
+    (["x3-reads-acl2"], "(ACL1 + ACL2)/2 in place of ACL1", (0.5, 0.5)),
+    (["x3-reads-acl2", "dt-accumulates"], "with dt-accumulates by 2 ACL1 - ACL2", (2.0, -1.0)),
+])  # fmt: skip
 def test_x3_on_acl2_is_as_told(kept: list[str], told: str, weights: tuple[float, float]) -> None:
     """A sphere at rest, so that V1 is the acceleration times the time."""
     scene = replace(case_scene(1), omega=(0.0, 0.0, 0.0), step_size=1e-4, steps=10000)

@@ -200,13 +200,10 @@ def test_constant_of_the_mended_program_is_that_of_the_flow(judged: Judged) -> N
     assert methods.complexity(lab, [1.0, 1.04]).verdict == NOT_REPRODUCED
 
 
-@pytest.mark.parametrize(
-    ("identity", "rests_on", "verdicts"),
-    [
-        ("v3-twice-the-time", ["unit times"], [IN_PART, NOT_REPRODUCED]),
-        ("iii1-crandall", ["example"], [REPRODUCED, NOT_REPRODUCED]),
-    ],
-)
+@pytest.mark.parametrize(("identity", "rests_on", "verdicts"), [
+    ("v3-twice-the-time", ["unit times"], [IN_PART, NOT_REPRODUCED]),
+    ("iii1-crandall", ["example"], [REPRODUCED, NOT_REPRODUCED]),
+])  # fmt: skip
 def test_a_verdict_names_the_parameters_on_which_it_rests(
     identity: str, rests_on: list[str], verdicts: list[str], judged: Judged
 ) -> None:

@@ -55,14 +55,11 @@ def test_verdict_of_a_combination_is_that_of_its_laboratory(identity: str) -> No
         assert every[assumptions] == whole, assumptions
 
 
-@pytest.mark.parametrize(
-    ("identity", "start", "readings", "verdict"),
-    [
-        ("v2-case-4-fails", (0.0, 1.0, 1.0), [], REPRODUCED),
-        ("v2-case-3-diverging", (1.0, 1.0, 1.0), [], REPRODUCED),
-        ("iv3-guard", (1.0, 1.0, 1.0), ["do-variable"], IN_PART),
-    ],
-)
+@pytest.mark.parametrize(("identity", "start", "readings", "verdict"), [
+    ("v2-case-4-fails", (0.0, 1.0, 1.0), [], REPRODUCED),
+    ("v2-case-3-diverging", (1.0, 1.0, 1.0), [], REPRODUCED),
+    ("iv3-guard", (1.0, 1.0, 1.0), ["do-variable"], IN_PART),
+])  # fmt: skip
 def test_300_steps_change_verdicts_of_runs_that_stop_later(
     identity: str, start: Triple, readings: list[str], verdict: str
 ) -> None:

@@ -31,14 +31,11 @@ def judged(path: Path, program: str, case: int) -> list[Fit]:
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize(
-    ("program", "case", "word", "listing", "alike"),
-    [
-        ("two-term", 2, "cdc48", "original", {"cdc48", "binary32"}),
-        ("two-term", 2, "binary64", "corrected", {"binary64", "binary128", "cdc48-rounded"}),
-        ("runge-kutta", 3, "cdc48-rounded", "original", None),
-    ],
-)
+@pytest.mark.parametrize(("program", "case", "word", "listing", "alike"), [
+    ("two-term", 2, "cdc48", "original", {"cdc48", "binary32"}),
+    ("two-term", 2, "binary64", "corrected", {"binary64", "binary128", "cdc48-rounded"}),
+    ("runge-kutta", 3, "cdc48-rounded", "original", None),
+])  # fmt: skip
 def test_a_page_tells_its_word(
     tmp_path: Path, program: str, case: int, word: str, listing: str, alike: set[str] | None
 ) -> None:

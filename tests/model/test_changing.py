@@ -49,23 +49,20 @@ def test_further_coefficient_distinguishes_polynomials_from_a_matrix() -> None:
     assert ChangingMoments(rows).at(1.0) == (3.0 + 0.1 + 0.2, 0.1 + 4.0 + 0.3, 0.2 + 0.3 + 5.0)
 
 
-@pytest.mark.parametrize(
-    ("polynomial", "span"),
-    [
-        ([1.0], (-math.inf, math.inf)),
-        ([1.0, -0.5], (-math.inf, 2.0)),
-        ([1.0, 0.25], (-4.0, math.inf)),
-        ([1.0, 0.0, -0.25], (-2.0, 2.0)),
-        ([4.0, -4.0, 1.0], (-math.inf, 2.0)),  # a double zero
-        ([4.0, -4.0, 1.000001], (-math.inf, math.inf)),
-        ([1.0, -(2.0**-900)], (-math.inf, 2.0**900)),
-        ([2.0**-900, -1.0], (-math.inf, 2.0**-900)),
-        ([1.0, -1e-320], (-math.inf, math.inf)),  # the zero is beyond the range of binary64
-        ([1.0, -3.0, 0.0, 0.0], (-math.inf, 1.0 / 3.0)),
-        ([6.0, 11.0, 6.0, 1.0], (-1.0, math.inf)),
-        ([120.0, -154.0, 71.0, -14.0, 1.0], (-math.inf, 2.0)),  # zeros 2, 3, 4 and 5
-    ],
-)
+@pytest.mark.parametrize(("polynomial", "span"), [
+    ([1.0], (-math.inf, math.inf)),
+    ([1.0, -0.5], (-math.inf, 2.0)),
+    ([1.0, 0.25], (-4.0, math.inf)),
+    ([1.0, 0.0, -0.25], (-2.0, 2.0)),
+    ([4.0, -4.0, 1.0], (-math.inf, 2.0)),  # a double zero
+    ([4.0, -4.0, 1.000001], (-math.inf, math.inf)),
+    ([1.0, -(2.0**-900)], (-math.inf, 2.0**900)),
+    ([2.0**-900, -1.0], (-math.inf, 2.0**-900)),
+    ([1.0, -1e-320], (-math.inf, math.inf)),  # the zero is beyond the range of binary64
+    ([1.0, -3.0, 0.0, 0.0], (-math.inf, 1.0 / 3.0)),
+    ([6.0, 11.0, 6.0, 1.0], (-1.0, math.inf)),
+    ([120.0, -154.0, 71.0, -14.0, 1.0], (-math.inf, 2.0)),  # zeros 2, 3, 4 and 5
+])  # fmt: skip
 def test_span_ends_at_the_first_zeros(polynomial: list[float], span: tuple[float, float]) -> None:
     assert ChangingMoments([[9.0], polynomial, [8.0]]).span == span
 

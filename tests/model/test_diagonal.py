@@ -33,16 +33,13 @@ def _drawn(source: random.Random) -> Matrix:
     return _tilted(source, values, 5.0)
 
 
-@pytest.mark.parametrize(
-    "matrix",
-    [
-        *(_drawn(random.Random(f"diagonal/{k}")) for k in range(30)),
-        _symmetric(1.0, 5e-324, 0.0, 1.0, 0.0, 1e-200),
-        _symmetric(1e308, 1e292, 0.0, 1.0, 0.0, 1e300),
-        _symmetric(2.0, 1.0, 1.0, 2.0, 1.0, 2.0),
-        _symmetric(3.0, 0.0, 0.0, 1.0, 0.0, 2.0),
-    ],
-)
+@pytest.mark.parametrize("matrix", [
+    *(_drawn(random.Random(f"diagonal/{k}")) for k in range(30)),
+    _symmetric(1.0, 5e-324, 0.0, 1.0, 0.0, 1e-200),
+    _symmetric(1e308, 1e292, 0.0, 1.0, 0.0, 1e300),
+    _symmetric(2.0, 1.0, 1.0, 2.0, 1.0, 2.0),
+    _symmetric(3.0, 0.0, 0.0, 1.0, 0.0, 2.0),
+])  # fmt: skip
 def test_each_eigenvalue_is_good_to_its_own_size(matrix: Matrix) -> None:
     values, vectors = diagonalised(matrix)
     exact = [[Fraction(x) for x in row] for row in matrix]

@@ -62,24 +62,21 @@ def test_events_dense_output_and_attitudes_are_as_in_scipy() -> None:
     assert abs(by_scipy.t_events[0][0] - found.t_events[0][0]) < 1e-3
 
 
-@pytest.mark.parametrize(
-    ("call", "hint"),
-    [
-        (lambda: solve(Scene(**BODY), (0, 10), t_eval=TIMES), "times"),
-        (lambda: solve(Scene(**BODY), t_span=(0, 10)), "times"),
-        (lambda: solve(Scene(**BODY), TIMES, rtol=1e-9, atol=1e-9), "tolerance"),
-        (lambda: solve(Scene(**BODY), TIMES, max_step=0.1), "nothing"),
-        (lambda: solve(Scene(**BODY), TIMES, strange=1), "dense_output"),
-        (lambda: prepare(Scene(**BODY), rtol=1e-9), "tolerance"),
-        (lambda: solve_many(Scene(**BODY), 1.0, tol=1e-9), "tolerance"),
-        (lambda: solve_many(Scene(**BODY), 1.0, omega0=[[1, 2, 3]]), "omega"),
-        (lambda: Stepper(Scene(**BODY), tol=1e-9), "tolerance"),
-        (lambda: Scene(I=[40, 30, 20], omega=[0, 1, 1]), "moments"),
-        (lambda: Scene(moments=[40, 30, 20], w0=[0, 1, 1]), "omega"),
-        (lambda: Scene(**BODY, q0=[1, 0, 0, 0]), "attitude"),
-        (lambda: Scene(**BODY, torque=lambda t, w, k: -k * w, args=(1,)), "defaults"),
-    ],
-)
+@pytest.mark.parametrize(("call", "hint"), [
+    (lambda: solve(Scene(**BODY), (0, 10), t_eval=TIMES), "times"),
+    (lambda: solve(Scene(**BODY), t_span=(0, 10)), "times"),
+    (lambda: solve(Scene(**BODY), TIMES, rtol=1e-9, atol=1e-9), "tolerance"),
+    (lambda: solve(Scene(**BODY), TIMES, max_step=0.1), "nothing"),
+    (lambda: solve(Scene(**BODY), TIMES, strange=1), "dense_output"),
+    (lambda: prepare(Scene(**BODY), rtol=1e-9), "tolerance"),
+    (lambda: solve_many(Scene(**BODY), 1.0, tol=1e-9), "tolerance"),
+    (lambda: solve_many(Scene(**BODY), 1.0, omega0=[[1, 2, 3]]), "omega"),
+    (lambda: Stepper(Scene(**BODY), tol=1e-9), "tolerance"),
+    (lambda: Scene(I=[40, 30, 20], omega=[0, 1, 1]), "moments"),
+    (lambda: Scene(moments=[40, 30, 20], w0=[0, 1, 1]), "omega"),
+    (lambda: Scene(**BODY, q0=[1, 0, 0, 0]), "attitude"),
+    (lambda: Scene(**BODY, torque=lambda t, w, k: -k * w, args=(1,)), "defaults"),
+])  # fmt: skip
 def test_keyword_of_scipy_is_answered_with_ours(call: Any, hint: str) -> None:
     with pytest.raises(TypeError, match=f"write .*{hint}|allowed: .*{hint}") as caught:
         call()
@@ -109,15 +106,12 @@ class Quantity:
         return np.array(self.values)
 
 
-@pytest.mark.parametrize(
-    "call",
-    [
-        lambda: Scene(moments=BODY["moments"], omega=Quantity([0.0, 57.0, 57.0])),
-        lambda: solve_many(Scene(**BODY), 1.0, omega=Quantity([0.0, 57.0, 57.0])),
-        lambda: solve(Scene(**BODY), Quantity(1.0)),
-        lambda: solve(Scene(**BODY), Quantity([0.0, 1.0])),
-    ],
-)
+@pytest.mark.parametrize("call", [
+    lambda: Scene(moments=BODY["moments"], omega=Quantity([0.0, 57.0, 57.0])),
+    lambda: solve_many(Scene(**BODY), 1.0, omega=Quantity([0.0, 57.0, 57.0])),
+    lambda: solve(Scene(**BODY), Quantity(1.0)),
+    lambda: solve(Scene(**BODY), Quantity([0.0, 1.0])),
+])  # fmt: skip
 def test_numbers_with_a_unit_are_refused_rather_than_taken_for_those_of_si(call: Any) -> None:
     refused(r"a number in deg / s; give its value in SI units", call)
 

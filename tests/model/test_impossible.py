@@ -23,17 +23,13 @@ def _file(folder: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize(
-    "make",
-    [
-        lambda _: Scene("", (1.0, 2.0, 3.0), IMPOSSIBLE),
-        lambda _: Scene("", (1.0, 2.0, 3.0), inertia=np.diag(IMPOSSIBLE)),
-        lambda _: replace(Scene("", (1.0, 2.0, 3.0), (3.0, 2.0, 2.0)), moments=IMPOSSIBLE),
-        lambda _: case_scene(6),
-        lambda folder: read_scene(_file(folder)),
-    ],
-    ids=["moments", "inertia", "replaced", "case", "file"],
-)
+@pytest.mark.parametrize("make", [
+    lambda _: Scene("", (1.0, 2.0, 3.0), IMPOSSIBLE),
+    lambda _: Scene("", (1.0, 2.0, 3.0), inertia=np.diag(IMPOSSIBLE)),
+    lambda _: replace(Scene("", (1.0, 2.0, 3.0), (3.0, 2.0, 2.0)), moments=IMPOSSIBLE),
+    lambda _: case_scene(6),
+    lambda folder: read_scene(_file(folder)),
+], ids=["moments", "inertia", "replaced", "case", "file"])  # fmt: skip
 def test_one_warning_at_the_line_of_the_user(make: Callable[[Path], Scene], tmp_path: Path) -> None:
     with pytest.warns(ImpossibleBodyWarning, match="no rigid body has these moments") as found:
         assert make(tmp_path).is_impossible

@@ -50,13 +50,10 @@ def moved(path: Path, outside: Path) -> Path:
 
 
 @pytest.mark.parametrize("repair", [False, True])
-@pytest.mark.parametrize(
-    "damage",
-    [
-        "changed",
-        *(pytest.param(x, marks=pytest.mark.campaign) for x in ("none", "missing", "dangling")),
-    ],
-)
+@pytest.mark.parametrize("damage", [
+    "changed",
+    *(pytest.param(x, marks=pytest.mark.campaign) for x in ("none", "missing", "dangling")),
+])  # fmt: skip
 @pytest.mark.parametrize("name", FOLDERS)
 def test_a_linked_folder_is_refused(
     name: str, damage: str, repair: bool, sweep: Sweep, store: Path, tmp_path: Path

@@ -27,16 +27,13 @@ def _rows_with(monkeypatch: pytest.MonkeyPatch, name: str, change: Any) -> Any:
         cards.deck.cache_clear()
 
 
-@pytest.mark.parametrize(
-    ("program", "number", "old", "new", "what"),
-    [
-        ("four-term", "640", "MS1", "MS2", "accelerations"),
-        ("runge-kutta", "370", "I3-I1", "I1-I3", "A, B and C"),
-        ("runge-kutta", "560", "40.", "41.", "forces"),
-        ("two-term", "750", "U2(1)", "U1(1)", "right-hand sides of omega at the beginning"),
-        ("four-term", "2250", "+.01", "+.02", "DT grows"),
-    ],
-)
+@pytest.mark.parametrize(("program", "number", "old", "new", "what"), [
+    ("four-term", "640", "MS1", "MS2", "accelerations"),
+    ("runge-kutta", "370", "I3-I1", "I1-I3", "A, B and C"),
+    ("runge-kutta", "560", "40.", "41.", "forces"),
+    ("two-term", "750", "U2(1)", "U1(1)", "right-hand sides of omega at the beginning"),
+    ("four-term", "2250", "+.01", "+.02", "DT grows"),
+])  # fmt: skip
 def test_a_card_that_differs_is_found_where_decks_agreed(
     program: str, number: str, old: str, new: str, what: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -30,17 +30,13 @@ def test_random_unsymmetric_systems(n: int) -> None:
         np.testing.assert_allclose(x, np.linalg.solve(a, b), rtol=0, atol=bound * np.abs(x).max())
 
 
-@pytest.mark.parametrize(
-    "a",
-    [
-        [[1.0, 2.0], [2.0, 4.0]],
-        [[0.0, 0.0], [1.0, 1.0]],
-        [[1.0, 1e-17], [1.0, 0.0]],
-        # n + pivot must differ from n = 2, whose neighbour above is 4.4e-16 away.
-        [[1.0, 1.0], [1.0, 1.0 + 2.220446049250313e-16]],
-    ],
-    ids=range(4),
-)
+@pytest.mark.parametrize("a", [
+    [[1.0, 2.0], [2.0, 4.0]],
+    [[0.0, 0.0], [1.0, 1.0]],
+    [[1.0, 1e-17], [1.0, 0.0]],
+    # n + pivot must differ from n = 2, whose neighbour above is 4.4e-16 away.
+    [[1.0, 1.0], [1.0, 1.0 + 2.220446049250313e-16]],
+], ids=range(4))  # fmt: skip
 def test_singular_matrix_leaves_the_right_hand_sides(a: list[list[float]]) -> None:
     b = np.array([[1.0, 2.0], [3.0, 4.0]])
     x, ier = _both(np.array(a), b)

@@ -31,14 +31,11 @@ def _page(program: str, case: int, capsys: Capture, *options: str) -> list[str]:
     return capsys.readouterr().out.splitlines()
 
 
-@pytest.mark.parametrize(
-    ("program", "heads", "columns"),
-    [
-        ("two-term", [5, 25, 45, 63, 80, 102, 124], [1, 21, 41, 56, 73, 93, 113]),
-        ("four-term", [5, 25, 45, 63, 80, 102, 124], [1, 21, 41, 56, 69, 89, 109]),
-        ("runge-kutta", [0, 20, 40, 60, 71, 91, 111], [0, 20, 40, 60, 71, 91, 111]),
-    ],
-)
+@pytest.mark.parametrize(("program", "heads", "columns"), [
+    ("two-term", [5, 25, 45, 63, 80, 102, 124], [1, 21, 41, 56, 73, 93, 113]),
+    ("four-term", [5, 25, 45, 63, 80, 102, 124], [1, 21, 41, 56, 69, 89, 109]),
+    ("runge-kutta", [0, 20, 40, 60, 71, 91, 111], [0, 20, 40, 60, 71, 91, 111]),
+])  # fmt: skip
 def test_page(program: str, heads: list[int], columns: list[int], capsys: Capture) -> None:
     """Each program has its own formats; in one, four places for six values leave an empty line."""
     lines = _page(program, 5, capsys)

@@ -33,16 +33,13 @@ def test_agrees_with_the_series(turn: int, time: float) -> None:
         assert _away(Scene("", (first, second, third), moments=moments), time) < 1e-27
 
 
-@pytest.mark.parametrize(
-    ("moments", "omega"),
-    [
-        *((moments, _START) for moments in itertools.permutations((1.0, 1.0, 0.3))),
-        ((2.0, 2.0, 2.0), _START),
-        ((200.0, 10.0, 20.0), _START),
-        *((_MOMENTS, omega) for omega in ((0.1, 1.0, 0.1), (0.1, 1.0, -0.1))),
-        *((_MOMENTS, omega) for omega in ((0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (0.0, 0.0, 0.0))),
-    ],
-)
+@pytest.mark.parametrize(("moments", "omega"), [
+    *((moments, _START) for moments in itertools.permutations((1.0, 1.0, 0.3))),
+    ((2.0, 2.0, 2.0), _START),
+    ((200.0, 10.0, 20.0), _START),
+    *((_MOMENTS, omega) for omega in ((0.1, 1.0, 0.1), (0.1, 1.0, -0.1))),
+    *((_MOMENTS, omega) for omega in ((0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (0.0, 0.0, 0.0))),
+])  # fmt: skip
 def test_agrees_where_the_motion_is_special(moments: Triple, omega: Triple) -> None:
     assert _away(Scene("", omega, moments=moments), 5.0) < 1e-25
 
@@ -70,14 +67,11 @@ def test_steady_rotation_is_constant(moments: Triple, axis: int) -> None:
                 assert torque_free(scene, time, rounded) == [Decimal(w) for w in omega]
 
 
-@pytest.mark.parametrize(
-    ("moments", "omega"),
-    [
-        ((6.0, 5.0, 2.0), (1e-3, 1.0, 1e-3)),
-        ((34.0, 26.0, 17.0), (-3.0, 1.0, 4.0)),
-        ((17.0, 26.0, 34.0), (4.0, -1.0, 3.0)),
-    ],
-)
+@pytest.mark.parametrize(("moments", "omega"), [
+    ((6.0, 5.0, 2.0), (1e-3, 1.0, 1e-3)),
+    ((34.0, 26.0, 17.0), (-3.0, 1.0, 4.0)),
+    ((17.0, 26.0, 34.0), (4.0, -1.0, 3.0)),
+])  # fmt: skip
 def test_motion_on_the_separatrix_never_flips_again(moments: Triple, omega: Triple) -> None:
     """Omega approaches the middle axis, with a size that the energy determines."""
     scene = Scene("", omega, moments=moments)

@@ -142,13 +142,10 @@ def test_balls_contain_the_reference(name: str) -> None:
     assert outside(found.omega, SCENES[name], times) <= 0.0
 
 
-@pytest.mark.parametrize(
-    ("draw", "names"),
-    [
-        *((state_scenes.draw, (name,)) for name in (*STEADY, *TURNING, "flash")),
-        *((state_scenes.draw_ready, (name, "damping")) for name in READY),
-    ],
-)
+@pytest.mark.parametrize(("draw", "names"), [
+    *((state_scenes.draw, (name,)) for name in (*STEADY, *TURNING, "flash")),
+    *((state_scenes.draw_ready, (name, "damping")) for name in READY),
+])  # fmt: skip
 def test_balls_contain_the_reference_of_a_state_torque(draw: Any, names: tuple[str, ...]) -> None:
     scene, end = draw(Random(f"enclosure {names[0]}"), names)
     speed = max(map(abs, scene.omega))

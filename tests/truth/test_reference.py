@@ -46,14 +46,11 @@ _LAW = TorqueLaw(
 _START = (0.3, -1.1, 2.2)
 
 
-@pytest.mark.parametrize(
-    ("scene", "times"),
-    [
-        *((case_scene(case), case_scene(case).times()) for case in (1, 2)),
-        *((Scene("", _START, moments), [0.5, 7.0]) for moments in permutations((30.0, 30.0, 70.0))),
-        (Scene("", _START, (2.0, 2.0, 2.0), torque=_LAW), [-2.0]),
-    ],
-)
+@pytest.mark.parametrize(("scene", "times"), [
+    *((case_scene(case), case_scene(case).times()) for case in (1, 2)),
+    *((Scene("", _START, moments), [0.5, 7.0]) for moments in permutations((30.0, 30.0, 70.0))),
+    (Scene("", _START, (2.0, 2.0, 2.0), torque=_LAW), [-2.0]),
+])  # fmt: skip
 def test_series_agrees_with_the_known_solution(
     scene: Scene, times: list[float], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -201,22 +201,19 @@ def _one(component: Any) -> list[Any]:
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize(
-    ("function", "rows"),
-    [
-        (lambda t, w, q: _one(1.0 / (t - 2.0)), 2),  # a pole between the times
-        (lambda t, w, q: _one(1.0 / t), 0),  # a pole at the beginning
-        (lambda t, w, q: _one(w[1] / (w[0] - 0.3)), 0),
-        (lambda t, w, q: _one(np.sqrt(1.5 - t)), 2),  # a branch point
-        (lambda t, w, q: _one(np.sqrt(-1.0 - t)), 0),
-        (lambda t, w, q: _one(np.sqrt(t)), 0),
-        (lambda t, w, q: _one(w[0] * w[0] * 3.0), 1),  # omega becomes infinite at about 1.7 s
-        (lambda t, w, q: _one(np.exp(1e300 * w[0] * w[0])), 0),
-        (lambda t, w, q: _one(np.sin(np.exp(2000.0 + t))), 0),
-        # The Taylor series of abs(t - 1.5) continues as t - 1.5.
-        (lambda t, w, q: _one(np.sqrt((t - 1.5) * (t - 1.5))), 2),
-    ],
-)
+@pytest.mark.parametrize(("function", "rows"), [
+    (lambda t, w, q: _one(1.0 / (t - 2.0)), 2),  # a pole between the times
+    (lambda t, w, q: _one(1.0 / t), 0),  # a pole at the beginning
+    (lambda t, w, q: _one(w[1] / (w[0] - 0.3)), 0),
+    (lambda t, w, q: _one(np.sqrt(1.5 - t)), 2),  # a branch point
+    (lambda t, w, q: _one(np.sqrt(-1.0 - t)), 0),
+    (lambda t, w, q: _one(np.sqrt(t)), 0),
+    (lambda t, w, q: _one(w[0] * w[0] * 3.0), 1),  # omega becomes infinite at about 1.7 s
+    (lambda t, w, q: _one(np.exp(1e300 * w[0] * w[0])), 0),
+    (lambda t, w, q: _one(np.sin(np.exp(2000.0 + t))), 0),
+    # The Taylor series of abs(t - 1.5) continues as t - 1.5.
+    (lambda t, w, q: _one(np.sqrt((t - 1.5) * (t - 1.5))), 2),
+])  # fmt: skip
 def test_the_rows_end_at_a_singularity(function: Callable[..., Any], rows: int) -> None:
     scene = Scene("", _OMEGA, _MOMENTS, torque=replayed(function))
     found = reference(scene, [0.5, 1.0, 3.0])

@@ -176,39 +176,33 @@ def _answer(growth: float, ended: str, error: float, estimate: float | None = No
     return Answer(draw, "solve taylor", ended, error, estimate, growth)
 
 
-@pytest.mark.parametrize(
-    ("growth", "ended", "error", "faults"),
-    [
-        (1.0, "complete", 1e-9, ""),
-        (1.0, "complete", 1.1e-9, "exceeds"),
-        (1.0, "overflow", float("inf"), "unfinished"),
-        (1e7, "overflow", float("inf"), ""),
-        (9e5, "complete", 4e-9, ""),
-        (9e5, "complete", 5e-9, "exceeds"),
-        (2e6, "complete", 1.0, ""),
-        (1e7, "complete", 1e-9, ""),
-        (1e7, SENSITIVE, 1e-9, ""),
-        (1e8, "complete", 1e-9, "silent"),
-        (1e8, SENSITIVE, 1e-9, ""),
-        (float("inf"), "complete", 1.0, "silent"),
-        (1e5, SENSITIVE, 1e-9, "false alarm"),
-    ],
-)
+@pytest.mark.parametrize(("growth", "ended", "error", "faults"), [
+    (1.0, "complete", 1e-9, ""),
+    (1.0, "complete", 1.1e-9, "exceeds"),
+    (1.0, "overflow", float("inf"), "unfinished"),
+    (1e7, "overflow", float("inf"), ""),
+    (9e5, "complete", 4e-9, ""),
+    (9e5, "complete", 5e-9, "exceeds"),
+    (2e6, "complete", 1.0, ""),
+    (1e7, "complete", 1e-9, ""),
+    (1e7, SENSITIVE, 1e-9, ""),
+    (1e8, "complete", 1e-9, "silent"),
+    (1e8, SENSITIVE, 1e-9, ""),
+    (float("inf"), "complete", 1.0, "silent"),
+    (1e5, SENSITIVE, 1e-9, "false alarm"),
+])  # fmt: skip
 def test_faults(growth: float, ended: str, error: float, faults: str) -> None:
     assert _answer(growth, ended, error).faults() == [*filter(None, [faults])]
 
 
-@pytest.mark.parametrize(
-    ("estimate", "error", "low", "blind"),
-    [
-        (None, 1e-10, False, False),
-        (2e-12, 1e-10, True, False),
-        (2e-11, 1e-10, False, False),
-        (5e-13, 1e-10, True, True),
-        (0.0, 1e-10, True, True),
-        (0.0, 2e-16, False, False),
-    ],
-)
+@pytest.mark.parametrize(("estimate", "error", "low", "blind"), [
+    (None, 1e-10, False, False),
+    (2e-12, 1e-10, True, False),
+    (2e-11, 1e-10, False, False),
+    (5e-13, 1e-10, True, True),
+    (0.0, 1e-10, True, True),
+    (0.0, 2e-16, False, False),
+])  # fmt: skip
 def test_estimates_that_are_too_small(
     estimate: float | None, error: float, low: bool, blind: bool
 ) -> None:

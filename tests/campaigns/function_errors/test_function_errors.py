@@ -73,16 +73,13 @@ def test_a_changed_digit_of_a_constant_exceeds_the_bounds(literal: str) -> None:
     assert not lanes_keep_their_bounds(changed_digit(LANES.read_text(), literal, 2))
 
 
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        ("s_ = x + x*x2*(", "s_ = x - x*x2*("),
-        ("x2*(S(2) + x2*(S(3)", "x2*(S(3) + x2*(S(2)"),
-        ("c_ = (1.0_dp - 0.5_dp*x2)", "c_ = (1.0_dp - 0.5_dp*x)"),
-        ("s_ = x + x*x2*(S(1) +", "s_ = 0.5_dp*x + (0.5_dp*x + x*x2*S(1)) + x*x2*("),
-        ("x = (angle(i) - turns*HALF_PI) - turns", "x = angle(i) - turns*HALF_PI - 2.0_dp*turns"),
-    ],
-)
+@pytest.mark.parametrize(("old", "new"), [
+    ("s_ = x + x*x2*(", "s_ = x - x*x2*("),
+    ("x2*(S(2) + x2*(S(3)", "x2*(S(3) + x2*(S(2)"),
+    ("c_ = (1.0_dp - 0.5_dp*x2)", "c_ = (1.0_dp - 0.5_dp*x)"),
+    ("s_ = x + x*x2*(S(1) +", "s_ = 0.5_dp*x + (0.5_dp*x + x*x2*S(1)) + x*x2*("),
+    ("x = (angle(i) - turns*HALF_PI) - turns", "x = angle(i) - turns*HALF_PI - 2.0_dp*turns"),
+])  # fmt: skip
 def test_other_statements_exceed_the_bounds(old: str, new: str) -> None:
     text = LANES.read_text()
     assert text.count(old) == 1
@@ -174,16 +171,13 @@ def test_longer_product_keeps_its_bound() -> None:
 
 
 @pytest.mark.sampled
-@pytest.mark.parametrize(
-    ("path", "old", "new", "name"),
-    [
-        (TWO_WORDS, "+ xl*yh) + xl*yl", "+ xl*yh)", "product_of"),
-        (TWO_WORDS, "y_low + x_low*factor", "y_low - x_low*factor", "multiple_of_pair"),
-        (TWO_WORDS, "(y - part)", "(part - y)", "sum_of_pairs"),
-        (WORD_PAIRS, "rest + (x%low + y%low)", "rest + x%low", "sum_of_pairs"),
-        (WORD_PAIRS, "- found%high*y%low)", "+ found%high*y%low)", "quotient_of_pairs"),
-    ],
-)
+@pytest.mark.parametrize(("path", "old", "new", "name"), [
+    (TWO_WORDS, "+ xl*yh) + xl*yl", "+ xl*yh)", "product_of"),
+    (TWO_WORDS, "y_low + x_low*factor", "y_low - x_low*factor", "multiple_of_pair"),
+    (TWO_WORDS, "(y - part)", "(part - y)", "sum_of_pairs"),
+    (WORD_PAIRS, "rest + (x%low + y%low)", "rest + x%low", "sum_of_pairs"),
+    (WORD_PAIRS, "- found%high*y%low)", "+ found%high*y%low)", "quotient_of_pairs"),
+])  # fmt: skip
 def test_a_changed_operation_exceeds_its_bound(path: Path, old: str, new: str, name: str) -> None:
     text = path.read_text()
     assert old in text

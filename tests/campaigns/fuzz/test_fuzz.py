@@ -96,13 +96,10 @@ _HANGS = (
 )
 
 
-@pytest.mark.parametrize(
-    ("code", "words"),
-    [
-        ("import os; print('at 7', flush=True); os.kill(os.getpid(), 11)", "ended with -11"),
-        pytest.param(_HANGS, "no end within", marks=pytest.mark.campaign),
-    ],
-)
+@pytest.mark.parametrize(("code", "words"), [
+    ("import os; print('at 7', flush=True); os.kill(os.getpid(), 11)", "ended with -11"),
+    pytest.param(_HANGS, "no end within", marks=pytest.mark.campaign),
+])  # fmt: skip
 def test_worker_that_dies_or_hangs_is_a_fault_of_its_input(
     code: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

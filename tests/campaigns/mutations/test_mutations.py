@@ -68,15 +68,12 @@ def test_operators_on_text(language: str, line: str, operator: str, wanted: list
     assert sorted(_of_text(line, language)[operator]) == sorted(wanted)
 
 
-@pytest.mark.parametrize(
-    ("language", "text"),
-    [
-        (FORTRAN, "  ! x = 1 - 2\n  use kinds, only : dp\n  real(dp), intent(in) :: x(3)"),
-        (FORTRAN, "  subroutine f(a, b)\n  end subroutine f\n#:if WORD == 3"),
-        (C, "/* x = 1 - 2; */\n// x = 1;\n#define N (3 - 1)"),
-        (JAVASCRIPT, "// x = 1 - 2;\nimport { a } from './b.js';"),
-    ],
-)
+@pytest.mark.parametrize(("language", "text"), [
+    (FORTRAN, "  ! x = 1 - 2\n  use kinds, only : dp\n  real(dp), intent(in) :: x(3)"),
+    (FORTRAN, "  subroutine f(a, b)\n  end subroutine f\n#:if WORD == 3"),
+    (C, "/* x = 1 - 2; */\n// x = 1;\n#define N (3 - 1)"),
+    (JAVASCRIPT, "// x = 1 - 2;\nimport { a } from './b.js';"),
+])  # fmt: skip
 def test_nothing_but_code_is_changed(language: str, text: str) -> None:
     assert _of_text(text, language) == {}
 
@@ -186,15 +183,12 @@ def test_tests_of_a_module_that_is_compiled_for_each_instruction_set_are_near(
     assert [each.name for each in near(mutation, [other, entered])] == ["a"]
 
 
-@pytest.mark.parametrize(
-    ("file", "function", "entered"),
-    [
-        ("tape_step.f90", "step_tape", ":step_tape_avx512"),
-        # A function that is inlined, and therefore entered by no test.
-        ("tape_step.f90", "is_continued", ":step_tape_plain"),
-        ("tape_terms.c", "expand_tape", ":expand_tape_avx2"),
-    ],
-)
+@pytest.mark.parametrize(("file", "function", "entered"), [
+    ("tape_step.f90", "step_tape", ":step_tape_avx512"),
+    # A function that is inlined, and therefore entered by no test.
+    ("tape_step.f90", "is_continued", ":step_tape_plain"),
+    ("tape_terms.c", "expand_tape", ":expand_tape_avx2"),
+])  # fmt: skip
 def test_tests_of_a_function_with_the_name_of_an_instruction_set_are_near(
     file: str, function: str, entered: str
 ) -> None:

@@ -64,22 +64,19 @@ def test_step_far_too_long_is_halved_until_the_order_shows(program: str, scene: 
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize(
-    ("scene", "program", "state", "words"),
-    [
-        # A textbook method of the same order does not settle either.
-        (_steps(2, 0.2, 2000), "two-term", "unsettled", "does not settle"),
-        # Each step then has order 1, which the program reports by IER.
-        (_steps(5, 1e-6, 100), "four-term", "singular", "IER = 129"),
-        (_steps(5, 3e-5, 100), "four-term", "singular", "IER = 129"),
-        *(
-            # Perturbed rotation about the middle axis: after some flips no step settles.
-            (replace(_steps(4, 5.0, 50), omega=(1e-6, 1.0, 1e-6)), program, "sensitive", "rounding")
-            for program in PROGRAMS
-        ),
-        (replace(_steps(4, 10.0, 60), omega=(1e-4, 1.0, 1e-4)), "runge-kutta", "sensitive", ""),
-    ],
-)
+@pytest.mark.parametrize(("scene", "program", "state", "words"), [
+    # A textbook method of the same order does not settle either.
+    (_steps(2, 0.2, 2000), "two-term", "unsettled", "does not settle"),
+    # Each step then has order 1, which the program reports by IER.
+    (_steps(5, 1e-6, 100), "four-term", "singular", "IER = 129"),
+    (_steps(5, 3e-5, 100), "four-term", "singular", "IER = 129"),
+    *(
+        # Perturbed rotation about the middle axis: after some flips no step settles.
+        (replace(_steps(4, 5.0, 50), omega=(1e-6, 1.0, 1e-6)), program, "sensitive", "rounding")
+        for program in PROGRAMS
+    ),
+    (replace(_steps(4, 10.0, 60), omega=(1e-4, 1.0, 1e-4)), "runge-kutta", "sensitive", ""),
+])  # fmt: skip
 def test_what_the_scene_can_not_tell_is_no_miss(
     scene: Scene, program: str, state: str, words: str
 ) -> None:
@@ -108,19 +105,15 @@ def _once(scene: Scene) -> Array:
     return _exact(scene) + (1e-3 if scene.steps == 4 else 2.5e-4)
 
 
-@pytest.mark.parametrize(
-    ("solution", "state", "value"),
-    [
-        (_exact, "rounding", None),
-        (_of_order(1.6), "as due", 1.6),  # half an order may be missing
-        (_of_order(1.4), "misses", 1.4),
-        (_of_order(0.0), "misses", 0.0),
-        (_once, "misses", 0.0),  # one halving is no proof
-        (lambda _: np.empty((0, 3)), "unsettled", None),
-        (lambda it: np.random.default_rng(it.steps).random((it.steps, 3)), "unsettled", None),
-    ],
-    ids=["exact", "1.6", "1.4", "0", "once", "overflow", "erratic"],
-)
+@pytest.mark.parametrize(("solution", "state", "value"), [
+    (_exact, "rounding", None),
+    (_of_order(1.6), "as due", 1.6),  # half an order may be missing
+    (_of_order(1.4), "misses", 1.4),
+    (_of_order(0.0), "misses", 0.0),
+    (_once, "misses", 0.0),  # one halving is no proof
+    (lambda _: np.empty((0, 3)), "unsettled", None),
+    (lambda it: np.random.default_rng(it.steps).random((it.steps, 3)), "unsettled", None),
+], ids=["exact", "1.6", "1.4", "0", "once", "overflow", "erratic"])  # fmt: skip
 def test_only_what_shows_the_order_is_as_due(
     solution: Callable[[Scene], Array], state: str, value: float | None
 ) -> None:

@@ -108,15 +108,12 @@ def test_longer_motions_get_finer_steps_of_solve_ivp() -> None:
 
 
 @pytest.mark.parametrize("method", [*(m for m in _METHODS if m != "quick"), "sphere"])
-@pytest.mark.parametrize(
-    ("law", "time", "wanted"),
-    [
-        (TorqueLaw((1e-281, 2e-281, 0.0)), 1e-24, 1e-305),
-        (TorqueLaw((1e-290, 2e-290, 0.0)), 1e-15, 1e-305),
-        (TorqueLaw(rate=(1e20, 2e20, 0.0)), 1e-60, 5e-101),
-        (TorqueLaw(cosines=(((1e-281, 0.0, 0.0), 1.0),)), 1e-24, 1e-305),
-    ],
-)
+@pytest.mark.parametrize(("law", "time", "wanted"), [
+    (TorqueLaw((1e-281, 2e-281, 0.0)), 1e-24, 1e-305),
+    (TorqueLaw((1e-290, 2e-290, 0.0)), 1e-15, 1e-305),
+    (TorqueLaw(rate=(1e20, 2e20, 0.0)), 1e-60, 5e-101),
+    (TorqueLaw(cosines=(((1e-281, 0.0, 0.0), 1.0),)), 1e-24, 1e-305),
+])  # fmt: skip
 def test_a_scale_that_loses_time_or_torque_is_not_taken(
     method: str, law: TorqueLaw, time: float, wanted: float
 ) -> None:

@@ -67,13 +67,10 @@ def test_it_grows_with_the_logarithm_of_the_tilt() -> None:
     assert flip_times([1.0, 2.0, 3.0], omega) == pytest.approx(expected, rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("moments", "omega"),
-    [
-        ((1.0, 2.0, 3.0), (0.0, 1.0, 0.0)),  # on the axis
-        ((2.0, 2.0, 2.0), (1.0, 1.0, 0.0)),  # a sphere
-        ((1.0, 2.0, 2.0), (0.0, 1.0, 0.1)),  # an axis in the plane of equal moments
-    ],
-)
+@pytest.mark.parametrize(("moments", "omega"), [
+    ((1.0, 2.0, 3.0), (0.0, 1.0, 0.0)),  # on the axis
+    ((2.0, 2.0, 2.0), (1.0, 1.0, 0.0)),  # a sphere
+    ((1.0, 2.0, 2.0), (0.0, 1.0, 0.1)),  # an axis in the plane of equal moments
+])  # fmt: skip
 def test_what_never_turns_takes_for_ever(moments: Any, omega: Any) -> None:
     assert flip_times(moments, omega)[0] == np.inf

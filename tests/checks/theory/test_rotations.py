@@ -129,16 +129,13 @@ def test_three_torques_hold_two_rotations_or_none_and_never_a_stable_one() -> No
     assert 60 <= counts.count(0) <= 140
 
 
-@pytest.mark.parametrize(
-    ("scene", "words"),
-    [
-        (case_scene(1), "A = 0, so that nothing holds the torque about axis 1"),
-        (case_scene(6), "ABC M1 M2 M3 > 0"),
-        (_scene((1.0, 2.0, 0.0)), "about axes 1 and 2 turns the body about axis 3"),
-        (_scene((0.0, 0.0, 2.0), TOP), "C = 0"),
-        (_scene((1.0, 2.0, 2.0), TOP), "C = 0"),
-    ],
-)
+@pytest.mark.parametrize(("scene", "words"), [
+    (case_scene(1), "A = 0, so that nothing holds the torque about axis 1"),
+    (case_scene(6), "ABC M1 M2 M3 > 0"),
+    (_scene((1.0, 2.0, 0.0)), "about axes 1 and 2 turns the body about axis 3"),
+    (_scene((0.0, 0.0, 2.0), TOP), "C = 0"),
+    (_scene((1.0, 2.0, 2.0), TOP), "C = 0"),
+])  # fmt: skip
 def test_scene_without_steady_rotations_says_why(scene: Scene, words: str) -> None:
     found = steady_rotations(scene, 1e-3)
     assert found.rotations == ()

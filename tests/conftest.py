@@ -20,6 +20,8 @@ if extension().choose_instructions(CHOSEN) > CHOSEN:
 
 pytest_plugins = ["tests.tiers"]
 Printed = Callable[[str], str]
+Patch = pytest.MonkeyPatch
+Capture = pytest.CaptureFixture[str]
 # Tests that share the built site and the judgements of all claims, half a minute of work; and
 # tests that take long, at the end of which no process should wait for another.
 _FIRST = (

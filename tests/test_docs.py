@@ -27,7 +27,7 @@ from pyharness.history import figures
 from pyharness.model.report import Report
 from pyharness.views import render as views
 from pyharness.views.render import csv_text
-from tests.conftest import Printed
+from tests.conftest import Patch, Printed
 from tests.json_reference import SCHEMA, schema_of
 
 ROOT = Path(__file__).parent.parent
@@ -70,7 +70,7 @@ def test_picture_of_the_architecture_is_the_import_contract() -> None:
 @pytest.mark.sampled
 @pytest.mark.parametrize(("path", "command", "output"), _blocks())
 def test_output_is_current(
-    path: Path, command: str, output: str, printed: Printed, monkeypatch: pytest.MonkeyPatch
+    path: Path, command: str, output: str, printed: Printed, monkeypatch: Patch
 ) -> None:
     """Its JSON has the documented fields. `python -m tests.test_docs` writes the blocks anew."""
     monkeypatch.chdir(ROOT)
@@ -144,7 +144,7 @@ def test_pictures_of_the_report_are_current() -> None:
 
 @pytest.mark.sampled
 @pytest.mark.parametrize("path", [*DOCS, README], ids=lambda path: path.stem)
-def test_examples_in_the_documents_run(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_examples_in_the_documents_run(path: Path, monkeypatch: Patch) -> None:
     """Shown outputs and the numbers of pictures are current: `python -m docs.gallery.build`."""
     monkeypatch.chdir(ROOT)
     monkeypatch.setenv("MPLBACKEND", "Agg")
@@ -218,9 +218,7 @@ def test_scene_file_in_the_reference_is_one(tmp_path: Path) -> None:
         "verify --only random --draws 3", "stress --only matrices",
     ],
 )  # fmt: skip
-def test_json_has_the_documented_fields(
-    command: str, printed: Printed, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_json_has_the_documented_fields(command: str, printed: Printed, monkeypatch: Patch) -> None:
     monkeypatch.chdir(ROOT)
     record = json.loads(printed(f"{command} --format json"))
     Draft202012Validator(schema_of(command.split()[0])).validate(record)

@@ -18,7 +18,7 @@ from docs.gallery import build
 from docs.gallery.build import PAGES, answer, examples, page, question
 from docs.gallery.execution import OUTPUT, PICTURE, PYTHON, executed, is_current, shown_output
 from pyharness.edition.documents import notebook
-from tests.conftest import Printed
+from tests.conftest import Patch, Printed
 
 _PUBLIC = {f"pyharness.{name}" for name in ("events", "torques")}
 TEXTS = {name: text for name, (_, text) in examples().items()}
@@ -92,9 +92,7 @@ def test_outputs_are_compared_apart_from_rounding(shown: str, printed: str, agre
     assert is_current(shown, printed) == agrees
 
 
-def test_command_of_the_wing_nut_runs(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, printed: Printed
-) -> None:
+def test_command_of_the_wing_nut_runs(tmp_path: Path, monkeypatch: Patch, printed: Printed) -> None:
     """The animation takes half a minute, and is not made here."""
     monkeypatch.chdir(tmp_path)
     text = TEXTS["wing-nut"]
@@ -114,7 +112,7 @@ def test_outputs_belong_to_their_examples() -> None:
     assert (second.printed, shown_output(text, second)) == ("", None)
 
 
-def test_build_replaces_outputs_and_draws(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_build_replaces_outputs_and_draws(tmp_path: Path, monkeypatch: Patch) -> None:
     monkeypatch.setattr(build, "HERE", tmp_path)
     monkeypatch.setenv("MPLBACKEND", "Agg")
     text = (

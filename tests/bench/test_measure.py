@@ -38,8 +38,8 @@ from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
 from pyharness.truth.reference import reference
 from pyharness.views.render import render
+from tests.conftest import Capture, Patch
 
-Capture = pytest.CaptureFixture[str]
 SHORT = Workload("5", case_scene(5), 3.0)
 OTHER = Workload("6", case_scene(6), 3.0)
 
@@ -197,7 +197,7 @@ def _refuses(scene: Scene) -> Maker:
 
 
 @pytest.fixture
-def few_steps(hurried: None, monkeypatch: pytest.MonkeyPatch) -> None:
+def few_steps(hurried: None, monkeypatch: Patch) -> None:
     monkeypatch.setattr(bench, "_LARGEST_STEPS", 64)
     monkeypatch.setattr(bench, "_ROUNDS", 2)
 
@@ -260,9 +260,7 @@ def test_every_contender_of_ours_meets_its_order_or_tolerance_and_counts() -> No
     assert any("100 eps" in each.reason for each in found.refused)
 
 
-def test_slow_contenders_are_left_out_and_it_is_said(
-    right: Array, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_slow_contenders_are_left_out_and_it_is_said(right: Array, monkeypatch: Patch) -> None:
     clock = itertools.count(0.0)
     monkeypatch.setattr(bench, "perf_counter", lambda: next(clock))
     monkeypatch.setattr(bench, "_ROUNDS", 1)
@@ -273,7 +271,7 @@ def test_slow_contenders_are_left_out_and_it_is_said(
     assert found.refused == [Refusal(SHORT, "slow", 1e-4, why)]
 
 
-def test_a_call_that_never_ends_is_ended(right: Array, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_call_that_never_ends_is_ended(right: Array, monkeypatch: Patch) -> None:
     monkeypatch.setattr(bench, "_LONGEST_FIRST", 0.05)
 
     def answer(setting: float) -> End:
@@ -346,7 +344,7 @@ def test_verb_writes_json_csv_and_picture(tmp_path: Path, capsys: Capture) -> No
     assert len(shown) > 10
 
 
-def test_missing_peer_is_said(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+def test_missing_peer_is_said(monkeypatch: Patch, capsys: Capture) -> None:
     room = "pyharness.cli.verbs.bench"
     few = [each for each in peers() if each.name in ("heyoka", "odeint")]
     there = property(lambda contender: contender.package != "heyoka")

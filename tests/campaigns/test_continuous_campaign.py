@@ -10,6 +10,7 @@ from pyharness import Scene, solve
 from pyharness.model.dense_output import Pieces
 from tests.campaigns import continuous_campaign, driver
 from tests.campaigns.continuous_campaign import KINDS, MODULE, Drawn, drawn, main, try_scene
+from tests.conftest import Capture, Patch
 
 
 def test_no_result_exceeds_the_limit() -> None:
@@ -45,9 +46,7 @@ def test_polynomials_have_all_degrees() -> None:
 
 
 @pytest.mark.parametrize("fault", ["nodes", "root", "lost", "twice"])
-def test_a_wrong_result_is_reported(
-    fault: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_wrong_result_is_reported(fault: str, monkeypatch: Patch, capsys: Capture) -> None:
     right = Pieces.__call__
 
     def wrong(*args: Any, **keywords: Any) -> Any:

@@ -18,6 +18,7 @@ from pyharness.model.trajectory import Trajectory
 from pyharness.truth.enclosed import Balls
 from pyharness.truth.reference import Reference, reference
 from tests.campaigns import proved
+from tests.conftest import Patch
 from tests.refused import refused
 
 COMMAND = "python -m tests.campaigns.proved"
@@ -75,7 +76,7 @@ def test_no_promise_is_broken_in_a_few_scenes() -> None:
     ("reference", _precise, "short precise"),
 ])  # fmt: skip
 def test_a_planted_fault_is_found(
-    name: str, fault: Callable[[Any], Any], result: str, monkeypatch: pytest.MonkeyPatch
+    name: str, fault: Callable[[Any], Any], result: str, monkeypatch: Patch
 ) -> None:
     pytest.importorskip("flint")
     right: Any = {"solve": solve, "reference": reference}[name]
@@ -130,9 +131,7 @@ def test_parts_of_a_campaign_make_the_whole(tmp_path: Path) -> None:
     refused(r"first\.json: no tally", read, paths[0])
 
 
-def test_an_interrupt_leaves_the_finished_scenes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_interrupt_leaves_the_finished_scenes(tmp_path: Path, monkeypatch: Patch) -> None:
     def scene(tally: Tally, seed: str, number: int, *rest: object) -> None:
         if number == 3:
             raise KeyboardInterrupt
@@ -160,7 +159,7 @@ def test_quantiles_of_the_histogram_are_those_of_the_numbers() -> None:
 
 
 def test_a_broken_promise_is_on_the_page_with_its_explanation(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: Patch
 ) -> None:
     tally = Tally()
     tally.judge("python -m tests.campaigns.proved 1 x 5", "free taylor", 3.0, 1.0)

@@ -13,6 +13,7 @@ from tests.campaigns import driver, entries
 from tests.campaigns.driver import Tally
 from tests.campaigns.entries import Result, truth_of
 from tests.campaigns.state_campaign import MODULE, TOLERANCES, judge, main, try_scene
+from tests.conftest import Capture, Patch
 
 BLIND = "estimates below a hundredth of the error"
 
@@ -37,9 +38,7 @@ def test_the_reference_is_that_of_two_series_in_more_digits() -> None:
         assert truth.error(wanted.omega, wanted.attitude, False) < 1e-15
 
 
-def test_a_wrong_result_is_reported(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_wrong_result_is_reported(monkeypatch: Patch, capsys: Capture) -> None:
     right = entries._row
 
     def wrong(entry: str, omega: Array, *others: Any) -> Result:

@@ -18,10 +18,10 @@ from pyharness.checks.port_protocol import VARIABLES
 from pyharness.cli.main import main
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.scene_file import case_numbers
+from tests.conftest import Capture, Patch
 from tests.json_reference import schema_of
 from tests.ports import answering, documented_command, scene_port
 
-Capture = pytest.CaptureFixture[str]
 CELL = "two-term/case-2/original"
 BIT = "import math; rows[6][2] = math.nextafter(float.fromhex(rows[6][2]), math.inf).hex()"
 
@@ -130,9 +130,7 @@ def test_a_wrong_port_fails_the_control(tmp_path: Path, capsys: Capture) -> None
 
 
 @pytest.mark.campaign
-def test_a_check_that_sees_nothing_would_fail_the_self_test(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_check_that_sees_nothing_would_fail_the_self_test(monkeypatch: Patch) -> None:
     """Without the comparison of rows the planted bits pass unseen, and the self-test says so."""
 
     def blind(cell: Cell, twin: Any, line: bytes, *rest: Any) -> Any:

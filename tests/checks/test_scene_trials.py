@@ -20,6 +20,7 @@ from pyharness.cli.main import main
 from pyharness.engine.registry import METHODS
 from pyharness.engine.rotated import restarted_at
 from pyharness.model.scene_file import scene_text
+from tests.conftest import Capture, Patch
 
 DAMPED = "docs/damped.toml"
 MOMENTS = (4.0, 3.0, 2.0)
@@ -117,9 +118,7 @@ def test_wrong_order_and_other_bits_are_seen() -> None:
 
 
 @pytest.mark.campaign
-def test_verb_stress_with_a_scene(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_verb_stress_with_a_scene(capsys: Capture, tmp_path: Path, monkeypatch: Patch) -> None:
     path = tmp_path / "a scene.toml"
     path.write_text(scene_text(SCENES["expressions"]()))
     monkeypatch.chdir(tmp_path)

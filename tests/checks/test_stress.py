@@ -24,6 +24,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.thesis.programs import PROGRAM_REGISTRY
 from tests.checks.stressed import checks_of, failed
+from tests.conftest import Capture, Patch
 
 
 @pytest.mark.campaign
@@ -56,9 +57,7 @@ def test_one_check_alone_is_the_same() -> None:
 
 
 @pytest.mark.parametrize("number", [math.inf, math.nan])
-def test_an_overflow_reported_as_complete_is_caught(
-    monkeypatch: pytest.MonkeyPatch, number: float
-) -> None:
+def test_an_overflow_reported_as_complete_is_caught(monkeypatch: Patch, number: float) -> None:
     def wrong(*_: object) -> End:
         return End(np.full(3, number), "complete", 1)
 
@@ -101,14 +100,14 @@ def test_the_worst_is_the_nearest_to_its_limit_or_failed() -> None:
     assert {name: each.id for name, each in found.items()} == {"a/b": "a/b/2", "a/c": "a/c/1"}
 
 
-def _run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str]:
+def _run(capsys: Capture, *arguments: str) -> tuple[int, str]:
     code = main(["stress", *arguments])
     return code, capsys.readouterr().out
 
 
 @pytest.mark.campaign
 def test_table_is_narrow_and_json_tells_all(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    capsys: Capture, tmp_path: Path, monkeypatch: Patch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     only = "separatrix/closed-form,separatrix/rk4/flip-1e-05,shapes/two-term/plate-123"
@@ -129,7 +128,7 @@ def test_table_is_narrow_and_json_tells_all(
 
 
 def test_a_failure_is_told_in_every_form(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    capsys: Capture, tmp_path: Path, monkeypatch: Patch
 ) -> None:
     def late(scene: Scene, times: Sequence[float], *rest: Any, **more: Any) -> Trajectory:
         return solve(scene, [t * (1.0 + 1e-9) for t in times], *rest, **more)
@@ -150,7 +149,7 @@ def test_a_failure_is_told_in_every_form(
 
 
 def test_an_exception_is_a_failure_of_the_requested_check(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    capsys: Capture, monkeypatch: Patch
 ) -> None:
     def broken(*arguments: Any, **more: Any) -> Trajectory:
         raise ArithmeticError("at all times")
@@ -162,7 +161,7 @@ def test_an_exception_is_a_failure_of_the_requested_check(
 
 
 def test_the_worst_input_is_saved_and_its_command_gives_the_same(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
+    capsys: Capture, tmp_path: Path
 ) -> None:
     folder = tmp_path / "worst"
     only = "separatrix/taylor/early-1e-01,separatrix/quick/early-1e-01"
@@ -183,7 +182,7 @@ def test_the_worst_input_is_saved_and_its_command_gives_the_same(
 
 
 def test_only_what_failed_is_saved_unless_a_folder_is_given(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    capsys: Capture, tmp_path: Path, monkeypatch: Patch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     folder = tmp_path / "worst"
@@ -203,7 +202,7 @@ def test_only_what_failed_is_saved_unless_a_folder_is_given(
 
 
 @pytest.fixture
-def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+def figures(monkeypatch: Patch) -> list[Any]:
     """Return the list to which every saved figure will be appended."""
     figure_module = pytest.importorskip("matplotlib.figure")
     saved: list[Any] = []
@@ -229,7 +228,7 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     ],
 )  # fmt: skip
 def test_picture_shows_what_its_numbers_say_and_no_title_meets_another(
-    only: str, key: str, figures: list[Any], capsys: pytest.CaptureFixture[str], tmp_path: Path
+    only: str, key: str, figures: list[Any], capsys: Capture, tmp_path: Path
 ) -> None:
     assert _run(capsys, "--only", only, "--plot", str(tmp_path / "x.svg"))[0] == 0
     rows = (tmp_path / "x.csv").read_text().splitlines()

@@ -26,11 +26,8 @@ from pyharness.model.errors import NotBuiltError
 from pyharness.model.listing import Listing
 from pyharness.model.report import short
 from pyharness.thesis import compiled
-from tests.conftest import Printed
+from tests.conftest import Capture, Patch, Printed
 from tests.instruction_sets import CHOSEN, LEVELS, levels_here
-
-Patch = pytest.MonkeyPatch
-Capture = pytest.CaptureFixture[str]
 
 
 def test_help_and_version(printed: Printed) -> None:

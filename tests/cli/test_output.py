@@ -23,9 +23,8 @@ from pyharness.cli.options import warn
 from pyharness.cli.output import write_folder
 from pyharness.model import output_files
 from pyharness.model.output_files import write_files
+from tests.conftest import Capture, Patch
 
-Capture = pytest.CaptureFixture[str]
-Patch = pytest.MonkeyPatch
 RUN = ["run", "--case", "3", "--program", "two-term", "--format", "csv"]
 
 

@@ -10,7 +10,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from pyharness.cli.main import main
-from tests.conftest import Printed
+from tests.conftest import Capture, Patch, Printed
 from tests.json_reference import schema_of
 from tests.truth.test_certificate import SCENES, genuine
 
@@ -23,7 +23,7 @@ torque.expression = ["-0.1*w1", "-0.1*w2 + 0.1*w1*w3", "-0.1*w3"]
 
 
 @pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def here(tmp_path: Path, monkeypatch: Patch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("damped.toml").write_text(DAMPED)
 
@@ -90,7 +90,7 @@ def test_certificate_and_closed_form_agree(printed: Printed) -> None:
             assert away <= Fraction(one["radius"]) + Fraction(other["radius"])
 
 
-def test_falsified_certificate_has_exit_status_1(capsys: pytest.CaptureFixture[str]) -> None:
+def test_falsified_certificate_has_exit_status_1(capsys: Capture) -> None:
     record = json.loads(json.dumps(genuine(next(iter(SCENES)))))
     Path("good.json").write_text(json.dumps(record))
     record["steps"][1][3][0] += 1
@@ -112,9 +112,7 @@ def test_falsified_certificate_has_exit_status_1(capsys: pytest.CaptureFixture[s
 
 
 @pytest.mark.parametrize("content", [None, b"", b"a = 1\n", b"{}", b"\xff\xfe{\0}\0"])
-def test_file_that_is_no_certificate_is_refused(
-    content: bytes | None, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_file_that_is_no_certificate_is_refused(content: bytes | None, capsys: Capture) -> None:
     """Regression test: the exit status was 1, as for a certificate that does not hold."""
     if content is not None:
         Path("x.json").write_bytes(content)

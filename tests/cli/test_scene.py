@@ -17,7 +17,7 @@ from pyharness.engine.scene_reader import SCENE_TABLES as TABLES
 from pyharness.engine.scene_reader import scene_of
 from pyharness.engine.term_file import KINDS
 from pyharness.model.facts import facts_folder
-from tests.conftest import Printed
+from tests.conftest import Capture, Printed
 
 ROOT = Path(__file__).parent.parent.parent
 SCHEMA = json.loads((facts_folder() / "scene.schema.json").read_text())
@@ -46,9 +46,7 @@ def test_a_new_scene_file_is_read(tmp_path: Path, printed: Printed) -> None:
     assert read_scene(path).omega == case_scene(3).omega
 
 
-def test_check_describes_a_scene(
-    tmp_path: Path, printed: Printed, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_check_describes_a_scene(tmp_path: Path, printed: Printed, capsys: Capture) -> None:
     found = printed(f"scene check {ROOT}/docs/satellite.toml")
     assert "gravity gradient + wheels + damping" in found
     assert max(map(len, found.splitlines())) <= 100

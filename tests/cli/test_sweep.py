@@ -8,15 +8,13 @@ import pytest
 
 from pyharness.cli.main import main
 from pyharness.cli.verbs import sweep as verb
-from tests.conftest import Printed
+from tests.conftest import Capture, Patch, Printed
 from tests.sweep.claims import CLAIMS
 from tests.sweep.sweeps import PROGRAM, SQUARE, TILT, text, written
 
-Capture = pytest.CaptureFixture[str]
-
 
 @pytest.fixture(autouse=True)
-def _beside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def _beside(tmp_path: Path, monkeypatch: Patch) -> None:
     monkeypatch.chdir(tmp_path)
     written(tmp_path, text(TILT, SQUARE, top='reductions = ["end", "status", "growth"]'))
 
@@ -55,7 +53,7 @@ def test_picture_is_drawn_with_its_numbers(content: str, printed: Printed, tmp_p
     assert "status" in (tmp_path / "status.csv").read_text().splitlines()[0]
 
 
-def test_claim_is_asked_by_its_name(printed: Printed, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_claim_is_asked_by_its_name(printed: Printed, monkeypatch: Patch) -> None:
     monkeypatch.setattr(verb, "CLAIMS", CLAIMS)
     top = 'reductions = [{name = "claim", id = "stays"}]'
     written(Path(), text(TILT, top=top))
@@ -64,7 +62,7 @@ def test_claim_is_asked_by_its_name(printed: Printed, monkeypatch: pytest.Monkey
 
 @pytest.mark.parametrize(("package", "executor"), [("zarr", "here"), ("distributed", "dask")])
 def test_missing_package_is_named(
-    package: str, executor: str, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+    package: str, executor: str, capsys: Capture, monkeypatch: Patch
 ) -> None:
     monkeypatch.setitem(sys.modules, package, None)
     assert main(["sweep", "sweep.toml", "--out", "store", "--executor", executor]) == 2

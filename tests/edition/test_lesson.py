@@ -19,7 +19,7 @@ from pyharness.history.ablation import entries
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene_file import case_scene
 from pyharness.thesis.decks import compiler, deck_text, run_deck
-from tests.conftest import Printed
+from tests.conftest import Patch, Printed
 from tests.ports import WEB, run_javascript
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -100,9 +100,7 @@ def _marked(command: str) -> Any:
 
 
 @pytest.mark.parametrize("command", [_marked(x) for x in _commands(LESSON) + _commands(NOTES)])
-def test_commands_run(
-    command: str, printed: Printed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_commands_run(command: str, printed: Printed, tmp_path: Path, monkeypatch: Patch) -> None:
     if command in ("cards", "defects", "run"):  # a verb, without its options
         return
     monkeypatch.chdir(tmp_path)
@@ -224,7 +222,7 @@ def test_numbers_of_the_solutions_are_computed() -> None:
 @pytest.mark.skipif(compiler() is None, reason="no gfortran")
 @pytest.mark.parametrize("program", ["runge-kutta", "two-term"])
 def test_decks_are_compiled_and_run_as_the_lesson_says(
-    program: str, printed: Printed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    program: str, printed: Printed, tmp_path: Path, monkeypatch: Patch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     blocks = re.findall(r"```sh\n(.*?)```", EXERCISES, re.DOTALL)

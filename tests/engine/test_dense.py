@@ -15,6 +15,7 @@ from pyharness.events import crosses
 from pyharness.model.dense_output import DenseOutput, Pieces
 from pyharness.model.trajectory import Trajectory
 from tests.campaigns import dense_campaign
+from tests.conftest import Capture, Patch
 
 MOMENTS = (1.0, 2.0, 3.0)
 OMEGA = (0.1, 2.0, 0.1)
@@ -169,7 +170,7 @@ def test_the_smallest_tolerance_of_a_method_is_enough() -> None:
     assert largest_error(sol_of(found), truth) <= 4e-9
 
 
-def test_too_many_polynomials_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_too_many_polynomials_are_refused(monkeypatch: Patch) -> None:
     monkeypatch.setattr(dense, "_MOST_PIECES", 5)
     for method in ("dop853", "rk4"):
         with pytest.raises(InputError, match="dense output"):
@@ -184,9 +185,7 @@ def test_a_short_campaign() -> None:
     assert dense_campaign.main(["4", "test"]) == 0
 
 
-def test_a_wrong_dense_output_is_reported(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_wrong_dense_output_is_reported(monkeypatch: Patch, capsys: Capture) -> None:
     right = Pieces.__call__
     monkeypatch.setattr(Pieces, "__call__", lambda own, times: right(own, times) * (1.0 + 2e-3))
     assert dense_campaign.main(["4", "test"]) == 1
@@ -274,7 +273,7 @@ def test_changing_inertia_has_steps_too() -> None:
 
 @pytest.mark.parametrize("name", ["damping", "table", "changing", "full", "turning", "fast"])
 def test_the_steps_of_a_recorded_torque_are_read_and_nothing_is_solved_again(
-    name: str, monkeypatch: pytest.MonkeyPatch
+    name: str, monkeypatch: Patch
 ) -> None:
     recorded = {
         "full": replace(SCENES["full"], torque=torques.damping([0.1, 0.2, 0.3])),
@@ -304,7 +303,7 @@ def test_the_steps_of_a_recorded_torque_are_read_and_nothing_is_solved_again(
     assert solve(scene, ends, events=lambda t, w: w[1] - 1.0).t_events is not None
 
 
-def test_steps_beyond_those_that_are_kept_are_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_steps_beyond_those_that_are_kept_are_replaced(monkeypatch: Patch) -> None:
     scene, times = SCENES["damping"], np.linspace(0.1, 40.0, 30)
     truth = solve(scene, times, tolerance=1e-14)
     kept = solve(scene, 40.0, tolerance=1e-10, dense_output=True)
@@ -319,7 +318,7 @@ def test_steps_beyond_those_that_are_kept_are_replaced(monkeypatch: pytest.Monke
 
 @pytest.mark.parametrize("name", [each for each in SCENES if each != "free"])
 def test_steps_are_those_of_the_integration_and_have_its_rows(
-    name: str, monkeypatch: pytest.MonkeyPatch
+    name: str, monkeypatch: Patch
 ) -> None:
     monkeypatch.setattr("pyharness.engine.solve.solution_of", None)  # would solve again
     times, turning = np.linspace(0.3, 12.0, 40), name != "changing"

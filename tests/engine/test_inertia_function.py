@@ -27,6 +27,7 @@ from pyharness.model.inertia_function import InertiaFunction
 from pyharness.model.scene_file import scene_text
 from pyharness.torques import gravity_gradient
 from pyharness.truth.reference import reference
+from tests.conftest import Capture
 from tests.refused import refused
 
 BODY = np.diag([4.0, 3.0, 2.0])
@@ -139,9 +140,7 @@ def turning_moments(t: Any) -> Any:
     return 4.0 + t, 3.0 + np.cos(t), 2.0
 
 
-def test_files_keep_functions_expressions_and_tables(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_files_keep_functions_expressions_and_tables(tmp_path: Path, capsys: Capture) -> None:
     path = tmp_path / "body.toml"
     path.write_text(
         '[body]\nmoments = ["20 + 3*exp(-t)", 23, "26 + 0.1*t"]\n[initial]\nomega = [0.1, 0, 1]\n'

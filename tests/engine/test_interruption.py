@@ -26,6 +26,7 @@ from pyharness.model.torque_law import TorqueLaw, Wave
 from pyharness.thesis.compiled import run
 from pyharness.thesis.many import run_many
 from tests.cli.interrupts import hearing
+from tests.conftest import Patch
 
 # An idle machine needs some hundredths of a second; uninterrupted, each call takes many seconds.
 PATIENCE = 1.5
@@ -148,9 +149,7 @@ def keyboard() -> Iterator[_Keyboard]:
 
 @pytest.mark.sampled
 @pytest.mark.parametrize("name", LONG)
-def test_kernel_ends_at_once(
-    name: str, keyboard: _Keyboard, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_kernel_ends_at_once(name: str, keyboard: _Keyboard, monkeypatch: Patch) -> None:
     rooms = ("taylor", "closed_form", "gauss", "many_scenes", "many_prepared")
     engine = [f"engine.{each}" for each in rooms]
     for each in (*engine, "thesis.compiled", "thesis.many", "model.extension"):

@@ -31,6 +31,7 @@ from pyharness.model.principal import principal
 from pyharness.model.recurrences import OPERATIONS, WAVE
 from pyharness.model.symbols import SYMBOLS
 from pyharness.truth.reference import reference
+from tests.conftest import Patch
 from tests.instruction_sets import CHOSEN, levels_here
 
 MOMENTS = (1.0, 1.2, 1.5)
@@ -61,7 +62,7 @@ def scene_of(torque: Any = every_function, **own: Any) -> Scene:
 
 
 @pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path: Path, monkeypatch: Patch) -> Path:
     """Return the folder of the cache, which is missing."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     return leaf_cache.folder()
@@ -337,7 +338,7 @@ def compiled_once(folder: Path) -> Path:
     return found
 
 
-def test_files_are_private_and_used_again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_files_are_private_and_used_again(folder: Path, monkeypatch: Patch) -> None:
     found = compiled_once(folder)
     assert stat.S_IMODE(folder.stat().st_mode) == 0o700
     assert stat.S_IMODE(found.stat().st_mode) == 0o700
@@ -355,40 +356,40 @@ def rewritten(file: Path, content: bytes) -> None:
     file.chmod(0o700)
 
 
-def of_another_user(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def of_another_user(file: Path, monkeypatch: Patch) -> None:
     monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
 
 
-def damaged(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def damaged(file: Path, monkeypatch: Patch) -> None:
     rewritten(file, file.read_bytes()[:-1] + b"\1")
 
 
-def of_another_processor(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def of_another_processor(file: Path, monkeypatch: Patch) -> None:
     monkeypatch.setattr(leaf_cache, "machine", lambda: "another one")
 
 
-def of_another_version(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def of_another_version(file: Path, monkeypatch: Patch) -> None:
     shape: Any = structure(listing(system_of(scene_of(simple))))
     text = whole_source(shape) + "/* newer */"
     monkeypatch.setattr(leaf_cache, "whole_source", lambda _: text)
 
 
-def as_a_link(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def as_a_link(file: Path, monkeypatch: Patch) -> None:
     file.rename(file.parent.parent / file.name)
     file.symlink_to(file.parent.parent / file.name)
 
 
-def in_a_linked_folder(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def in_a_linked_folder(file: Path, monkeypatch: Patch) -> None:
     file.parent.rename(file.parent.parent / "elsewhere")
     file.parent.symlink_to(file.parent.parent / "elsewhere")
 
 
-def a_folder(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def a_folder(file: Path, monkeypatch: Patch) -> None:
     file.unlink()
     file.mkdir()
 
 
-HOSTILE: dict[str, Callable[[Path, pytest.MonkeyPatch], Any]] = {
+HOSTILE: dict[str, Callable[[Path, Patch], Any]] = {
     "another user": of_another_user,
     "another processor": of_another_processor,
     "another version": of_another_version,
@@ -405,9 +406,7 @@ HOSTILE: dict[str, Callable[[Path, pytest.MonkeyPatch], Any]] = {
 
 
 @pytest.mark.parametrize("name", HOSTILE)
-def test_a_hostile_file_is_never_loaded(
-    name: str, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_hostile_file_is_never_loaded(name: str, folder: Path, monkeypatch: Patch) -> None:
     file = compiled_once(folder)
     leaf_cache.loaded.cache_clear()
     HOSTILE[name](file, monkeypatch)
@@ -459,7 +458,7 @@ COMPILERS = {
 @pytest.mark.usefixtures("fresh")
 @pytest.mark.parametrize("name", COMPILERS)
 def test_without_a_working_compiler_the_interpreter_solves(
-    name: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+    name: str, folder: Path, monkeypatch: Patch
 ) -> None:
     command = COMPILERS[name]
     if name == "missing":
@@ -488,7 +487,7 @@ TINY = Scene("tiny", (1e-310, 0.0, 0.0), (1.0, 1.0, 1.0))
      ("-fno-signed-zeros", True), ("-mrecip", False)],
 )  # fmt: skip
 def test_a_compiler_that_changes_the_arithmetic_is_refused(
-    flag: str, is_wrapped: bool, folder: Path, monkeypatch: pytest.MonkeyPatch
+    flag: str, is_wrapped: bool, folder: Path, monkeypatch: Patch
 ) -> None:
     """Also if its options are not seen; code linked with some would change the whole process."""
     command = script(folder, f'exec cc {flag} "$@"') if is_wrapped else f"cc {flag}"
@@ -505,9 +504,7 @@ def test_a_compiler_that_changes_the_arithmetic_is_refused(
 
 @pytest.mark.external
 @pytest.mark.usefixtures("fresh")
-def test_leaves_of_another_compiler_are_not_loaded(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_leaves_of_another_compiler_are_not_loaded(folder: Path, monkeypatch: Patch) -> None:
     monkeypatch.setenv("CC", "cc -g")
     assert prepare(scene_of(simple), compiled=True).leaves == "compiled"
     leaf_cache.compiler.cache_clear()
@@ -527,7 +524,7 @@ def too_slow(*_: Any, **__: Any) -> None:
 
 @pytest.mark.parametrize("what", ["mkdir", "write_text", "replace", "load", "slow", "file"])
 def test_without_room_or_rights_the_interpreter_solves(
-    what: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+    what: str, folder: Path, monkeypatch: Patch
 ) -> None:
     if what == "load":
         monkeypatch.setattr(leaf_cache, "CDLL", no_room)  # as on a disk that is mounted noexec
@@ -561,7 +558,7 @@ def test_two_processes_compile_at_once(folder: Path, tmp_path: Path) -> None:
     assert len(list(folder.glob("*.so"))) == 1
 
 
-def test_the_folder_is_limited_and_cleaned(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_folder_is_limited_and_cleaned(folder: Path, monkeypatch: Patch) -> None:
     file = compiled_once(folder)
     left = folder / "new-killed"
     left.mkdir()

@@ -13,6 +13,7 @@ from pyharness.engine.rescaled import scaled
 from pyharness.engine.solve import solve
 from pyharness.model.errors import TimedError
 from pyharness.thesis.programs import PROGRAM_REGISTRY
+from tests.conftest import Patch
 
 
 def test_properties_of_the_registry_are_those_of_its_methods() -> None:
@@ -65,7 +66,7 @@ def test_solution_that_blows_up_returns_the_rows_until_then(method: str) -> None
     "method", [*SCIPY_METHODS, "auto", "closed-form", "taylor", "gauss-2", "rk4"]
 )
 def test_time_of_a_refusal_is_in_the_seconds_of_the_scene(
-    method: str, power: int, monkeypatch: pytest.MonkeyPatch
+    method: str, power: int, monkeypatch: Patch
 ) -> None:
     """The time belongs to the result that could not be reached, neither the first nor the last."""
     monkeypatch.setattr("pyharness.engine.scipy_ivp._MOST_EVALUATIONS", 2000)
@@ -89,9 +90,7 @@ def test_time_of_a_refusal_is_in_the_seconds_of_the_scene(
     assert refusal.value.time * factor == pytest.approx(time, rel=1e-5, abs=0.0)
 
 
-def test_time_of_a_refusal_in_a_span_whose_square_is_no_number(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_time_of_a_refusal_in_a_span_whose_square_is_no_number(monkeypatch: Patch) -> None:
     monkeypatch.setattr("pyharness.engine.scipy_ivp._MOST_EVALUATIONS", 2000)
     law = TorqueLaw(sines=(((1e105, 2e105, 3e105), 1e104),))
     scene = Scene("", (1.0, 2.0, -1.0), moments=(3.0, 2.0, 1.0), torque=law)
@@ -101,9 +100,7 @@ def test_time_of_a_refusal_in_a_span_whose_square_is_no_number(
 
 
 @pytest.mark.parametrize("method", SCIPY_METHODS)
-def test_every_call_of_the_right_hand_side_is_counted(
-    method: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_every_call_of_the_right_hand_side_is_counted(method: str, monkeypatch: Patch) -> None:
     scene = case_scene(5)
     slope = Mock(side_effect=scene.right_hand_side())
     monkeypatch.setattr(Scene, "right_hand_side", lambda _: slope)

@@ -24,6 +24,7 @@ from pyharness import (
 )
 from pyharness.model.state_torque import recorded
 from pyharness.truth.reference import reference
+from tests.conftest import Patch
 from tests.engine.entry_points import ball, check_ends, ends_of
 from tests.refused import refused
 
@@ -830,9 +831,7 @@ def test_results_that_depend_on_a_crossing_switch_are_no_sliding() -> None:
     check_ends(ends_of(scene, 3.0), solve(scene, 3.0).omega[-1], abs=1e-8)
 
 
-def test_dense_output_ends_with_the_last_row_before_sliding(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_dense_output_ends_with_the_last_row_before_sliding(monkeypatch: Patch) -> None:
     # Nothing is solved again.
     monkeypatch.setattr("pyharness.engine.dense.state_pieces", None)
     scene = ball(lambda t, w: [-2.0 * np.sign(w[0]), 0.0, 1.0], (1.0, 0.0, 0.0))

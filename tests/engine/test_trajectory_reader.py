@@ -41,6 +41,7 @@ from pyharness.model.tape import Tape
 from pyharness.model.trajectory import Trajectory
 from pyharness.model.trajectory_file import file_content
 from pyharness.torques import damping, gravity_gradient, recorded
+from tests.conftest import Patch
 from tests.engine.test_terms import INERTIA
 from tests.engine.test_work import GENTLE, TIMES, TORQUES, scene_with, switched, written
 
@@ -255,9 +256,7 @@ def test_rows_of_an_opaque_torque_are_saved_without_the_scene(tmp_path: Path) ->
     assert load(path).omega.tobytes() == found.omega.tobytes()
 
 
-def test_file_is_replaced_completely_or_not_at_all(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_file_is_replaced_completely_or_not_at_all(tmp_path: Path, monkeypatch: Patch) -> None:
     path = tmp_path / "found.npz"
     found = solve(case_scene(5), [1.0])
     found.save(path)
@@ -407,9 +406,7 @@ def _zip(entries: dict[str, bytes]) -> bytes:
 
 
 @pytest.mark.parametrize("name", [*FOREIGN, *CHANGED])
-def test_foreign_file_is_refused_in_a_line(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_foreign_file_is_refused_in_a_line(name: str, tmp_path: Path, monkeypatch: Patch) -> None:
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "found.npz"
     path.write_bytes(FOREIGN[name]() if name in FOREIGN else _content(**CHANGED[name]))
@@ -470,7 +467,7 @@ def test_file_of_another_version_is_not_called_damaged(tmp_path: Path) -> None:
 
 
 def test_file_of_another_kind_or_size_is_refused_at_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: Patch
 ) -> None:
     path = tmp_path / "found.npz"
     for name in (path, tmp_path, "/dev/zero"):

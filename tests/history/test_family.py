@@ -29,10 +29,8 @@ from pyharness.model.trajectory import Array
 from pyharness.thesis import compiled
 from pyharness.thesis.linear_solver import SINGULAR, leqt1f
 from pyharness.truth.reference import reference
-from tests.conftest import Printed
+from tests.conftest import Capture, Patch, Printed
 from tests.refused import refused
-
-Capture = pytest.CaptureFixture[str]
 
 PAGE = (Path(__file__).parent.parent.parent / "docs/explanation/methods.md").read_text()
 GROWING = Scene("", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))  # 1 / (1 - t)
@@ -68,7 +66,7 @@ ORDERS = {
 
 @pytest.mark.sampled
 @pytest.mark.parametrize("case", ORDERS)
-def test_orders_as_derived(case: int, capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_orders_as_derived(case: int, capsys: Capture, monkeypatch: Patch) -> None:
     part, told = ORDERS[case]
     every = family_members()
     assert len(every) == 200
@@ -129,7 +127,7 @@ def test_slopes_that_agree_by_chance_are_no_order() -> None:
     assert abs(found.deviation) <= SLACK
 
 
-def test_settled_order_replaces_one_that_is_too_low(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_settled_order_replaces_one_that_is_too_low(monkeypatch: Patch) -> None:
     """The slopes of the first horizon agree better, by chance."""
     horizons = iter([(1.5, 1.0), (2.0, 1.03)])
 
@@ -321,7 +319,7 @@ def test_one_member_in_every_format(printed: Printed) -> None:
     assert "| collocation | 0,0.5,1 | 3 | 4/" in printed(f"{one} --format markdown")
 
 
-def test_order_too_low_is_exit_code_1(capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_order_too_low_is_exit_code_1(capsys: Capture, monkeypatch: Patch) -> None:
     monkeypatch.setattr("pyharness.history.family.predicted_order", lambda member: 3)
     assert main(["family", "--terms", "2"]) == 1
     told = "UNEXPECTED: collocation at points thesis, 2 terms, 1 corrections: order 2.0"

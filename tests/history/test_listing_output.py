@@ -11,6 +11,7 @@ from pyharness.history.printed_page import Difference, Fit, printed_numbers, spl
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.thesis.decks import card_steps
 from pyharness.thesis.printer import page
+from tests.conftest import Capture
 
 MACHINE = Path(__file__).parents[2] / "docs" / "machine"
 PAGES = sorted(MACHINE.glob("*.txt"))
@@ -99,9 +100,7 @@ def test_a_page_tells_its_reading(tmp_path: Path) -> None:
     assert {each.listing for each in found if each.is_whole} == {"original with do-variable"}
 
 
-def test_command_exits_with_1_for_no_word(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_command_exits_with_1_for_no_word(tmp_path: Path, capsys: Capture) -> None:
     assert len(PAGES) == 6
     path = printed(tmp_path, "two-term", 2, "cdc48")
     asked = ["verify", "--listing-output", str(path), "--program", "two-term", "--case", "2"]

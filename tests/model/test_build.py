@@ -24,6 +24,7 @@ from pyharness.model import arithmetic, extension
 from pyharness.model.arithmetic import check_compiler, check_options
 from pyharness.model.build import build
 from tests.as_written import COMPILER
+from tests.conftest import Capture, Patch
 from tests.instruction_sets import LEVELS, level_of_processor
 
 ROOT = Path(__file__).parent.parent.parent
@@ -56,9 +57,7 @@ def test_hot_kernels_are_built_for_this_processor_or_for_all() -> None:
     assert built in ([native], [*LEVELS] if has_levels else ["plain"])
 
 
-def test_a_build_for_another_processor_is_refused(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_build_for_another_processor_is_refused(monkeypatch: Patch, capsys: Capture) -> None:
     monkeypatch.setattr("pyharness._kernels.choose_instructions", lambda highest: -1)
     monkeypatch.setattr(_build, "INSTRUCTION_SETS", ("avx512",))
     extension._check_processor.cache_clear()
@@ -71,7 +70,7 @@ def test_a_build_for_another_processor_is_refused(
         extension._check_processor.cache_clear()
 
 
-def test_an_extension_that_cannot_be_loaded_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_extension_that_cannot_be_loaded_says_why(monkeypatch: Patch) -> None:
     monkeypatch.setattr(extension, "import_module", Mock(side_effect=ImportError("no symbol: f")))
     with pytest.raises(NotBuiltError, match=r"^the Fortran extension can't be loaded: no"):
         solve(case_scene(3), 1.0)
@@ -152,7 +151,7 @@ def _changing() -> Iterator[tuple[str, str]]:
 @pytest.mark.skipif(_build.COMPILER != "gcc", reason="the options are those of gcc")
 @pytest.mark.parametrize(("language", "flags"), [*_changing()])
 def test_flags_that_change_the_arithmetic_are_refused(
-    language: str, flags: str, monkeypatch: pytest.MonkeyPatch
+    language: str, flags: str, monkeypatch: Patch
 ) -> None:
     """By name, and by what they do if a compiler's wrapper adds them."""
     named = flags.split()[-1] if "default-double" in flags else flags.split()[0]

@@ -19,6 +19,7 @@ from pyharness.sweep.batches import solve_chunk
 from pyharness.sweep.run import places_of_a_chunk
 from pyharness.sweep.sweep import Sweep, spread
 from pyharness.sweep.sweep_file import read_sweep
+from tests.conftest import Patch
 from tests.sweep.sweeps import run_sweep, written
 
 ATLAS = Path(__file__).parent.parent.parent / "docs/atlas"
@@ -56,9 +57,7 @@ def _axes(sweep: Sweep, *fields: str) -> list[Array]:
 
 @pytest.mark.campaign
 @pytest.mark.parametrize("name", draw.PICTURES)
-def test_every_sweep_has_its_picture(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_every_sweep_has_its_picture(name: str, tmp_path: Path, monkeypatch: Patch) -> None:
     store = str(tmp_path / "store")
     sweep = _coarse(tmp_path, name, 4)
     (tmp_path / "sweep.toml").rename(tmp_path / f"{name}.toml")

@@ -18,6 +18,7 @@ from pyharness.sweep import run, store_layout
 from pyharness.sweep.batches import solve_chunk
 from pyharness.sweep.sweep import Sweep
 from pyharness.sweep.sweep_file import read_sweep
+from tests.conftest import Capture, Patch
 from tests.refused import refused
 from tests.sweep.sweeps import TILT, files, run_sweep, text, written
 
@@ -94,7 +95,7 @@ DAMAGES: dict[str, Callable[[Path], object]] = {
 @pytest.mark.campaign
 @pytest.mark.parametrize("name", DAMAGES)
 def test_damaged_chunk_is_one_line_and_is_repaired(
-    name: str, sweep: Sweep, store: Path, intact: Path, monkeypatch: pytest.MonkeyPatch
+    name: str, sweep: Sweep, store: Path, intact: Path, monkeypatch: Patch
 ) -> None:
     DAMAGES[name](store / CHUNK)
     refused(f"^--out '{store}': .*'{CHUNK}'.*--repair", run_sweep, sweep, str(store))
@@ -153,7 +154,7 @@ def test_damaged_metadata_are_one_line_and_are_repaired(
 
 
 def test_another_schema_is_refused_and_stays_as_it_was(
-    sweep: Sweep, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    sweep: Sweep, tmp_path: Path, monkeypatch: Patch
 ) -> None:
     with monkeypatch.context() as patched:
         patched.setitem(SCHEMAS, "sweep store", 3)
@@ -175,9 +176,7 @@ def test_store_of_the_first_schema_is_refused(sweep: Sweep, store: Path) -> None
 
 
 @pytest.mark.campaign
-def test_command_line_repairs(
-    store: Path, intact: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_command_line_repairs(store: Path, intact: Path, capsys: Capture) -> None:
     command = ["sweep", str(intact / "sweep.toml"), "--out", str(store)]
     flip(store / CHUNK)
     flip(store / OTHER)
@@ -239,7 +238,7 @@ def _damaged_at_random(store: Path, draw: random.Random) -> str:
     ],
 )
 def test_no_damage_is_believed(
-    seed: int, sweep: Sweep, store: Path, intact: Path, monkeypatch: pytest.MonkeyPatch
+    seed: int, sweep: Sweep, store: Path, intact: Path, monkeypatch: Patch
 ) -> None:
     monkeypatch.setattr(run, "forecast", lambda *given: 0.0)
     what = _damaged_at_random(store, random.Random(seed))

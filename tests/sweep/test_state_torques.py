@@ -21,6 +21,7 @@ from pyharness.sweep.store import opened
 from pyharness.sweep.sweep import Sweep, spread
 from pyharness.sweep.sweep_file import read_sweep
 from pyharness.views.render import render
+from tests.conftest import Patch
 from tests.sweep.sweeps import axis, every, written
 
 SCENE = """
@@ -212,7 +213,7 @@ def test_forecast_keeps_constants_that_every_scene_has_of_its_own(tmp_path: Path
     assert len({*places.tolist()}) == 5
 
 
-def test_torques_are_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_torques_are_compiled(tmp_path: Path, monkeypatch: Patch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     given = axis("torque.constants.k", [0.1, 0.2, 0.5])
     plain, compiled = (
@@ -224,9 +225,7 @@ def test_torques_are_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 
 
 @pytest.mark.usefixtures("best_level")
-def test_the_report_says_whether_torques_were_compiled(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_report_says_whether_torques_were_compiled(tmp_path: Path, monkeypatch: Patch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     given = axis("torque.constants.k", [0.1, 0.2])
     sweep = read_sweep(written(tmp_path, text(given, solver="compiled = true")))

@@ -12,6 +12,7 @@ from pyharness.model.scene_file import case_scene
 from pyharness.thesis import decks as punched
 from pyharness.thesis.cards import deck
 from pyharness.thesis.decks import alterations, compiler, deck_text, run_deck
+from tests.conftest import Capture, Patch
 
 
 def _cards(text: str) -> dict[int, str]:
@@ -96,7 +97,7 @@ def test_dialect_of_today_adds_marked_lines_alone() -> None:
 
 @pytest.mark.campaign
 @pytest.mark.skipif(compiler() is None, reason="no gfortran")
-def test_decks_and_port_agree(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_decks_and_port_agree(monkeypatch: Patch) -> None:
     found = list(decks(Selection(thin=True)))
     assert len(found) == 3
     assert all(check.passed and check.value == 0.0 for check in found)
@@ -115,7 +116,7 @@ def test_decks_and_port_agree(monkeypatch: pytest.MonkeyPatch) -> None:
     ("old", "new", "told"),
     [("1HI", "1HJ", "the page differs"), ("GO TO 8 ", "J=3     ", "75 records more")],
 )
-def test_page_and_records(old: str, new: str, told: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_page_and_records(old: str, new: str, told: str, monkeypatch: Patch) -> None:
     changed = "pyharness.checks.cells.deck_text"
     monkeypatch.setattr(changed, lambda *given: deck_text(*given).replace(old, new))
     (check,) = decks(Selection(only=["decks/runge-kutta/case-2/original"]))
@@ -123,9 +124,7 @@ def test_page_and_records(old: str, new: str, told: str, monkeypatch: pytest.Mon
     assert told in check.note
 
 
-def test_without_a_compiler_verify_says_so(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_without_a_compiler_verify_says_so(monkeypatch: Patch, capsys: Capture) -> None:
     for room in ("checks.cells", "cli.verbs.verify"):
         monkeypatch.setattr(f"pyharness.{room}.compiler", lambda: None)
     assert list(decks(Selection(only=["decks"]))) == []

@@ -17,6 +17,7 @@ from tests.campaigns.estimates import truth
 from tests.campaigns.estimates.__main__ import COMMAND, SENSITIVE, Answer, answers, main
 from tests.campaigns.estimates.scenes import COARSEST, FINEST, KINDS, Draw, drawn
 from tests.campaigns.estimates.truth import truth_of
+from tests.conftest import Capture, Patch
 
 BODY = (1.0, 2.0, 2.7)
 TURNED = (0.3, -0.5, 0.2, 0.7)
@@ -98,7 +99,7 @@ def test_the_truth_is_precise_where_errors_are_amplified() -> None:
     assert whole.error(solve(scene, time, "closed-form", 1e-9).omega) < 1e-15
 
 
-def test_truth_says_what_it_cannot_know(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_truth_says_what_it_cannot_know(monkeypatch: Patch) -> None:
     with pytest.raises(InputError, match="grows without bound"):
         truth_of(Scene("", (1.0, 1.0, 1.0), None, (1.0, 1.0, 1.0)), [2.0])
     monkeypatch.setattr(truth, "_MOST_NODES", 10)
@@ -106,7 +107,7 @@ def test_truth_says_what_it_cannot_know(monkeypatch: pytest.MonkeyPatch) -> None
         truth_of(*SCENES["no torque"])
 
 
-def test_a_bounded_motion_without_rows_is_no_refusal(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bounded_motion_without_rows_is_no_refusal(monkeypatch: Patch) -> None:
     """Else the campaign would draw another scene in its place."""
     monkeypatch.setattr(
         "tests.campaigns.estimates.truth.solve",
@@ -130,7 +131,7 @@ def test_number_of_a_seed_is_one_scene() -> None:
 
 
 @pytest.mark.campaign
-def test_few_dozen_scenes(capsys: pytest.CaptureFixture[str]) -> None:
+def test_few_dozen_scenes(capsys: Capture) -> None:
     assert main(["--scenes", "24", "--seed", "test"]) == 0
     printed = capsys.readouterr().out
     assert printed.endswith("0 faults\n")
@@ -158,7 +159,7 @@ def test_scenes_whose_reported_error_was_wrong(seed: str, number: int) -> None:
         assert set(answer.faults()) - harmless == set(), answer
 
 
-def test_one_scene_alone(capsys: pytest.CaptureFixture[str]) -> None:
+def test_one_scene_alone(capsys: Capture) -> None:
     assert main(["--only", "3", "--seed", "test", "--tolerances", "1e-6,1e-6"]) == 0
     printed = capsys.readouterr().out
     assert printed.count("ended='complete'") == len(ENTRIES)
@@ -211,9 +212,7 @@ def test_estimates_that_are_too_small(
     assert found.faults() == (["blind"] if blind else [])
 
 
-def test_a_reported_error_that_is_too_small_is_a_fault(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_reported_error_that_is_too_small_is_a_fault(monkeypatch: Patch, capsys: Capture) -> None:
     right = entries._row
 
     monkeypatch.setattr(entries, "_row", lambda *given: replace(right(*given), estimate=1e-30))

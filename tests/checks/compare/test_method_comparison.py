@@ -23,6 +23,7 @@ from pyharness.model.expressions import parsed
 from pyharness.truth.reference import reference
 from pyharness.views.pictures import saved
 from pyharness.views.render import render
+from tests.conftest import Capture
 
 DAMPED = "docs/damped.toml"
 DECAY = parsed(["-0.2*w1", "-0.2*w2", "-0.2*w3"], {})
@@ -113,7 +114,7 @@ def test_ready_terms_are_compared() -> None:
     assert found.growth is not None
 
 
-def test_verb_compares_methods(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_verb_compares_methods(capsys: Capture, tmp_path: Path) -> None:
     command = f"compare --scene {DAMPED} --method auto,dop853"
     assert main(shlex.split(command)) == 0
     assert "as expected: no error exceeds the limit" in capsys.readouterr().out
@@ -134,9 +135,7 @@ def test_fixed_step_has_no_tolerance() -> None:
 
 
 @pytest.mark.campaign
-def test_methods_without_rows_are_not_as_expected(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_methods_without_rows_are_not_as_expected(capsys: Capture, tmp_path: Path) -> None:
     """No method solves the first scene; in the second, method and reference end early."""
     found = compare_methods(case_scene(5), ["closed-form"])
     assert (found.unexpected, found.is_complete) == (("no method has a result",), False)

@@ -9,11 +9,10 @@ from scipy.linalg import lu
 
 from pyharness.checks.theory.collocation_matrices import PARTS, solved, solver_roundings
 from pyharness.model import extension
+from tests.conftest import Patch
 
 
-def test_a_theorem_bounds_errors_only_where_its_hypotheses_hold(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_theorem_bounds_errors_only_where_its_hypotheses_hold(monkeypatch: Patch) -> None:
     assert solved("four-term", 1e-2).residual <= 1.0
     compiled = extension.extension()
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, solve, solve_many
+from tests.refused import refused
 
 MOMENTS = (2.0, 3.0, 4.0)
 
@@ -37,12 +38,12 @@ def test_derivatives_through_a_jump_are_those_of_the_closed_form(reverse: int) -
         assert np.abs(own - values).max() <= 1e-10 * max(1.0, np.abs(values).max()), name
 
 
-def test_derivatives_of_a_saturated_law_are_those_of_forty_digits() -> None:
-    def law(t: Any, omega: Any, *, gain: float = 2.0) -> Any:
-        return [0.0, 0.0, np.clip(-gain * omega[2], -0.5, 0.5)]
+def saturated(t: Any, omega: Any, *, gain: float = 2.0) -> Any:
+    return [0.0, 0.0, np.clip(-gain * omega[2], -0.5, 0.5)]
 
-    scene = Scene("clip", (0.0, 0.0, 1.0), MOMENTS, torque=law)
-    found: Any = solve(scene, 9.0, sensitivities=["torque.gain"])
+
+def by_gain() -> float:
+    """Return the derivative of omega3 at 9 s by the gain of a saturated law, of forty digits."""
     with mpmath.workdps(40):
 
         def omega(gain: Any) -> Any:
@@ -50,26 +51,20 @@ def test_derivatives_of_a_saturated_law_are_those_of_forty_digits() -> None:
             leaves = (1 - mpmath.mpf("0.5") / gain) * 8
             return mpmath.mpf("0.5") / gain * mpmath.exp(-gain / 4 * (9 - leaves))
 
-        expected = float(mpmath.diff(omega, mpmath.mpf(2)))
-    assert found.sensitivities["torque.gain"][0, 2, 0] == pytest.approx(expected, rel=1e-9)
+        return float(mpmath.diff(omega, mpmath.mpf(2)))
 
 
-def test_derivatives_of_own_states() -> None:
-    def law(t: Any, omega: Any, states: Any) -> Any:
-        return [0.0, 0.0, -2.0 * states["turned"]], {"turned": omega[2]}
+def spring(t: Any, omega: Any, states: Any) -> Any:
+    return [0.0, 0.0, -2.0 * states["turned"]], {"turned": omega[2]}
 
-    scene = Scene("spring", (0.0, 0.0, 1.0), MOMENTS, torque=law, states={"turned": 0.0})
-    times = np.array([1.0, 4.0])
-    found: Any = solve(scene, times, sensitivities=["omega", "moments"], attitude=True)
-    slopes = found.sensitivities["omega"]
-    assert slopes.shape == (2, 8, 3)
-    frequency = math.sqrt(0.5)
-    assert slopes[:, 7, 2] == pytest.approx(np.sin(frequency * times) / frequency, rel=1e-9)
-    # The frequency is sqrt(2/I3).
-    turned = np.cos(frequency * times) * times / frequency - np.sin(frequency * times) / 0.5
-    assert found.sensitivities["moments"][:, 7, 2] == pytest.approx(
-        turned * -frequency / 8.0, rel=1e-9
-    )
+
+def turned(by: str) -> Any:
+    """Return the derivatives of a spring's angle at 1 and 4 s; the frequency is sqrt(2/I3)."""
+    times, frequency = np.array([1.0, 4.0]), math.sqrt(0.5)
+    if by == "omega":
+        return np.sin(frequency * times) / frequency
+    angles = np.cos(frequency * times) * times / frequency - np.sin(frequency * times) / 0.5
+    return angles * -frequency / 8.0
 
 
 def test_motions_that_end_before_the_first_time_have_no_rows() -> None:
@@ -133,16 +128,16 @@ def test_a_switch_that_is_only_touched_is_refused() -> None:
         return [0.0, 0.0, np.where(omega[2] > 1.0, 4.0, push * (2.0 - t))]
 
     scene = Scene("touch", (0.0, 0.0, 0.75), MOMENTS, torque=law)
-    with pytest.raises(InputError, match=r"does not depend smoothly on torque\.push"):
-        solve(scene, 5.0, sensitivities=["torque.push"])
+    words = r"does not depend smoothly on torque\.push"
+    refused(words, solve, scene, 5.0, sensitivities=["torque.push"])
 
 
 def test_the_work_limit_is_named() -> None:
     scene = Scene("brake", (0.1, 0.2, 0.8), MOMENTS, torque=brake)
-    times, effort = [20.0], 2.3e-6
-    assert solve(scene, times, tolerance=1e-2, effort=effort).steps
-    with pytest.raises(InputError, match=r"^sensitivities: taylor .* work limit"):
-        solve(scene, times, tolerance=1e-2, effort=effort, sensitivities=["torque.weak"])
+    limited: dict[str, Any] = {"times": [20.0], "tolerance": 1e-2, "effort": 2.3e-6}
+    assert solve(scene, **limited).steps
+    words = r"^sensitivities: taylor .* work limit"
+    refused(words, solve, scene, **limited, sensitivities=["torque.weak"])
 
 
 def test_a_smaller_change_may_keep_the_work_limit() -> None:
@@ -192,8 +187,8 @@ AT_SWITCHES: dict[str, Any] = {
 def test_a_row_with_two_derivatives_is_refused(kind: str) -> None:
     torque, more, how, name, at = AT_SWITCHES[kind]
     scene = Scene(kind, **{"omega": (0.0, 0.0, 0.8), "moments": MOMENTS, "torque": torque} | more)
-    with pytest.raises(InputError, match=rf"^sensitivities: at t = {at:g} s .* by {name}, .*other"):
-        solve(scene, sensitivities=[name], **how)
+    words = rf"^sensitivities: at t = {at:g} s .* by {name}, .*other"
+    refused(words, solve, scene, sensitivities=[name], **how)
 
 
 def test_near_a_switch_a_derivative_is_right_or_refused() -> None:
@@ -212,39 +207,48 @@ def test_near_a_switch_a_derivative_is_right_or_refused() -> None:
     assert max(refused) < -4
 
 
-def test_a_switch_without_influence_on_the_row_keeps_the_derivatives() -> None:
-    scene = Scene("brake", (0.0, 0.0, 0.8), MOMENTS, torque=brake)
-    slopes: Any = solve(scene, [10.0, 12.0], sensitivities=["torque.weak"]).sensitivities
-    assert slopes["torque.weak"][:, 2, 0] == pytest.approx([0.0, -0.5], rel=1e-9)
-    fixed = Scene("fixed", (0.0, 0.0, 0.8), MOMENTS, torque=pushed)
-    slopes = solve(fixed, [-0.7, 0.0, 0.7], sensitivities=["omega"]).sensitivities
-    assert slopes["omega"][:, 2, 2] == pytest.approx([1.0, 1.0, 1.0], rel=1e-9)
-
-
 XS, YS = [0.0, 0.5, 1.0, 1.5], [0.0, 1.0, 0.0, 2.0]
 # Torques that are continuous, but have a kink where the first row or the motion's start is.
-CONTINUOUS: dict[str, Any] = {
+# Torque, other arguments of the scene, times, parameter, the derivatives of omega3 or of the own
+# state by it, and their relative and absolute error.
+DERIVATIVES: dict[str, Any] = {
+    "saturated": (saturated, {}, 9.0, "torque.gain", by_gain(), (1e-9, 0.0)),
+    **{
+        f"own state by {name}": (
+            spring, {"states": {"turned": 0.0}, "attitude": (1, 0, 0, 0)}, [1.0, 4.0], name,
+            turned(name), (1e-9, 0.0),
+        )
+        for name in ("omega", "moments")
+    },
+    "switch without influence": (
+        brake, {"omega": (0.0, 0.0, 0.8)}, [10.0, 12.0], "torque.weak", [0.0, -0.5], (1e-9, 1e-12)
+    ),
+    "switch at a fixed time": (
+        pushed, {"omega": (0.0, 0.0, 0.8)}, [-0.7, 0.0, 0.7], "omega", [1.0] * 3, (1e-9, 0.0)
+    ),
+    # Torques that are continuous, but have a kink where the first row or the motion's start is.
     "clip": (
-        lambda t, w, *, k=4.0: -np.clip(k * w, -2.0, 2.0), [1.0, 3.0], "torque.k",
-        [0.0, -0.25 * np.exp(-2.0)],
+        lambda t, w, *, k=4.0: -np.clip(k * w, -2.0, 2.0), {}, [1.0, 3.0], "torque.k",
+        [0.0, -0.25 * np.exp(-2.0)], (1e-8, 1e-8),
     ),
     "table of time": (
-        lambda t, w, *, ts=0.5: [0.0, 0.0, 4.0 * np.interp(t - ts, XS, YS)], [1.0, 1.5],
-        "torque.ts", [-1.0, 0.0],
+        lambda t, w, *, ts=0.5: [0.0, 0.0, 4.0 * np.interp(t - ts, XS, YS)], {}, [1.0, 1.5],
+        "torque.ts", [-1.0, 0.0], (1e-8, 1e-8),
     ),
     "table of omega": (
-        lambda t, w: [0.0, 0.0, -2.0 * np.interp(w[2], XS, YS) - 0.4], [1.0, 1.5], "omega",
-        np.exp([1.0, 1.5]),
+        lambda t, w: [0.0, 0.0, -2.0 * np.interp(w[2], XS, YS) - 0.4], {}, [1.0, 1.5], "omega",
+        np.exp([1.0, 1.5]), (1e-8, 1e-8),
     ),
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("kind", CONTINUOUS)
-def test_a_kink_of_the_torque_leaves_one_derivative(kind: str) -> None:
-    torque, times, name, expected = CONTINUOUS[kind]
-    scene = Scene(kind, (0.0, 0.0, 1.0), MOMENTS, torque=torque)
+@pytest.mark.parametrize("kind", DERIVATIVES)
+def test_derivatives_are_those_of_closed_forms(kind: str) -> None:
+    torque, more, times, name, expected, (rel, own) = DERIVATIVES[kind]
+    scene = Scene(kind, **{"omega": (0.0, 0.0, 1.0), "moments": MOMENTS, "torque": torque} | more)
     slopes: Any = solve(scene, times, sensitivities=[name]).sensitivities
-    assert slopes[name][:, 2, -1] == pytest.approx(expected, rel=1e-8, abs=1e-8)
+    row = 7 if scene.states else 2
+    assert slopes[name][:, row, -1] == pytest.approx(expected, rel=rel, abs=own)
 
 
 def test_bodies_with_a_row_at_a_switch_are_refused_alone() -> None:

@@ -83,51 +83,32 @@ def test_growth_of_many_steps_is_that_of_a_perturbed_motion(
     assert 0.9 * reached <= (ends[0].growth or 0.0) <= 20.0 * reached
 
 
-def test_a_body_at_rest_under_control_waits_for_a_push() -> None:
-    """Perturbations of the attitude are relative to no omega."""
+def at_rest(torque: Any, third: float = 3.0) -> Scene:
+    """Return a body at rest, of which perturbations are relative to no omega."""
+    return Scene("", (0, 0, 0), (1.0, 2.0, third), attitude=(1, 0, 0, 0), torque=torque)
 
+
+def test_a_body_at_rest_under_control_waits_for_a_push() -> None:
     def torque(time: Any, omega: Any, q: Any) -> list[Any]:
         push = np.where(time > 5.0, 1.0, 0.0)
         return [push - q[0] * q[1] - omega[0], -q[0] * q[2] - omega[1], -q[0] * q[3] - omega[2]]
 
-    scene = Scene("push", (0.0, 0.0, 0.0), (1.0, 2.0, 3.0), attitude=(1, 0, 0, 0), torque=torque)
-    found = solve(scene, 20.0)
+    found = solve(at_rest(torque), 20.0)
     assert found.ended == "complete"
     assert found.steps < 400
 
 
 @pytest.mark.parametrize("push", [
-    lambda t: np.where(t > 20.0, 1.0, 0.0),
-    lambda t: np.exp(-3.0 * (t - 20.0) ** 2),
+    lambda t: np.where(t > 20.0, 1.0, 0.0), lambda t: np.exp(-3.0 * (t - 20.0) ** 2),
     lambda t: 1.0 + np.tanh(8.0 * (t - 20.0)),
 ])  # fmt: skip
 def test_a_body_at_rest_waits_for_a_push_without_damping(push: Callable[[Any], Any]) -> None:
-    def torque(time: Any, omega: Any, q: Any) -> list[Any]:
-        return [0.1 * push(time) - q[1], -q[2], -q[3]]
-
-    scene = Scene("push", (0.0, 0.0, 0.0), (1.0, 2.0, 3.0), attitude=(1, 0, 0, 0), torque=torque)
+    scene = at_rest(lambda t, w, q: [0.1 * push(t) - q[1], -q[2], -q[3]])
     found, truth = (solve(scene, 30.0, tolerance=tolerance) for tolerance in (1e-9, 1e-12))
     assert found.ended == "complete"
     assert found.steps < 300
     largest = np.abs(truth.omega).max()
     assert np.abs(found.omega - truth.omega).max() <= 1e-9 * largest
-
-
-@pytest.mark.parametrize(("push", "impulse"), [
-    (lambda t: t**6 / (1.0 + t**6), 1.953624981341453),
-    (lambda t: 1.0 - np.exp(-(t**12)), 2.041714317827167),
-    (lambda t: np.sin(4.4 * t) ** 8, 0.781203549776875),
-])  # fmt: skip
-def test_a_push_that_begins_slowly_is_judged_by_the_omega_that_it_causes(
-    push: Callable[[Any], Any], impulse: float
-) -> None:
-    def torque(time: Any, omega: Any, q: Any) -> list[Any]:
-        return [1e-9 * push(time), 0.0 * q[1], 0.0]
-
-    scene = Scene("push", (0.0, 0.0, 0.0), (1.0, 2.0, 3.0), attitude=(1, 0, 0, 0), torque=torque)
-    found = solve(scene, 3.0, tolerance=1e-9)
-    assert found.ended == "complete"
-    assert found.omega[0, 0] == pytest.approx(1e-9 * impulse, rel=2e-9, abs=0.0)
 
 
 @pytest.mark.parametrize(("swing", "damping"), [(0.0, 0.0), (0.0, 0.2), (0.3, 0.2)])
@@ -138,10 +119,29 @@ def test_a_body_that_control_keeps_at_rest_is_complete(swing: float, damping: fl
         gain = 0.5 + swing * np.cos(20.0 * time)
         return [-gain * q[1 + i] - damping * omega[i] for i in range(3)]
 
-    scene = Scene("hold", (0.0, 0.0, 0.0), (1.0, 2.0, 2.5), attitude=(1, 0, 0, 0), torque=torque)
-    found = solve(scene, 50.0)
+    found = solve(at_rest(torque, 2.5), 50.0)
     assert found.ended == "complete"
     assert 1.0 <= (found.growth or 0.0) < 100.0
+
+
+@pytest.mark.parametrize(("push", "impulse"), [
+    (lambda t: t**6 / (1.0 + t**6), 1.953624981341453),
+    (lambda t: 1.0 - np.exp(-(t**12)), 2.041714317827167),
+    (lambda t: np.sin(4.4 * t) ** 8, 0.781203549776875),
+])  # fmt: skip
+def test_a_push_that_begins_slowly_is_judged_by_the_omega_that_it_causes(
+    push: Callable[[Any], Any], impulse: float
+) -> None:
+    scene = at_rest(lambda t, w, q: [1e-9 * push(t), 0.0 * q[1], 0.0])
+    found = solve(scene, 3.0, tolerance=1e-9)
+    assert found.ended == "complete"
+    assert found.omega[0, 0] == pytest.approx(1e-9 * impulse, rel=2e-9, abs=0.0)
+
+
+def coupled(function: Any, omega: Any, back: float = 1.0) -> Scene:
+    """Return a body whose omega1 is pushed by omega2, and omega2 by omega1, as time goes."""
+    return Scene("", omega, moments=(1.0, 2.0, 2.5), torque=lambda t, w: [
+        function(t) * w[1], back * function(t) * w[0], 0.0])  # fmt: skip
 
 
 @pytest.mark.parametrize("omega", [(0.0, 0.0, 1.0), (1e-9, 0.0, 1.0), (0.0, 0.0, 0.0)])
@@ -149,11 +149,7 @@ def test_a_body_that_control_keeps_at_rest_is_complete(swing: float, damping: fl
 def test_growth_of_a_steady_motion_follows_a_torque_that_it_does_not_feel(
     omega: Triple, frequency: float
 ) -> None:
-    def torque(time: Any, omega: Any) -> list[Any]:
-        wave = 0.5 * np.cos(frequency * time)
-        return [wave * omega[1], wave * omega[0], 0.0]
-
-    scene = Scene("", omega, moments=(1.0, 2.0, 2.5), torque=torque)
+    scene = coupled(lambda t: 0.5 * np.cos(frequency * t), omega)
     found = solve(scene, 50.0)
     assert found.ended == "complete"
     assert found.growth == pytest.approx(1.1, abs=0.1)
@@ -163,23 +159,17 @@ def test_growth_of_a_steady_motion_follows_a_torque_that_it_does_not_feel(
 
 
 @pytest.mark.parametrize("function", [
-    lambda t: np.cos(t) ** 20,
-    lambda t: 0.4 * np.cos(5.0 * t) ** 13,
-    lambda t: np.exp(-20.0 * t),
-    lambda t: 1e-40 * np.cos(1e3 * t),
-    lambda t: np.cos(10.0 * t * t),
+    lambda t: np.cos(t) ** 20, lambda t: 0.4 * np.cos(5.0 * t) ** 13, lambda t: np.exp(-20.0 * t),
+    lambda t: 1e-40 * np.cos(1e3 * t), lambda t: np.cos(10.0 * t * t),
     lambda t: 0.1 * sum(np.cos((1.0 + 0.1 * k) * t) for k in range(10)),
 ])  # fmt: skip
 def test_a_steady_motion_takes_no_more_steps_than_another(function: Callable[[Any], Any]) -> None:
-    def torque(time: Any, omega: Any) -> list[Any]:
-        return [0.5 * function(time) * omega[1], 0.5 * function(time) * omega[0], 0.0]
-
-    steps = {}
+    steps = []
     for omega in [(0.0, 0.0, 1.0), (0.3, -0.5, 1.0)]:
-        found = solve(Scene("", omega, moments=(1.0, 2.0, 2.5), torque=torque), 50.0)
+        found = solve(coupled(lambda t: 0.5 * function(t), omega), 50.0)
         assert found.ended == "complete"
-        steps[omega] = found.steps
-    assert steps[0.0, 0.0, 1.0] <= steps[0.3, -0.5, 1.0]
+        steps.append(found.steps)
+    assert steps[0] <= steps[1]
 
 
 @pytest.mark.parametrize(("function", "coupling", "spin", "time", "wanted"), [
@@ -190,12 +180,7 @@ def test_growth_of_a_steady_motion_follows_pulses(
     function: Callable[[Any], Any], coupling: float, spin: float, time: float, wanted: float
 ) -> None:
     """The amplification is that of the linear equations by DOP853, between 400 times."""
-
-    def torque(time: Any, omega: Any) -> list[Any]:
-        pulse = function(time)
-        return [pulse * omega[1], coupling * pulse * omega[0], 0.0]
-
-    found = solve(Scene("", (0.0, 0.0, spin), moments=(1.0, 2.0, 2.5), torque=torque), time)
+    found = solve(coupled(function, (0.0, 0.0, spin), coupling), time)
     assert found.ended == "complete"
     assert found.growth == pytest.approx(wanted, rel=0.2)
 
@@ -269,16 +254,21 @@ def test_error_of_a_closed_form_is_what_it_may_be(scene: Scene, time: float) -> 
         assert other.error / ROUNDING == pytest.approx((found.growth or 0.0) + 16.0)
 
 
+def closed(seed: str, kind: str) -> tuple[Scene, float, Any, float]:
+    """Return a random scene, its time, its closed form, and the true relative error of that."""
+    moments, omega, _, time = free_motions.draw(Random(seed), kind)
+    scene = Scene("", omega, moments)
+    found: Any = solve(scene, [time], "closed-form", 1e-13)
+    truth = np.array(torque_free(scene, time))
+    error = float(max(abs(truth - [Decimal(x) for x in found.omega[0].tolist()])))
+    return scene, time, found, error / max(np.abs(found.omega).max(), np.abs(scene.omega).max())
+
+
 @pytest.mark.parametrize("kind", ["generic", "near separatrix", "needle", "middle axis"])
 def test_error_of_a_closed_form_is_a_bound_near_its_errors(kind: str) -> None:
     ratios = []
     for number in range(150):
-        moments, omega, _, time = free_motions.draw(Random(f"bound {kind} {number}"), kind)
-        scene = Scene("", omega, moments)
-        found: Any = solve(scene, [time], "closed-form", 1e-13)
-        truth = np.array(torque_free(scene, time))
-        scale = max(np.abs(found.omega).max(), np.abs(scene.omega).max())
-        error = float(max(abs(truth - [Decimal(x) for x in found.omega[0].tolist()]))) / scale
+        _, _, found, error = closed(f"bound {kind} {number}", kind)
         assert error <= found.error
         if found.growth < 2.0**44:
             assert found.ended == "complete"
@@ -288,12 +278,7 @@ def test_error_of_a_closed_form_is_a_bound_near_its_errors(kind: str) -> None:
 
 @pytest.mark.parametrize("number", [2393, 2719, 4503])
 def test_error_of_a_closed_form_grows_where_its_double_double_is_not_enough(number: int) -> None:
-    moments, omega, _, time = free_motions.draw(Random(f"saturated {number}"), "near separatrix")
-    scene = Scene("", omega, moments)
-    found: Any = solve(scene, [time], "closed-form", 1e-13)
-    truth = np.array(torque_free(scene, time))
-    error = float(max(abs(truth - [Decimal(x) for x in found.omega[0].tolist()])))
-    error /= max(np.abs(found.omega).max(), np.abs(scene.omega).max())
+    scene, time, found, error = closed(f"saturated {number}", "near separatrix")
     assert 300.0 * ROUNDING < error <= found.error
     assert found.ended == "sensitive"
     many: Any = solve_many([scene], time, tolerance=1e-13, estimates=True)

@@ -138,48 +138,65 @@ subroutine tape_derivatives(n_numbers, numbers, n, state, n_columns, starts, for
   status = variation%status
 end subroutine tape_derivatives
 
-subroutine tape_many(n_packed, packed, n, omega0, n_times, times, n_attitudes, attitude0, &
-                     n_parameters, n_sets, parameters, given_up, omega, n_results, attitude, &
-                     status, n_estimates, estimates, raised)
-  ! Solve many bodies under one torque: omega of each body at its time and, if n_attitudes > 0, its
-  ! attitude. The status is 0, or -1 if a body is left to `tape_rows`.
+subroutine tape_many(n_packed, packed, n_alone, alone, n, omega0, n_rows, n_times, times, &
+                     n_attitudes, attitude0, n_parameters, n_sets, parameters, n_own, own0, &
+                     n_sizes, own_sizes, given_up, omega, n_results, attitude, n_owned, own, status, &
+                     n_estimates, estimates, raised)
+  ! Solve many bodies under one torque: omega at n_rows times of each body; if n_attitudes > 0, also
+  ! its attitude; and n_own own states.
   !f2py threadsafe
   use, intrinsic :: iso_c_binding, only: c_loc, c_null_ptr
-  use bodies, only: bodies_t
   use interruption, only: watch
-  use many_tape, only: solve_tape_bodies
+  use many_tape, only: many_t, solve_tape_bodies
   implicit none
   integer(4), intent(in) :: n_packed
   real(8), intent(in), target :: packed(n_packed) ! the scene, as in prepared.f90
+  integer(4), intent(in) :: n_alone
+  real(8), intent(inout), target :: alone(n_alone) ! the same for one body, as in many_tape.f90
   integer(4), intent(in) :: n                   ! number of bodies
   real(8), intent(in), target :: omega0(3, n)   ! rad/s
+  integer(4), intent(in) :: n_rows
   integer(4), intent(in) :: n_times             ! n, or 1
-  real(8), intent(in), target :: times(n_times) ! s
+  real(8), intent(in), target :: times(n_rows, n_times) ! s, of one sign, ordered away from 0
   integer(4), intent(in) :: n_attitudes         ! n, or 0 without attitude
   real(8), intent(in), target :: attitude0(4, n_attitudes) ! unit quaternions
   integer(4), intent(in) :: n_parameters        ! further inputs of the tape
   integer(4), intent(in) :: n_sets              ! of parameters: 0, 1 or n
   real(8), intent(in), target :: parameters(n_parameters, n_sets)
+  integer(4), intent(in) :: n_own               ! own states
+  real(8), intent(in), target :: own0(n, n_own)
+  integer(4), intent(in) :: n_sizes             ! n_own
+  ! Least sizes to which their errors are relative; the last is unused, as f2py takes no size 0.
+  real(8), intent(in), target :: own_sizes(n_sizes + 1)
   integer(4), intent(inout), target :: given_up(1) ! not 0: another thread ends this call
-  real(8), intent(inout), target :: omega(3, n)
+  real(8), intent(inout), target :: omega(3, n_rows, n)
   integer(4), intent(in) :: n_results           ! as n_attitudes
-  real(8), intent(inout), target :: attitude(4, n_results)
-  integer(1), intent(inout), target :: status(n)
+  real(8), intent(inout), target :: attitude(4, n_rows, n_results)
+  integer(4), intent(in) :: n_owned             ! n_own
+  real(8), intent(inout), target :: own(n_rows, n, n_owned)
+  integer(1), intent(inout), target :: status(n_rows, n)
   integer(4), intent(in) :: n_estimates         ! n if the estimates are requested, else 0
   ! Relative error of a result, and error amplification; only of bodies with a result.
-  real(8), intent(inout), target :: estimates(2, n_estimates)
+  real(8), intent(inout), target :: estimates(2, n_rows, n_estimates)
   integer(4), intent(out) :: raised             ! 1: interrupted by the user
-  type(bodies_t) :: bodies
+  type(many_t) :: many
 
-  bodies%n = n
-  bodies%omega0 => omega0
-  bodies%times => times
-  bodies%attitude0 => attitude0
-  bodies%parameters => parameters
-  bodies%attitude => attitude
-  bodies%estimates => estimates
+  many%n = n
+  many%n_rows = n_rows
+  many%n_own = n_own
+  many%omega0 => omega0
+  many%attitude0 => attitude0
+  many%own0 => own0
+  many%own_sizes => own_sizes
+  many%times => times
+  many%parameters => parameters
+  many%omega => omega
+  many%attitude => attitude
+  many%own => own
+  many%status => status
+  many%estimates => estimates
   call watch(c_loc(given_up))
-  call solve_tape_bodies(packed, bodies, omega, status, raised)
+  call solve_tape_bodies(packed, alone, many, raised)
   call watch(c_null_ptr)
 end subroutine tape_many
 

@@ -38,8 +38,6 @@ module bodies
     real(dp), pointer, contiguous :: attitude(:, :)     !! (4, 0 or n), results
     !! (2, 0 or n), results: estimated relative error, and amplification; negative: unknown
     real(dp), pointer, contiguous :: estimates(:, :)
-    !! (parameters, 0, 1 or n) of a tape; null for none
-    real(dp), pointer, contiguous :: parameters(:, :) => null()
     integer(i1) :: mark         !! status of the bodies that a kernel must solve
     integer :: n_waves          !! largest number of waves that act on one of them
   end type bodies_t

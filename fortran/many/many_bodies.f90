@@ -7,7 +7,7 @@ module many_bodies
   use levels, only: many_fixed, many_free, many_taylor
   use many_kinds, only: mark_bodies
   use many_left, only: solve_left, solve_left_with_attitude
-  use many_tape, only: solve_tape_bodies
+  use many_tape, only: many_t, solve_tape_bodies
   use methods, only: QUICK_OR_TAYLOR, TAPE, TAYLOR
   use places, only: COEFFICIENTS, CONSTANT, EFFORT, METHOD, N_COSINES, N_SINES, RATE, STEP, &
                     TOLERANCE, WAVES
@@ -24,8 +24,8 @@ contains
     real(dp), intent(in), target :: packed(0:n_packed - 1)
     real(dp), intent(in), target :: omega0(3, n)
     real(dp), intent(in), target, contiguous :: times(:)
-    real(dp), intent(inout) :: omega(3, n)
-    integer(i1), intent(inout) :: status(n)
+    real(dp), intent(inout), target :: omega(3, n)
+    integer(i1), intent(inout), target :: status(n)
     integer, intent(out) :: raised
     type(bodies_t) :: bodies
     real(dp), target :: no_attitude(4, 0), no_estimates(2, 0)
@@ -33,6 +33,10 @@ contains
     integer :: code, middle
 
     code = int(packed(METHOD))
+    if (code == TAPE) then
+      call solve_packed_tape(packed, n_packed, n, omega0, times, omega, status, raised)
+      return
+    end if
     ! The multi-lane kernels have the series but not quick. The bodies that they leave are solved by
     ! the series as well, whose checks are the same.
     if (code == QUICK_OR_TAYLOR) code = TAYLOR
@@ -54,13 +58,39 @@ contains
     bodies%attitude0 => no_attitude
     bodies%attitude => no_attitude
     bodies%estimates => no_estimates
-    if (code == TAPE) then
-      call solve_tape_bodies(packed, bodies, omega, status, raised)
-      if (raised == 0) call solve_left(bodies, code, own, omega, status, raised)
-      return
-    end if
     call solve_bodies(bodies, code, own, omega, status, raised)
   end subroutine solve_packed_bodies
+
+  subroutine solve_packed_tape(packed, n_packed, n, omega0, times, omega, status, raised)
+    !! Solve many initial omegas of one recorded scene.
+    integer, intent(in) :: n_packed, n
+    real(dp), intent(in), target :: packed(0:n_packed - 1)
+    real(dp), intent(in), target :: omega0(3, n)
+    real(dp), intent(in), target, contiguous :: times(:)
+    real(dp), intent(inout), target :: omega(3, n)
+    integer(i1), intent(inout), target :: status(n)
+    integer, intent(out) :: raised
+    type(many_t) :: many
+    real(dp), target :: alone(0:n_packed - 1), of_attitudes(4, 1, 0), of_estimates(2, 1, 0)
+    real(dp), target :: attitudes(4, 0), states(n, 0), sizes(0), own(1, n, 0), parameters(0, 0)
+
+    alone = packed
+    many%n = n
+    many%n_rows = 1
+    many%n_own = 0
+    many%omega0 => omega0
+    many%times(1:1, 1:size(times)) => times
+    many%omega(1:3, 1:1, 1:n) => omega
+    many%status(1:1, 1:n) => status
+    many%attitude0 => attitudes
+    many%own0 => states
+    many%own_sizes => sizes
+    many%parameters => parameters
+    many%attitude => of_attitudes
+    many%own => own
+    many%estimates => of_estimates
+    call solve_tape_bodies(packed, alone, many, raised)
+  end subroutine solve_packed_tape
 
   subroutine solve_bodies(bodies, code, packed, omega, status, raised)
     !! Compute omega of each body at its time, and its attitude if attitude0 is specified.

@@ -20,6 +20,10 @@ enum { MANY = 3 };                            /* factors of a product that may n
 enum { FEW_TERMS = 5 };                       /* of values amid a step */
 enum { CARRIED = 6 };                         /* terms of an exponential */
 enum { PROBES = 3, VECTORS = PROBES + 1 };    /* perturbations; with the truncation error */
+enum { MOST = MOST_UNKNOWNS };
+enum { PARTS = 4 };                           /* of a step, as in tape_state.f90 */
+/* Kinds of operations of numbers that are constant in a motion: a product with one, any other. */
+enum { SCALED = -1, FIXED = -2 };
 enum { MOST_TRIES = 40, MOST_STEPS = 20000 }; /* of a step; of a body */
 enum { HALVINGS = 12 };                       /* of a step whose series do not converge */
 enum { BETWEEN_LOOKS = 10000 };               /* steps between polls for an interrupt */
@@ -48,6 +52,7 @@ static const double MOST_CANCELLED = 1e3; /* largest sum of the terms of a step,
 static const double WITHIN_CIRCLE = 0.9;  /* as in tape_plan.f90 */
 static const double INVISIBLE = 100.0;    /* as in tape_powers.f90, and the next one too */
 static const double PART_OF_ORDER = 0.6;
+static const double MOST_OF_REACHED = 2.0; /* as in tape_state.f90 */
 static const double NEAR_ZERO = 1e3; /* as MULTIPLE in tape_steady.f90 */
 
 typedef lanes number, series[TERMS];
@@ -67,6 +72,10 @@ struct bodies {
   double (*estimates)[2]; /* relative error, amplification; or NULL */
   int n_parameters, n_sets; /* sets of parameters: one, or one for each body */
   const double *parameters; /* of each set */
+  int n_rows;    /* results of each body: one for each of its times, ordered away from 0 */
+  int n_own;     /* own states of the user, after omega and the attitude */
+  const double *own0, *own_sizes; /* of each body; least sizes to which their errors are relative */
+  double *own;
 };
 
 /* An operation, whose operands and result are series. */
@@ -79,21 +88,27 @@ struct operation {
 struct group {
   const struct bodies *all;
   int n, order;
+  int n_body;                     /* unknowns without own states */
   int body[SIDE_BY_SIDE];         /* -1 for none */
+  int row[SIDE_BY_SIDE];          /* the next result */
   bits steps, tries;
   series *a;                      /* terms of each slot */
   struct operation *operations;
   lanes **terms;                  /* series of each term of the combinations */
+  lanes **factors;                /* of each term: a constant of the motion, or NULL */
+  lanes *scaled;                  /* of each term: its coefficient, times the factor */
   const struct leaves *leaves;    /* compiled for these registers; or NULL */
   int *depends; /* of each slot: the unknowns on which it depends, as bits; the next is the time */
   double is_varying;              /* 1 if the Jacobian depends on the time, or 0 */
   lanes *middle, *noises;         /* of each slot: value amid the step, rounding error */
-  lanes (*tangents)[WITH_ATTITUDE]; /* of each slot: derivatives by the unknowns */
-  lanes y[WITH_ATTITUDE], low[WITH_ATTITUDE]; /* unknowns and their rounding errors */
-  lanes error[WITH_ATTITUDE];     /* truncation error, propagated so far */
-  lanes probes[PROBES][WITH_ATTITUDE]; /* perturbations since time 0 */
-  lanes slope[WITH_ATTITUDE];     /* derivatives times the step at its end, by the last series */
-  lanes weights[WITH_ATTITUDE];   /* make the unknowns comparable */
+  lanes (*tangents)[MOST]; /* of each slot: derivatives by the unknowns */
+  lanes y[MOST], low[MOST]; /* unknowns and their rounding errors */
+  lanes error[MOST];     /* truncation error, propagated so far */
+  lanes probes[PROBES][MOST]; /* perturbations since time 0 */
+  lanes slope[MOST];     /* derivatives times the step at its end, by the last series */
+  lanes weights[MOST];   /* make the unknowns comparable */
+  lanes least[MOST];              /* sizes of own states, by the user */
+  lanes sizes[MOST];              /* to which errors are relative; 0: not known yet */
   lanes end, t, t_low, rest, h, previous, scale, local, allowed, worst, noise;
   lanes growth;                   /* square of the amplification */
   bits is_first;                  /* before the first step */
@@ -132,12 +147,23 @@ static inline lanes ratio_of(int order, lanes allowed, lanes last)
   return (lanes)(__builtin_convertvector(part, bits) + (bits)all_of(1.0));
 }
 
+/* Return term 0 of a combination. */
+static inline lanes combined_values(const struct group *g, int n)
+{
+  const struct tape *tape = &g->all->tape;
+  lanes sum = all_of(tape->constants[n]);
+  for (int i = tape->starts[n] - 1; i < tape->starts[n + 1] - 1; i++)
+    sum += tape->coefficients[i] * g->a[tape->slots[i] - 1][0];
+  return sum;
+}
+
+/* Return term k of a combination, above 0. */
 static inline lanes combined(const struct group *g, int n, int k)
 {
   const struct tape *tape = &g->all->tape;
-  lanes sum = all_of(k == 0 ? tape->constants[n] : 0.0);
+  lanes sum = {0.0};
   for (int i = tape->starts[n] - 1; i < tape->starts[n + 1] - 1; i++)
-    sum += tape->coefficients[i] * g->terms[i][k];
+    sum += g->scaled[i] * g->terms[i][k];
   return sum;
 }
 
@@ -206,7 +232,7 @@ static void set_values(struct group *g)
     series *out = g->a + operation[3] - 1;
     lanes grown, shrunk;
     switch (operation[0]) {
-    case LINEAR: out[0][0] = combined(g, operation[1] - 1, 0); break;
+    case LINEAR: out[0][0] = combined_values(g, operation[1] - 1); break;
     case PRODUCT: out[0][0] = x * y; break;
     case QUOTIENT: out[0][0] = x / y; break;
     case SQRT: out[0][0] = each_of(sqrt, x); break;
@@ -299,13 +325,15 @@ static void expand(struct group *g)
       switch (each->kind) {
       case LINEAR: o[k] = combined(g, each->combination, k); break;
       case PRODUCT: multiply(o, x, y, k); break;
+      case SCALED: o[k] = x[0] * y[k]; break;
       TERM_CASES
-      default: break; /* a table */
+      default: break; /* a table, or constant */
       }
     }
     const lanes part = g->h / (k + 1.0);
     for (int i = 0; i < g->n; i++)
-      g->a[FIRST_UNKNOWN + i][k + 1] = part * combined(g, derivatives + i, k);
+      g->a[FIRST_UNKNOWN + i][k + 1] =
+          part * (k == 0 ? combined_values(g, derivatives + i) : combined(g, derivatives + i, k));
   }
 }
 
@@ -365,8 +393,11 @@ static void find_series(struct group *g)
         recurrence_of(operation), operation[1] - 1, g->a[operation[1] - 1],
         g->a[operation[2] > 0 ? operation[2] - 1 : 0], g->a[operation[3] - 1]};
   }
-  for (int i = 0; i < tape->starts[tape->n_combinations] - 1; i++)
+  for (int i = 0; i < tape->starts[tape->n_combinations] - 1; i++) {
     g->terms[i] = g->a[tape->slots[i] - 1];
+    g->factors[i] = NULL;
+    g->scaled[i] = all_of(tape->coefficients[i]);
+  }
 }
 
 /* Find the unknowns on which each slot depends, and whether it depends on the time. */
@@ -393,6 +424,42 @@ static void find_dependences(struct group *g)
   }
 }
 
+/* Return whether a slot is an operand of an operation that is no combination. */
+static int is_operand(const struct tape *tape, int slot)
+{
+  for (int n = 0; n < tape->n_operations; n++) {
+    const int *operation = tape->operations[n];
+    if (operation[0] == LINEAR || operation[0] == TABLE) continue;
+    if (operation[1] == slot || (operation[0] != SINE_COSINE && operation[2] == slot)) return 1;
+  }
+  return 0;
+}
+
+/* Mark operations of constants, whose further terms are 0. */
+static void find_constants(struct group *g)
+{
+  const struct tape *tape = &g->all->tape;
+  for (int n = 0; n < tape->n_operations; n++) {
+    const int *operation = tape->operations[n];
+    struct operation *each = g->operations + n;
+    if (g->depends[operation[3] - 1] == 0) each->kind = FIXED;
+    if (each->kind != PRODUCT) continue;
+    const int is_swapped = g->depends[operation[2] - 1] == 0;
+    if (!is_swapped && g->depends[operation[1] - 1] != 0) continue;
+    each->kind = SCALED;
+    if (is_swapped) each->x = g->a[operation[2] - 1], each->y = g->a[operation[1] - 1];
+  }
+  for (int n = 0; n < tape->n_operations; n++) {
+    const int out = tape->operations[n][3];
+    struct operation *each = g->operations + n;
+    if (each->kind != SCALED || is_operand(tape, out)) continue;
+    /* Combinations alone have it as a term: they multiply by the constant themselves. */
+    each->kind = FIXED;
+    for (int i = 0; i < tape->starts[tape->n_combinations] - 1; i++)
+      if (tape->slots[i] == out) g->terms[i] = each->y, g->factors[i] = each->x;
+  }
+}
+
 /* Return the derivative of a combination by an unknown. */
 static lanes perturbed(const struct group *g, int n, int j)
 {
@@ -404,15 +471,18 @@ static lanes perturbed(const struct group *g, int n, int j)
 }
 
 /* Compute the derivatives of the rates by the unknowns amid the step, times the step. */
-static void set_jacobian(struct group *g, lanes factor, lanes jacobian[][WITH_ATTITUDE])
+static void set_jacobian(struct group *g, lanes factor, lanes jacobian[][MOST])
 {
   const struct tape *tape = &g->all->tape;
   const lanes half = 0.5 * factor, step = factor * g->h;
   if (g->leaves) {
-    g->leaves->set_lane_jacobian(*g->a, tape->coefficients, tape->constants, &half, &step, jacobian);
+    lanes found[WITH_ATTITUDE][WITH_ATTITUDE];
+    g->leaves->set_lane_jacobian(*g->a, tape->coefficients, tape->constants, &half, &step, found);
+    for (int i = 0; i < g->n; i++)
+      for (int j = 0; j < g->n; j++) jacobian[i][j] = found[i][j];
     return;
   }
-  lanes *const m = g->middle, (*const v)[WITH_ATTITUDE] = g->tangents;
+  lanes *const m = g->middle, (*const v)[MOST] = g->tangents;
   for (int n = 0; n < g->all->n_slots; n++) {
     lanes sum = {0.0};
     /* The order is above the number of these terms. */
@@ -486,10 +556,10 @@ static void set_truncation(const struct group *g, lanes factor, lanes *left)
 
 /* Replace vectors by the products of the exponential of a matrix and each vector. */
 static inline __attribute__((always_inline)) void carry_of(const int n,
-                                                           lanes matrix[][WITH_ATTITUDE],
-                                                           lanes vectors[][WITH_ATTITUDE])
+                                                           lanes matrix[][MOST],
+                                                           lanes vectors[][MOST])
 {
-  lanes sums[VECTORS][WITH_ATTITUDE], next[VECTORS][WITH_ATTITUDE];
+  lanes sums[VECTORS][MOST], next[VECTORS][MOST];
 #pragma GCC unroll 4
   for (int v = 0; v < VECTORS; v++)
 #pragma GCC unroll 7
@@ -523,11 +593,12 @@ static inline __attribute__((always_inline)) void carry_of(const int n,
     for (int i = 0; i < n; i++) vectors[v][i] = sums[v][i];
 }
 
-static void carry(int n, lanes matrix[][WITH_ATTITUDE],
-                                            lanes vectors[][WITH_ATTITUDE])
+static void carry(int n, lanes matrix[][MOST],
+                                            lanes vectors[][MOST])
 {
   if (n == 3) carry_of(3, matrix, vectors);
-  else carry_of(WITH_ATTITUDE, matrix, vectors);
+  else if (n == WITH_ATTITUDE) carry_of(WITH_ATTITUDE, matrix, vectors);
+  else carry_of(n, matrix, vectors);
 }
 
 /* Set the time, the unknowns and term 0 of all slots. */
@@ -537,6 +608,10 @@ static void set_start(struct group *g)
   g->a[0][1] = g->h;
   for (int i = 0; i < g->n; i++) g->a[FIRST_UNKNOWN + i][0] = g->y[i];
   set_values(g);
+  if (g->all->n_parameters == 0) return;
+  const struct tape *tape = &g->all->tape;
+  for (int i = 0; i < tape->starts[tape->n_combinations] - 1; i++)
+    if (g->factors[i] != NULL) g->scaled[i] = tape->coefficients[i] * *g->factors[i];
 }
 
 /* Compare the derivatives with those that the last series had at its end. */
@@ -544,7 +619,7 @@ static void check_derivatives(struct group *g)
 {
   const int derivatives = g->all->tape.n_combinations - g->n;
   for (int i = 0; i < g->n; i++) {
-    const lanes found = g->previous * combined(g, derivatives + i, 0);
+    const lanes found = g->previous * combined_values(g, derivatives + i);
     const lanes defect = g->weights[i] * absolute(found - g->slope[i]);
     /* NaN is not allowed. */
     g->fails |= g->is_checked & ~(defect <= g->allowed);
@@ -593,16 +668,127 @@ static inline __attribute__((always_inline)) void sum_up(const struct group *g, 
   }
 }
 
+/* Return a component of perturbation j at time 0, relative to the size of the unknown. */
+static double sign_of(const struct group *g, int j, int unknown)
+{
+  const double even = 1.0 / sqrt(g->n);
+  return g->n == PROBES ? unknown == j : (unknown + 1) >> j & 1 ? -even : even;
+}
+
+/* The beginning of a step. */
+struct start {
+  lanes t, t_low, h; /* with the step that was tried */
+  lanes error[MOST], low[MOST];
+};
+
+/* Return the largest value of an unknown that begins at 0, in a part of the step. */
+static lanes reached_size(const struct group *g, int unknown, lanes factor)
+{
+  lanes most = {0.0};
+  for (int i = 1; i <= PARTS; i++) {
+    const lanes part = factor * ((double)i / PARTS);
+    lanes sum = {0.0};
+    for (int k = g->order; k > 0; k--) sum = part * (sum + g->a[FIRST_UNKNOWN + unknown][k]);
+    most = larger(most, absolute(sum));
+  }
+  return most;
+}
+
+/* Set unknown sizes of own states to those that the first step may reach; return the lanes. */
+static bits guess_sizes(struct group *g)
+{
+  bits found = {0};
+  for (int i = g->n_body; i < g->n; i++) {
+    const bits is_unknown = g->is_first & (absolute(g->y[i]) == 0.0) & (g->least[i - g->n_body] == 0.0);
+    if (!any(is_unknown)) continue;
+    const lanes guess = larger(reached_size(g, i, all_of(1.0)), all_of(LEAST));
+    g->sizes[i] = select_of(is_unknown, guess, g->sizes[i]);
+    /* The state may stay at 0: the single-body kernel decides to what its errors are relative. */
+    g->fails |= is_unknown & ~((guess >= 1.0 / FAR) & (guess <= FAR));
+    g->weights[i] = select_of(is_unknown, 1.0 / guess, g->weights[i]);
+    for (int j = 0; j < PROBES; j++) {
+      const lanes probe = sign_of(g, j, i) * guess;
+      g->probes[j][i] = select_of(is_unknown, probe, g->probes[j][i]);
+    }
+    found |= is_unknown;
+  }
+  return found;
+}
+
+/* Return the lanes whose guesses are much larger than what the first step reaches. */
+static bits is_too_large(struct group *g, bits is_guessed, lanes factor)
+{
+  bits found = {0};
+  for (int i = g->n_body; i < g->n; i++) {
+    const bits is_own = is_guessed & (absolute(g->y[i]) == 0.0) & (g->least[i - g->n_body] == 0.0);
+    const lanes reached = reached_size(g, i, factor);
+    found |= is_own & (factor < 1.0) & (g->sizes[i] > MOST_OF_REACHED * reached);
+    g->sizes[i] = select_of(is_own, larger(reached, all_of(LEAST)), g->sizes[i]);
+  }
+  return found;
+}
+
+/* Return the estimated error of a lane's body so far. */
+static double error_of(const struct group *g, int lane, double growth, double blurred)
+{
+  return WRONG * g->worst[lane] + UNSEEN * growth * g->local[lane] + ROUNDINGS * blurred;
+}
+
+/* Store a body's unknowns and estimates as its next result. */
+static void put_row(struct group *g, int lane, const double *z)
+{
+  const struct bodies *all = g->all;
+  const size_t row = g->body[lane] * (size_t)all->n_rows + g->row[lane]++;
+  const double growth = sqrt(g->growth[lane]);
+  const double blurred = ROUNDING * growth * (1.0 + sqrt(g->noise[lane]));
+  double square = 0.0;
+  for (int i = 3; i < g->n_body; i++) square += z[i] * z[i];
+  for (int i = 0; i < 3; i++) all->omega[row][i] = z[i];
+  for (int i = 3; i < g->n_body; i++) all->attitude[row][i - 3] = z[i] / sqrt(square);
+  for (int i = 0; i < all->n_own; i++) all->own[row + i * (size_t)all->n * all->n_rows] = z[g->n_body + i];
+  if (all->estimates == NULL) return;
+  all->estimates[row][0] = error_of(g, lane, growth, blurred);
+  all->estimates[row][1] = growth;
+}
+
+static const double *times_of(const struct bodies *all, int body)
+{
+  return all->times + (all->n_times == 1 ? 0 : body * (size_t)all->n_rows);
+}
+
+/* Store the results of a lane's body at times within its last step, by the series. */
+static void put_rows(struct group *g, int lane, const struct start *start, const lanes *left,
+                     double factor)
+{
+  const double *times = times_of(g->all, g->body[lane]);
+  double z[MOST];
+  while (g->row[lane] < g->all->n_rows - 1 && fabs(times[g->row[lane]]) <= fabs(g->t[lane])) {
+    const double passed = (times[g->row[lane]] - start->t[lane]) - start->t_low[lane];
+    const double part = passed / start->h[lane], share = part / factor;
+    const double unseen = pow(share, g->order + 1);
+    for (int i = 0; i < g->n; i++) {
+      const lanes *a = g->a[FIRST_UNKNOWN + i];
+      double sum = 0.0, error = start->error[i][lane];
+      for (int k = g->order; k > 0; k--) sum = part * (sum + a[k][lane]);
+      error += share * (g->error[i][lane] + left[i][lane] - error) - unseen * left[i][lane];
+      z[i] = a[0][lane] + (sum + (start->low[i][lane] - error));
+    }
+    put_row(g, lane, z);
+  }
+}
+
 /* Take a step in each lane, or shorten the step that the lane tries next. */
 static void step(struct group *g)
 {
   const int n = g->n, order = g->order;
-  lanes jacobian[WITH_ATTITUDE][WITH_ATTITUDE], left[WITH_ATTITUDE], noise[WITH_ATTITUDE];
-  lanes change[WITH_ATTITUDE], slope[WITH_ATTITUDE], size[WITH_ATTITUDE];
+  lanes jacobian[MOST][MOST], left[MOST], noise[MOST], change[MOST], slope[MOST], size[MOST];
+  struct start start = {g->t, g->t_low, g->h};
+  bits is_guessed = {0};
   lanes last = {0.0}, total = {0.0}, norm = {0.0}, stop;
   bits arrives, at_end;
 
   expand(g);
+  if (any(g->is_first)) is_guessed = guess_sizes(g);
   for (int k = order - 2; k <= order; k++) {
     for (int i = 0; i < n; i++) {
       const lanes term = g->weights[i] * absolute(g->a[FIRST_UNKNOWN + i][k]);
@@ -622,7 +808,7 @@ static void step(struct group *g)
   }
   factor = converged(g, factor);
   set_jacobian(g, factor, jacobian);
-  for (int j = 0; j < n; j++) size[j] = j < 3 ? g->scale : all_of(0.5);
+  for (int j = 0; j < n; j++) size[j] = j < 3 ? g->scale : j < g->n_body ? all_of(0.5) : g->sizes[j];
   for (int i = 0; i < n; i++) {
     lanes row = {0.0};
     for (int j = 0; j < n; j++) row += absolute(jacobian[i][j]) * size[j];
@@ -630,20 +816,24 @@ static void step(struct group *g)
   }
   const lanes tried = factor;
   factor = select_of(norm > A_STEP, factor * (A_STEP / norm), factor);
-  const bits accepted = is_finite & (factor >= SHORTER) & (norm <= 1.0 / LEAST);
+  bits accepted = is_finite & (factor >= SHORTER) & (norm <= 1.0 / LEAST);
   const lanes shorter = select_of(is_finite & (factor > 0.01), factor, all_of(0.01)) * g->h;
   factor = ended(g, factor, &arrives, &at_end, &stop);
   const lanes h = factor * g->h;
   set_noise(g, noise);
-  lanes reached = g->scale, terms = {0.0}, turned = {0.0}, rounded = all_of(1.0), noises = {0.0};
+  lanes reached = g->scale, terms = {0.0}, own = {0.0}, turned = {0.0}, rounded = all_of(1.0), noises = {0.0};
   sum_up(g, 0, 3, factor, change, slope, size);
-  if (n == WITH_ATTITUDE) sum_up(g, 3, 4, factor, change, slope, size);
+  if (g->n_body == WITH_ATTITUDE) sum_up(g, 3, 4, factor, change, slope, size);
+  for (int i = g->n_body; i < n; i++) sum_up(g, i, 1, factor, change, slope, size);
+  if (any(is_guessed)) accepted &= ~is_too_large(g, is_guessed, factor);
   for (int i = 0; i < n; i++) {
     if (i < 3) {
       reached = larger(reached, absolute(g->y[i] + change[i]));
       terms = larger(terms, size[i]);
-    } else {
+    } else if (i < g->n_body) {
       turned += 2.0 * size[i];
+    } else {
+      own = larger(own, g->weights[i] * size[i]);
     }
     /* Perturbations of an unknown that stays near 0 change where its terms do not show it: see
        tape_steady.f90. */
@@ -655,11 +845,11 @@ static void step(struct group *g)
   }
   /* Large terms that cancel are rounded. */
   const double most = fmax(MOST_CANCELLED, g->all->tolerance / (2.0 * ROUNDING));
-  g->fails |= accepted & ~(larger(terms / reached, turned) <= most);
+  g->fails |= accepted & ~(larger(larger(terms / reached, turned), own) <= most);
   set_truncation(g, factor, left);
   for (int i = 0; i < n; i++)
     for (int j = 0; j < n; j++) jacobian[i][j] *= factor / tried;
-  lanes vectors[VECTORS][WITH_ATTITUDE], worst = {0.0}, growth = {0.0};
+  lanes vectors[VECTORS][MOST], worst = {0.0}, growth = {0.0};
   lanes *const error = vectors[PROBES];
   for (int i = 0; i < n; i++) {
     for (int j = 0; j < PROBES; j++) vectors[j][i] = g->probes[j][i];
@@ -677,6 +867,8 @@ static void step(struct group *g)
   growth = growth * ((double)n / PROBES) + (1.0 - n);
   g->fails |= accepted & ~(growth <= MOST_GROWTH * MOST_GROWTH);
   for (int i = 0; i < n; i++) {
+    start.error[i] = g->error[i];
+    start.low[i] = g->low[i];
     error[i] -= left[i];
     worst += g->weights[i] * absolute(error[i]);
     g->error[i] = select_of(accepted, error[i], g->error[i]);
@@ -695,6 +887,10 @@ static void step(struct group *g)
   g->previous = select_of(accepted, h, g->previous);
   g->scale = select_of(accepted, reached, g->scale);
   g->weights[0] = g->weights[1] = g->weights[2] = 1.0 / g->scale;
+  for (int i = g->n_body; i < n; i++) {
+    g->sizes[i] = select_of(accepted, larger(g->sizes[i], absolute(g->y[i])), g->sizes[i]);
+    g->weights[i] = select_of(accepted, 1.0 / g->sizes[i], g->weights[i]);
+  }
   /* The time at a stop is exact. */
   const lanes moved = h + g->t_low, later = g->t + moved, part = later - g->t;
   const lanes later_low = (g->t - (later - part)) + (moved - part);
@@ -709,16 +905,18 @@ static void step(struct group *g)
   g->steps -= accepted;
   g->tries = (g->tries + 1) & ~accepted;
   g->fails |= (g->tries > MOST_TRIES) | (g->steps > MOST_STEPS);
+  for (int i = 0; i < SIDE_BY_SIDE && g->all->n_rows > 1; i++)
+    if (accepted[i] && g->body[i] >= 0) put_rows(g, i, &start, left, factor[i]);
 }
 
 /* Set the inputs of the tape that are parameters, and return whether they are finite. */
 static int set_parameters(struct group *g, int lane, int set)
 {
-  const int n = g->all->n_parameters;
+  const int n = g->all->n_parameters, first = g->n < N_INPUTS ? N_INPUTS : FIRST_UNKNOWN + g->n;
   double sum = 0.0;
   for (int i = 0; i < n; i++) {
     const double value = g->all->parameters[set * (size_t)n + i];
-    g->a[N_INPUTS + i][0][lane] = value;
+    g->a[first + i][0][lane] = value;
     sum += fabs(value);
   }
   return sum <= FAR;
@@ -728,22 +926,30 @@ static int set_parameters(struct group *g, int lane, int set)
 static int put_in(struct group *g, int lane, int body)
 {
   const struct bodies *all = g->all;
-  const double *omega = all->omega0[body], end = all->times[all->n_times == 1 ? 0 : body];
+  const double *omega = all->omega0[body], *times = times_of(all, body);
+  const double end = times[all->n_rows - 1];
+  double own[MOST];
   const double scale = fmax(fabs(omega[0]), fmax(fabs(omega[1]), fabs(omega[2])));
-  const double even = 1.0 / sqrt(g->n);
   double sum = fabs(omega[0]) + fabs(omega[1]) + fabs(omega[2]);
-  for (int i = 3; i < g->n; i++) sum += fabs(all->attitude0[body][i - 3]);
+  for (int i = 3; i < g->n_body; i++) sum += fabs(all->attitude0[body][i - 3]);
+  for (int i = 0; i < all->n_own; i++) {
+    own[i] = all->own0[body + i * (size_t)all->n];
+    sum += fabs(own[i]);
+  }
   /* A sum, because a maximum may lose a NaN. */
   if (!(sum <= FAR && scale >= 1.0 / FAR && fabs(end) <= FAR && fabs(end) >= 1.0 / FAR)) return 0;
   if (!(scale * fabs(end) <= MOST_ANGLE)) return 0;
   if (!set_parameters(g, lane, all->n_sets == 1 ? 0 : body)) return 0;
   for (int i = 0; i < g->n; i++) {
-    g->y[i][lane] = i < 3 ? omega[i] : all->attitude0[body][i - 3];
+    const int k = i - g->n_body;
+    g->y[i][lane] = i < 3 ? omega[i] : k < 0 ? all->attitude0[body][i - 3] : own[k];
     g->weights[i][lane] = i < 3 ? 1.0 / scale : 2.0;
+    if (k >= 0) g->least[k][lane] = all->own_sizes[k];
+    if (k >= 0) g->sizes[i][lane] = fmax(fabs(own[k]), all->own_sizes[k]);
+    if (k >= 0) g->weights[i][lane] = g->sizes[i][lane] > 0.0 ? 1.0 / g->sizes[i][lane] : 0.0;
     g->low[i][lane] = g->error[i][lane] = g->slope[i][lane] = 0.0;
     for (int j = 0; j < PROBES; j++) {
-      const double sign = g->n == PROBES ? i == j : (i + 1) >> j & 1 ? -even : even;
-      g->probes[j][i][lane] = sign / g->weights[i][lane];
+      g->probes[j][i][lane] = g->weights[i][lane] > 0.0 ? sign_of(g, j, i) / g->weights[i][lane] : 0.0;
     }
   }
   g->t[lane] = g->t_low[lane] = g->worst[lane] = g->noise[lane] = g->allowed[lane] = 0.0;
@@ -756,38 +962,37 @@ static int put_in(struct group *g, int lane, int body)
   g->is_checked[lane] = g->fails[lane] = 0;
   g->steps[lane] = g->tries[lane] = 0;
   g->body[lane] = body;
+  g->row[lane] = 0;
+  while (g->row[lane] < all->n_rows - 1 && times[g->row[lane]] == 0.0) {
+    double z[MOST];
+    for (int i = 0; i < g->n; i++) z[i] = g->y[i][lane];
+    put_row(g, lane, z);
+  }
   return 1;
 }
 
-/* Take the result of a lane's body, or leave the body to the single-body kernel. */
+/* Take the last result of a lane's body, or leave the body to the single-body kernel. */
 static void take_out(struct group *g, int lane)
 {
   const struct bodies *all = g->all;
   const int body = g->body[lane];
   const double growth = sqrt(g->growth[lane]), trusted = TRUSTED / (1.0 + growth / DOUBTED);
   const double blurred = ROUNDING * growth * (1.0 + sqrt(g->noise[lane]));
-  double z[WITH_ATTITUDE], square = 0.0;
-  g->body[lane] = -1;
-  if (g->fails[lane] || !(g->worst[lane] <= trusted * all->tolerance)
-      || !(blurred <= SURE * all->tolerance)) return;
-  for (int i = 0; i < g->n; i++) {
-    z[i] = g->y[i][lane] + (g->low[i][lane] - g->error[i][lane]);
-    if (i >= 3) square += z[i] * z[i];
+  double z[MOST];
+  if (!g->fails[lane] && g->worst[lane] <= trusted * all->tolerance
+      && blurred <= SURE * all->tolerance) {
+    for (int i = 0; i < g->n; i++) z[i] = g->y[i][lane] + (g->low[i][lane] - g->error[i][lane]);
+    put_row(g, lane, z);
+    for (int i = 0; i < all->n_rows; i++) all->status[body * (size_t)all->n_rows + i] = COMPLETE;
   }
-  for (int i = 0; i < 3; i++) all->omega[body][i] = z[i];
-  for (int i = 3; i < g->n; i++) all->attitude[body][i - 3] = z[i] / sqrt(square);
-  all->status[body] = COMPLETE;
-  if (all->estimates == NULL) return;
-  all->estimates[body][0] = WRONG * g->worst[lane] + UNSEEN * growth * g->local[lane]
-                            + ROUNDINGS * blurred;
-  all->estimates[body][1] = growth;
+  g->body[lane] = -1;
 }
 
 /* Put a motion that never ends into an empty lane: its numbers are finite. */
 static void clear(struct group *g, int lane)
 {
   for (int i = 0; i < g->n; i++) {
-    g->weights[i][lane] = 1.0;
+    g->weights[i][lane] = g->sizes[i][lane] = 1.0;
     g->y[i][lane] = i == 3;
   }
   g->fails[lane] = -1;
@@ -822,7 +1027,9 @@ static int order_for(const struct bodies *all, int *factors)
   /* A step would have to end at a switch in one lane and not in others. */
   for (int n = 0; n < all->tape.n_operations; n++)
     if (all->tape.operations[n][0] == SWITCH || all->tape.operations[n][0] == FLOOR) return 0;
-  for (int i = 0; i < all->n_slots; i++) factors[i] = 1;
+  /* Parameters are constant in a motion. */
+  const int last = all->tape.n_unknowns < N_INPUTS ? N_INPUTS : FIRST_UNKNOWN + all->tape.n_unknowns;
+  for (int i = 0; i < all->n_slots; i++) factors[i] = i < last || i >= last + all->n_parameters;
   const int most = most_factors(&all->tape, factors);
   /* A product of many factors may not show in its first terms: see tape_powers.f90. */
   if (most >= MANY) least = (int)ceil(2 * most / PART_OF_ORDER);
@@ -836,15 +1043,15 @@ static int order_for(const struct bodies *all, int *factors)
 void OF_LEVEL(solve_tape_bodies, LEVEL)(struct bodies *all)
 {
   struct group g;
-  const size_t of_slot = TERMS + 2 + WITH_ATTITUDE, n_slots = all->n_slots;
+  const size_t of_slot = TERMS + 2 + MOST, n_slots = all->n_slots;
   const int n = all->tape.n_operations, n_terms = all->tape.starts[all->tape.n_combinations] - 1;
-  lanes *memory = aligned_alloc(sizeof(lanes), n_slots * of_slot * sizeof(lanes));
+  lanes *memory = aligned_alloc(sizeof(lanes), (n_slots * of_slot + n_terms) * sizeof(lanes));
   int next = 0, active = 0, unseen = 0;
 
   all->interrupted = 0;
   memset(&g, 0, sizeof g);
   g.depends = calloc(n_slots, sizeof *g.depends);
-  g.operations = malloc(n * sizeof *g.operations + n_terms * sizeof *g.terms);
+  g.operations = malloc(n * sizeof *g.operations + 2 * n_terms * sizeof *g.terms);
   if (memory != NULL && g.depends != NULL && g.operations != NULL) g.order = order_for(all, g.depends);
   if (g.order == 0) {
     free(memory);
@@ -853,17 +1060,21 @@ void OF_LEVEL(solve_tape_bodies, LEVEL)(struct bodies *all)
     return;
   }
   memset(g.depends, 0, n_slots * sizeof *g.depends);
-  memset(memory, 0, n_slots * of_slot * sizeof(lanes));
+  memset(memory, 0, (n_slots * of_slot + n_terms) * sizeof(lanes));
   g.all = all;
   g.n = all->tape.n_unknowns;
+  g.n_body = g.n - all->n_own;
   g.leaves = fits_lanes((intptr_t)all->tape.leaves) ? all->tape.leaves : NULL;
   g.a = (series *)memory;
   g.middle = memory + n_slots * TERMS;
   g.noises = g.middle + n_slots;
-  g.tangents = (lanes(*)[WITH_ATTITUDE])(g.noises + n_slots);
+  g.tangents = (lanes(*)[MOST])(g.noises + n_slots);
+  g.scaled = memory + n_slots * of_slot;
   g.terms = (lanes **)(g.operations + n);
+  g.factors = g.terms + n_terms;
   find_series(&g);
   find_dependences(&g);
+  find_constants(&g);
   for (int i = 0; i < SIDE_BY_SIDE; i++) clear(&g, i);
   g.h = g.previous = g.scale = g.local = all_of(1.0);
   for (;;) {

@@ -50,15 +50,19 @@ module tape
     real(c_double) :: tolerance         !! relative, and of the angle of the attitude in rad
     integer(c_int) :: n_slots, n_tables
     integer(c_int) :: n                 !! number of bodies
-    integer(c_int) :: n_times           !! 1 or n
+    integer(c_int) :: n_times           !! sets of times: 1 or n
     integer(c_int) :: interrupted       !! out: not 0 if the user interrupted it
     type(c_ptr) :: omega0, attitude0    !! (3, n), rad/s; (4, n), unit quaternions
-    type(c_ptr) :: times                !! (n_times), s
-    type(c_ptr) :: omega, attitude      !! (3, n), (4, n): results
-    type(c_ptr) :: status               !! (n), of one byte
-    type(c_ptr) :: estimates            !! (2, n): relative error, amplification; or null
+    type(c_ptr) :: times                !! (n_rows, n_times), s, ordered away from 0
+    type(c_ptr) :: omega, attitude      !! (3, n_rows, n), (4, n_rows, n): results
+    type(c_ptr) :: status               !! (n_rows, n), of one byte
+    type(c_ptr) :: estimates            !! (2, n_rows, n): relative error, amplification; or null
     integer(c_int) :: n_parameters, n_sets !! sets of parameters: 0, 1 or n
     type(c_ptr) :: parameters           !! (n_parameters, n_sets): further inputs of the tape
+    integer(c_int) :: n_rows            !! times of a body
+    integer(c_int) :: n_own             !! own states
+    type(c_ptr) :: own0, own_sizes      !! (n, n_own), (n_own)
+    type(c_ptr) :: own                  !! (n_rows, n, n_own): results
   end type tape_bodies_t
 
   interface

@@ -9,15 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.engine.many_alone import (
-    NO_ATTITUDE,
-    is_solved_alone,
-    prepare_details,
-    solve_one_by_one,
-    solve_with_states,
-)
+from pyharness.engine.many_details import prepare_details
+from pyharness.engine.many_recorded import NO_ATTITUDE, needs_equations, solve_recorded
 from pyharness.engine.many_scenes import (
     BODIES,
+    ONES,
     PARAMETER,
     TORQUES,
     about_principal,
@@ -25,6 +21,7 @@ from pyharness.engine.many_scenes import (
     checked_copies,
     from_scene,
     from_scenes,
+    rows_of_alike,
     rows_of_scene,
     solve_bodies,
 )
@@ -33,19 +30,21 @@ from pyharness.engine.plan import FINEST
 from pyharness.engine.registry import PREPARED, REGISTRY, requested_tolerance
 from pyharness.engine.solve import ascending_times
 from pyharness.engine.solver import CODES
-from pyharness.model.arrays import check_rows, count_bodies, only_one, rows_of, spread, threads_of
+from pyharness.model.arrays import check_rows, count_bodies, only_one, rows_of, spread
 from pyharness.model.attitude import rotated, scalar_first, turned_back
 from pyharness.model.codes import Methods
 from pyharness.model.ensemble import Ensemble, place_for
 from pyharness.model.errors import InputError, kind_of, known
 from pyharness.model.keywords import with_hints
-from pyharness.model.principal import in_double
+from pyharness.model.principal import PrincipalScene, in_double
 from pyharness.model.progress import bar_of_bodies, expect_bodies
 from pyharness.model.scene import Scene, checked_scene
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import ROUNDING, Array
 from pyharness.model.values import Number, Numbers, boolean, checked_effort, finite, number_list
 
-_PLAIN, _TILTED = -2, -1  # kinds of scenes: about principal axes; with an inertia matrix
+# Kinds of scenes under torque laws: about principal axes, and with an inertia matrix.
+_LAWS = _PLAIN, _TILTED = -2, -1
 _NO_DETAILS: dict[str, Any] = dict.fromkeys(("t_events", "y_events", "sensitivities", "refusals"))
 
 
@@ -112,8 +111,8 @@ def solve_many(
         are solved side by side.
     states : dict of arrays, shape (n,), or of float
         Initial values of the scene's own states (`Scene.states`), by name; the default is the
-        scene's values. Bodies with own states are solved one by one, without `compiled`, `events`,
-        `sensitivities` and `out`.
+        scene's values. With own states, `compiled`, `events`, `sensitivities` and
+        `out` are refused.
     method : str
         A name in `pyharness.engine.solver.PREPARED`. `auto` uses a closed form if there is one,
         else the Taylor series.
@@ -199,39 +198,19 @@ def solve_many(
     if isinstance(scene, Scene) and scene.states:
         refused = {"events": events, "sensitivities": sensitivities, "out": out}
         refused["compiled"] = compiled or None
-        settings["tolerance"] = requested_tolerance(method, tolerance)
-        with bar_of_bodies(boolean("progress", progress)):
-            return solve_with_states(
-                scene, t_end, rows, arrays, states, refused=refused,
-                estimates=boolean("estimates", estimates), threads=threads, **settings,
-            )  # fmt: skip
-    if states is not None:
+        for name, value in refused.items():
+            if value is not None:
+                raise InputError(f"{name}: the scene has states of its own; allowed: solve")
+    elif states is not None:
         raise InputError("states: the scene has no states of its own; allowed: a scene with some")
     if scene and (events is not None or sensitivities is not None):
         details = prepare_details(
             scene, t_end if rows is None else rows, arrays, events=events,
             sensitivities=sensitivities, has_rows=rows is not None, **settings,
         )  # fmt: skip
-    bodies, ends = scene, t_end
-    if rows is not None:  # a copy of each body for each time
-        if isinstance(scene, Scene):
-            # Normalised twice, a quaternion may have another last bit.
-            copies = checked_copies(arrays, as_given=True)
-            n = count_bodies(copies)
-            arrays |= {
-                name: each if len(each) == 1 else np.repeat(each, len(rows), axis=0)
-                for name, each in copies.items()
-            }
-        else:
-            n, bodies = len(scene), [each for each in scene for _ in rows]
-        ends = np.tile(rows, n)
+    settings |= {"estimates": boolean("estimates", estimates), "compiled": compiled}
     with bar_of_bodies(boolean("progress", progress)):
-        solved = _solve(
-            bodies, ends, arrays, out, step, estimates=boolean("estimates", estimates),
-            threads=threads, compiled=compiled, **settings,
-        )  # fmt: skip
-    if rows is not None:
-        solved = solved.with_times(rows)
+        solved = _solve(scene, t_end, rows, arrays, states, out, step, threads=threads, **settings)
     if details is None:
         # `out` may have the details of an earlier call.
         has_details = solved.t_events is not None or solved.sensitivities is not None
@@ -241,31 +220,20 @@ def solve_many(
 
 
 def _solve(
-    scene: Scene | Sequence[Scene], t_end: Any, arrays: dict[str, Any],
-    out: "Ensemble | Array | None", step: Number | None, **settings: Any,
+    scene: Scene | Sequence[Scene], t_end: Any, times: Array | None, arrays: dict[str, Any],
+    states: object, out: "Ensemble | Array | None", step: Number | None, **settings: Any,
 ) -> Ensemble:  # fmt: skip
     own = {name: value for name, value in arrays.items() if value is not None}
-    kind = only_one({name: own[name] for name in BODIES if name in own})
-    method, effort, threads = settings["method"], settings["effort"], settings["threads"]
-    ready: dict[str, Any] = {}
-    axes = turns = None
     if isinstance(scene, Scene):
-        if kind:  # the arrays give other bodies
+        if only_one({name: own[name] for name in BODIES if name in own}):
+            # The arrays give other bodies.
             if scene.changing is not None:
-                scene = replace(scene, changing=None, moments=(1.0, 1.0, 1.0))
+                scene = replace(scene, changing=None, moments=ONES)
             scene = in_double(scene)
-        if is_solved_alone(scene, {name: own[name] for name in TORQUES if name in own}):
-            settings["tolerance"] = _choose_kernel(method, settings["tolerance"])[1]
-            settings |= {"effort": checked_effort(effort), "threads": threads_of(threads)}
-            return solve_one_by_one(scene, t_end, arrays, out, **settings)
-        step_size = scene.step_size
-        if kind == "inertia" or (scene.inertia is not None and not kind):
-            given = {"inertia": scene.inertia, **from_scene(scene), **own}
-            own, axes, turns = about_principal(given)
-        else:
-            if scene.inertia is not None:
-                scene = replace(scene, inertia=None, moments=(1.0, 1.0, 1.0))
-            ready = rows_of_scene(scene)
+        if needs_equations(scene, {name: own[name] for name in TORQUES if name in own}):
+            settings["tolerance"] = _choose_kernel(settings["method"], settings["tolerance"])[1]
+            settings["effort"] = checked_effort(settings["effort"])
+            return solve_recorded(scene, t_end, times, arrays, states, out, **settings)
     else:
         for name in own:
             raise InputError(
@@ -273,10 +241,46 @@ def _solve(
                 "scenes without arrays"
             )
         kinds = [_kind_of(each, row) for row, each in enumerate(scene)]
-        if len(set(kinds)) > 1 or max(kinds, default=_PLAIN) >= 0:
-            return _solve_groups(scene, kinds, t_end, step, out, **settings)
+        if len(set(kinds)) > 1 or any(each not in _LAWS for each in kinds):
+            return _solve_groups(scene, kinds, t_end, times, step, out, **settings)
+    if times is None:
+        return _solve_laws(scene, t_end, arrays, out, step, **settings)
+    # A copy of each body for each time.
+    if isinstance(scene, Scene):
+        # Normalised twice, a quaternion may have another last bit.
+        copies = checked_copies(arrays, as_given=True)
+        n = count_bodies(copies)
+        arrays |= {
+            name: each if len(each) == 1 else np.repeat(each, len(times), axis=0)
+            for name, each in copies.items()
+        }
+    else:
+        n, scene = len(scene), [each for each in scene for _ in times]
+    found = _solve_laws(scene, np.tile(times, n), arrays, out, step, **settings)
+    return found.with_times(times)
+
+
+def _solve_laws(
+    scene: Scene | Sequence[Scene], t_end: Any, arrays: dict[str, Any],
+    out: "Ensemble | Array | None", step: Number | None, **settings: Any,
+) -> Ensemble:  # fmt: skip
+    own = {name: value for name, value in arrays.items() if value is not None}
+    method = settings["method"]
+    ready: dict[str, Any] = {}
+    axes = turns = None
+    if isinstance(scene, Scene):
+        step_size = scene.step_size
+        is_moments = "moments" in own or "coefficients" in own
+        if "inertia" in own or (scene.inertia is not None and not is_moments):
+            given = {"inertia": scene.inertia, **from_scene(scene), **own}
+            own, axes, turns = about_principal(given)
+        else:
+            if scene.inertia is not None:
+                scene = replace(scene, inertia=None, moments=ONES)
+            ready = rows_of_scene(scene)
+    else:
         own = from_scenes(scene)
-        if kinds[0] == _TILTED:
+        if scene[0].inertia is not None:
             own, axes, turns = about_principal(own)
         step_size = scene[0].step_size
     if step is not None:
@@ -284,8 +288,8 @@ def _solve(
     code, tolerance = _choose_kernel(method, settings["tolerance"])
     own["t_end"] = t_end
     found, omega0, times = solve_bodies(
-        ready, own, (code, tolerance, step_size, checked_effort(effort)), method=method,
-        is_rounded=axes is not None, threads=threads, out=out,
+        ready, own, (code, tolerance, step_size, checked_effort(settings["effort"])),
+        method=method, is_rounded=axes is not None, threads=settings["threads"], out=out,
         with_estimates=settings["estimates"],
     )  # fmt: skip
     if axes is not None:
@@ -298,39 +302,55 @@ def _solve(
     return found if found.leaves is None else replace(found, leaves=None)
 
 
-def _kind_of(scene: Scene, row: int) -> int:
-    """Return a number that scenes share if one kernel call can solve them."""
-    checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True)
-    return row if is_solved_alone(scene, {}) else _PLAIN if scene.inertia is None else _TILTED
+def _kind_of(scene: Scene, row: int) -> object:
+    """Return a value that scenes share if one kernel call can solve them."""
+    try:
+        checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True)
+    except InputError as mistake:
+        raise InputError(f"scene {row}: {mistake}") from None
+    if isinstance(scene, PrincipalScene):
+        return row
+    if not needs_equations(scene, {}):
+        return _PLAIN if scene.inertia is None else _TILTED
+    body = next((name for name in BODIES if getattr(scene, name) is not None), scene.changing)
+    torque: object = scene.torque
+    if isinstance(torque, TorqueLaw):
+        torque = len(torque.sines), len(torque.cosines), any(torque.rate)
+    return body, torque
 
 
 def _solve_groups(
-    scenes: Sequence[Scene], kinds: Sequence[int], t_end: Any, step: Number | None,
-    out: "Ensemble | Array | None", **settings: Any,
+    scenes: Sequence[Scene], kinds: Sequence[object], t_end: Any, times: Array | None,
+    step: Number | None, out: "Ensemble | Array | None", **settings: Any,
 ) -> Ensemble:  # fmt: skip
     check_alike(scenes)
     if scenes[0].attitude is None and any(each.torque.needs_attitude for each in scenes):
         raise InputError(NO_ATTITUDE)
-    times, n = rows_of("t_end", t_end), len(scenes)
-    check_rows("t_end", times, n)
-    times = spread(times, n)
-    found = place_for(out, n, scenes[0].attitude is not None, settings["estimates"])
+    n = len(scenes)
+    ends = rows_of("t_end", t_end) if times is None else np.zeros(1)
+    check_rows("t_end", ends, n)
+    ends = spread(ends, n)
+    with_attitude, estimates = scenes[0].attitude is not None, settings["estimates"]
+    if times is None:
+        found = place_for(out, n, with_attitude, estimates)
+    else:
+        found = place_for(None, n * len(times), with_attitude, estimates).with_times(times)
     leaves: set[str | None] = set()
     expect_bodies(n)
-    groups: dict[int, list[int]] = {}
+    groups: dict[object, list[int]] = {}
     for row, kind in enumerate(kinds):
         groups.setdefault(kind, []).append(row)
     for kind, rows in groups.items():
-        own: Any = scenes[rows[0]] if kind >= 0 else [scenes[row] for row in rows]
-        # A torque in an array avoids preparing a kernel, which takes longer than solving one scene.
-        alone = {"torque_constant": own.law.constant} if kind >= 0 and own.torque.in_space else {}
-        part = solve_many(own, times[rows], step=step, **alone, **settings)
+        own: Any = [scenes[row] for row in rows]
+        arrays = dict.fromkeys((*BODIES, *TORQUES, "omega", "attitude"))
+        if kind not in _LAWS:
+            own, arrays = rows_of_alike(own)
+        part = _solve(own, ends[rows], times, arrays, None, None, step, **settings)
         leaves.add(part.leaves)
-        found.omega[rows], found.status[rows] = part.omega, part.status
-        if found.attitude is not None:
-            found.attitude[rows] = part.attitude
-        if found.estimates is not None:
-            found.estimates[rows] = part.estimates
+        for name in ("omega", "status", "attitude", "estimates"):
+            array = getattr(found, name)
+            if array is not None:
+                array[rows] = getattr(part, name)
     texts = "; ".join(sorted(filter(None, leaves))) or None
     return found if found.leaves == texts else replace(found, leaves=texts)
 

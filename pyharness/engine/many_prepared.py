@@ -7,14 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.engine.many_scenes import rows_of_scene, solve_bodies
+from pyharness.engine.many_tape import Bodies, Equations, solve_tape
 from pyharness.model.arrays import (
     buffer_of,
     check_rows,
     row_of,
     rows_of,
-    rows_within,
     threads_of,
-    unit_quaternions,
 )
 from pyharness.model.attitude import IDENTITY, rotated, scalar_first
 from pyharness.model.codes import Methods, Places, Statuses
@@ -30,7 +29,6 @@ from pyharness.model.trajectory import Array
 if TYPE_CHECKING:
     from pyharness.engine.solver import Solver
 
-NO_PARAMETERS = np.empty((0, 0))
 # The methods that the kernel for many bodies has.
 _SIDE_BY_SIDE = (Methods.CLOSED_FORM, Methods.CLOSED_FORM_OR_TAYLOR, Methods.TAYLOR)
 
@@ -92,75 +90,45 @@ def many_states(
         found = place_for(out, n, with_attitude=True)
         if out is not None:  # the starts may share memory with it
             starts, turns = starts.copy(), turns.copy()
-        work = partial(solve_each, solver, starts, times, turns, found)
+        bodies = Bodies(starts, times_within(solver.scene, times)[None], turns)
+        work = partial(solve_with, solver, bodies, found.with_times(np.zeros(1)))
         for_each_piece(work, n, threads_of(threads))
     assert found.attitude is not None
     return found.omega, found.attitude, found.status
 
 
-def solve_each(
-    solver: "Solver[Any]", starts: Array, times: Array, turns: Array | None, found: Ensemble,
-    piece: slice, given_up: NDArray[np.int32],
+def solve_with(
+    solver: "Solver[Any]", bodies: Bodies, found: Ensemble, piece: slice,
+    given_up: NDArray[np.int32],
 ) -> None:  # fmt: skip
-    """Solve the bodies in `piece`, and write their results to `found`.
-
-    `turns` are the initial quaternions, if any.
-    """
-    left = list(range(piece.start, piece.stop))
-    if solver.packed[Places.METHOD] == Methods.TAPE and solver.scene.inertia is None:
-        own = times if solver.scene.changing is None else times_within(solver.scene, times)
-        left = solve_lanes(solver.packed, NO_PARAMETERS, starts, own, turns, found, piece, given_up)
-    # Some bodies' errors can't be measured side by side.
-    for i in left:
-        if given_up[0]:
-            return
-        solve_row(solver, i, starts, times, turns, found)
+    """Solve the bodies in `piece` into `found`, whose arrays have an axis of times."""
+    if solver.packed[Places.METHOD] == Methods.TAPE:
+        axes = axes_and_turn(solver.scene) if uses_principal_axes(solver.scene) else None
+        equations = Equations(solver.packed, solver.packed, axes=axes)
+        solve_tape(equations, bodies, found, piece, given_up)
+        return
+    for i in range(piece.start, piece.stop):
+        for row, times in enumerate(bodies.times):
+            if given_up[0]:
+                return
+            _solve_row(solver, (i, row), bodies, float(row_of(times, i)), found)
 
 
-def solve_row(
-    solver: "Solver[Any]", i: int, starts: Array, times: Array, turns: Array | None,
-    found: Ensemble,
-) -> None:  # fmt: skip
-    start, time = row_of(starts, i), float(row_of(times, i))
+def _solve_row(
+    solver: "Solver[Any]", at: tuple[int, int], bodies: Bodies, time: float, found: Ensemble
+) -> None:
+    start = row_of(bodies.omega, at[0])
     try:
-        if turns is None or found.attitude is None:
-            found.omega[i] = solver(start, time)
+        if bodies.attitude is None or found.attitude is None:
+            found.omega[at] = solver(start, time)
         else:
-            found.omega[i], found.attitude[i] = solver(start, time, row_of(turns, i))
-        found.status[i] = ENDS.index(solver.status)
+            turn = row_of(bodies.attitude, at[0])
+            found.omega[at], found.attitude[at] = solver(start, time, turn)
+        found.status[at] = ENDS.index(solver.status)
         if found.estimates is not None:
-            found.estimates[i] = np.array([solver.error, solver.growth], float)
+            found.estimates[at] = np.array([solver.error, solver.growth], float)
     except InputError:
-        found.omega[i], found.status[i] = np.nan, Statuses.REFUSED
-        if found.attitude is not None:
-            found.attitude[i] = np.nan
-        if found.estimates is not None:
-            found.estimates[i] = np.nan
-
-
-def solve_lanes(
-    packed: Array, parameters: Array, starts: Array, times: Array, turns: Array | None,
-    found: Ensemble, piece: slice, given_up: NDArray[np.int32],
-) -> list[int]:  # fmt: skip
-    """Solve bodies side by side into `found`; return unsolved bodies' indices.
-
-    The equations in `packed` use `parameters`, (n, k) or (1, k).
-    """
-    n = piece.stop - piece.start
-    sets = parameters if len(parameters) < 2 else parameters[piece]
-    first = last = np.empty((0, 4))
-    if turns is not None:
-        first, last = unit_quaternions(rows_within(turns, piece)), np.empty((n, 4))
-    omega, status = np.empty((n, 3)), np.empty(n, np.int8)
-    extension().tape_many(
-        packed, rows_within(starts, piece).T, rows_within(times, piece), first.T, sets.T, given_up,
-        omega.T, last.T, status,
-        found.estimates_of(piece),
-    )  # fmt: skip
-    taken = status == Statuses.COMPLETE
-    found.omega[piece][taken] = omega[taken]
-    found.status[piece][taken] = Statuses.COMPLETE
-    if found.attitude is not None:
-        found.attitude[piece][taken] = last[taken]
-    left: list[int] = (piece.start + np.flatnonzero(~taken)).tolist()
-    return left
+        found.omega[at], found.status[at] = np.nan, Statuses.REFUSED
+        for array in (found.attitude, found.estimates):
+            if array is not None:
+                array[at] = np.nan

@@ -26,8 +26,9 @@ from pyharness.model.ensemble import Ensemble, place_for
 from pyharness.model.errors import InputError
 from pyharness.model.extension import extension
 from pyharness.model.inertia import SYMMETRIC, nearest_float, principal_frame
+from pyharness.model.principal import PrincipalScene
 from pyharness.model.progress import for_each_piece
-from pyharness.model.scene import STATE_TORQUE, Scene, checked_scene
+from pyharness.model.scene import STATE_TORQUE, Scene, Triple, checked_scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
 from pyharness.model.waves import with_merged_rows
@@ -37,6 +38,7 @@ _NOTHING = np.empty((4, 0), order="F")  # in place of attitudes
 _UNKNOWN = -1.0  # in place of an estimate that the kernel does not compute
 _MOST_KEPT = 8  # scenes whose arrays are kept
 BODIES = ("moments", "inertia", "coefficients")
+ONES: Triple = (1.0, 1.0, 1.0)
 PARAMETER = "parameters: "  # before the names of parameters of a torque
 TORQUES = ("torque_constant", "torque_rate", "sines", "cosines")
 _WAVES = ("sines", "cosines")
@@ -59,34 +61,10 @@ def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Array, Ar
     n = count_bodies(own)
     matrices, constant, rate, sines, cosines = (spread(each, n) for each in own.values())
     constant, sines, cosines = with_merged_rows(constant, sines, cosines)
-    with np.errstate(all="ignore"):
-        opposite = matrices.transpose(0, 2, 1)
-        largest = np.abs(matrices).max(axis=(1, 2))
-        is_right = np.isfinite(largest) & (
-            np.abs(matrices - opposite).max(axis=(1, 2)) <= SYMMETRIC * largest
-        )
-        matrices = np.where(is_right[:, None, None], 0.5 * matrices + 0.5 * opposite, np.eye(3))
     vectors = np.concatenate(
         [constant[:, None], rate[:, None], sines[..., :3], cosines[..., :3]], axis=1
     )
-    # The coefficients A, B, C are more accurate than rounded moments.
-    coefficients, axes, components, status = (
-        np.ascontiguousarray(each.T)
-        for each in extension().inertia_frames(matrices.transpose(1, 2, 0), vectors.T)
-    )
-    axes = axes.transpose(0, 2, 1)
-    for i in np.flatnonzero((status == Statuses.GAVE_UP) & np.isfinite(vectors).all(axis=(1, 2))):
-        (a, b, c), (d, e, f), (g, h, k) = matrices[i].tolist()
-        frame = principal_frame(((a, b, c), (d, e, f), (g, h, k)))
-        i1, i2, i3 = exact = frame.exact_moments
-        exact_coefficients = (i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3
-        coefficients[i] = [nearest_float(each) for each in exact_coefficients]
-        axes[i] = frame.axes
-        for row, (x, y, z) in enumerate(vectors[i].tolist()):
-            turned = frame.into((Fraction(x), Fraction(y), Fraction(z)))
-            parts = zip(turned, exact, strict=True)
-            components[i, row] = [nearest_float(part / moment) for part, moment in parts]
-    coefficients[~is_right | (status == Statuses.REFUSED)] = np.nan
+    coefficients, axes, components = _frames(matrices, vectors)
     last = 2 + sines.shape[1]
     found: dict[str, Any] = {
         **rows,
@@ -108,6 +86,47 @@ def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Array, Ar
         conjugate = turns * np.array([1.0, -1.0, -1.0, -1.0])
         found["attitude"] = turned_back(unit_quaternions(found["attitude"]), conjugate)
     return found, axes, turns
+
+
+def _frames(matrices: Array, vectors: Array) -> tuple[Array, Array, Array]:
+    """Return A, B, C of n bodies, their principal axes (columns), and (n, k, 3) of `vectors`.
+
+    The last are components about these axes, over the moments. An invalid inertia has coefficients
+    NaN.
+    """
+    with np.errstate(all="ignore"):
+        opposite = matrices.transpose(0, 2, 1)
+        largest = np.abs(matrices).max(axis=(1, 2))
+        is_right = np.isfinite(largest) & (
+            np.abs(matrices - opposite).max(axis=(1, 2)) <= SYMMETRIC * largest
+        )
+        matrices = np.where(is_right[:, None, None], 0.5 * matrices + 0.5 * opposite, np.eye(3))
+    # The coefficients A, B, C are more accurate than rounded moments.
+    coefficients, axes, components, status = (
+        np.ascontiguousarray(each.T)
+        for each in extension().inertia_frames(matrices.transpose(1, 2, 0), vectors.T)
+    )
+    axes = axes.transpose(0, 2, 1)
+    for i in np.flatnonzero((status == Statuses.GAVE_UP) & np.isfinite(vectors).all(axis=(1, 2))):
+        (a, b, c), (d, e, f), (g, h, k) = matrices[i].tolist()
+        frame = principal_frame(((a, b, c), (d, e, f), (g, h, k)))
+        i1, i2, i3 = exact = frame.exact_moments
+        exact_coefficients = (i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3
+        coefficients[i] = [nearest_float(each) for each in exact_coefficients]
+        axes[i] = frame.axes
+        for row, (x, y, z) in enumerate(vectors[i].tolist()):
+            turned = frame.into((Fraction(x), Fraction(y), Fraction(z)))
+            parts = zip(turned, exact, strict=True)
+            components[i, row] = [nearest_float(part / moment) for part, moment in parts]
+    coefficients[~is_right | (status == Statuses.REFUSED)] = np.nan
+    return coefficients, axes, components
+
+
+def axes_of_inertia(matrices: Array) -> tuple[Array, Array, Array]:
+    """Return A, B, C (NaN if invalid) of n bodies, their principal axes, and inverse inertias."""
+    n = len(matrices)
+    coefficients, axes, components = _frames(matrices, np.broadcast_to(np.eye(3), (n, 3, 3)))
+    return coefficients, axes, np.einsum("nik,njk->nij", axes, components)
 
 
 def from_scene(scene: Scene) -> dict[str, Any]:
@@ -194,6 +213,32 @@ def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
     if scenes[0].attitude is not None:
         found["attitude"] = np.array([row["attitude"] for row in rows])
     return found
+
+
+def rows_of_alike(scenes: Sequence[Scene]) -> tuple[Scene, dict[str, Any]]:
+    """Return a scene, and the arrays in which scenes under one recorded torque differ.
+
+    A torque law is given by arrays.
+    """
+    first = scenes[0]
+    arrays: dict[str, Any] = dict.fromkeys((*BODIES, *TORQUES))
+    arrays["omega"] = np.array([each.omega for each in scenes])
+    arrays["attitude"] = first.attitude and np.array([each.attitude for each in scenes])
+    if isinstance(first, PrincipalScene):
+        return first, arrays
+    for name in BODIES:
+        if getattr(first, name) is not None:
+            arrays[name] = np.array([getattr(each, name) for each in scenes])
+    if not isinstance(first.torque, StateTorque):
+        laws = [each.law for each in scenes]
+        arrays["torque_constant"] = np.array([each.constant for each in laws])
+        if any(first.law.rate):
+            arrays["torque_rate"] = np.array([each.rate for each in laws])
+        for name in _WAVES:
+            if getattr(first.law, name):
+                waves = [[[*size, f] for size, f in getattr(each, name)] for each in laws]
+                arrays[name] = np.array(waves)
+    return first, arrays
 
 
 def checked_copies(arrays: dict[str, Any], *, as_given: bool = False) -> dict[str, Array]:

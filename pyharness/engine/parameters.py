@@ -19,7 +19,7 @@ from pyharness.model.expressions import components
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque, replayed, torque_of
 from pyharness.model.symbols import MOST_OPERATIONS, SYMBOLS, Recorder
-from pyharness.model.tape import N_INPUTS, Tape, evaluate
+from pyharness.model.tape import N_INPUTS, Linear, Operation, Tape, evaluate
 from pyharness.model.torque_law import TorqueLaw, body_torque
 from pyharness.model.values import Matrix, Triple
 
@@ -104,31 +104,73 @@ def _with_values(part: StateTorque | TorqueLaw, values: Mapping[str, float]) -> 
     )  # fmt: skip
 
 
-@lru_cache(maxsize=8)
-def tape_of_bodies(
-    torque: StateTorque | TorqueLaw, body: tuple[Triple, Triple] | None, names: tuple[str, ...],
-    attitude: bool,
-) -> Tape:  # fmt: skip
-    """Return the recorded equations of motion, with the torque's parameters `names` as inputs.
+class BatchBody(NamedTuple):
+    """The body of a batch: constants, or `n_data` inputs of its equations of motion."""
 
-    Without `body`, A, B, C and the reciprocal moments are inputs too.
+    changing: Changing | None = None
+    coefficients: Triple | None = None
+    reciprocals: Triple | None = None  # of the moments
+    inertia: Matrix | None = None
+    # 6: A, B, C and reciprocals; 21: A, B, C, the principal axes and the inverse inertia
+    n_data: int = 0
+
+
+@lru_cache(maxsize=16)
+def tape_of_bodies(
+    torque: StateTorque | TorqueLaw, body: BatchBody, names: tuple[tuple[str, int], ...],
+    attitude: bool, states: tuple[str, ...] = (),
+) -> tuple[Tape, Tape]:  # fmt: skip
+    """Return the equations of motion, with the body's data and the torque's parameters as inputs.
+
+    `names` are parameters with numbers of values. The second tape has constants in place of these
+    inputs: its first operations.
     """
-    n_body = 0 if body else 6
-    recorder = Recorder(n_inputs=N_INPUTS + n_body + len(names))
-    time, x, y, z, *inputs = recorder.inputs()
-    q, rest = inputs[:4], inputs[4:]
-    coefficients, reciprocals = body or (rest[:3], rest[3:6])
-    given = {f"{TORQUE}{name}": [x] for name, x in zip(names, rest[n_body:], strict=True)}
-    omega = np.array([x, y, z], dtype=object)
-    total = sum(_torque(part, time, omega, q, given) for part in _list_summands(torque))
+    own = 7 if attitude else 3
+    first = max(N_INPUTS, 1 + own + len(states))
+    counts = [count for _, count in names]
+    recorder = Recorder(n_inputs=first + body.n_data + sum(counts))
+    time, *inputs = recorder.inputs()
+    omega, q = np.array(inputs[:3], dtype=object), inputs[3:7] if attitude else list(IDENTITY)
+    data = inputs[first - 1 : first - 1 + body.n_data]
+    rest = iter(inputs[first - 1 + body.n_data :])
+    given = {f"{TORQUE}{name}": [next(rest) for _ in range(count)] for name, count in names}
+    values = inputs[own : own + len(states)]
+    parts = [
+        _torque(part, time, omega, q, given, values if getattr(part, "own", ()) else ())
+        for part in _list_summands(torque)
+    ]
+    total = sum(np.array(part[:3], dtype=object) for part in parts)
+    own_rates = [sum(each) for each in zip(*(part[3:] for part in parts if len(part) > 3), strict=True)]
+    rates = list(_rates_of_batch(body, data, time, omega, total))
+    if attitude:
+        rates += quaternion_rates((omega[0], omega[1], omega[2]), q)
+    tape = recorder.tape([*rates, *own_rates])
+    constants = (Operation("linear", (), Linear(0.0, ())),) * (tape.n_inputs - first)
+    if not constants:
+        return tape, tape
+    return tape, replace(tape, operations=constants + tape.operations, n_inputs=first)
+
+
+def _rates_of_batch(
+    body: BatchBody, data: Sequence[Any], time: Any, omega: Any, torque: Any
+) -> Sequence[Any]:
+    if body.changing is not None:
+        return rates_of_changing(body.changing, time, omega, torque)
+    if body.inertia is not None:
+        return list(rates_about_body_axes(body.inertia, omega, torque))
+    x, y, z = omega
+    if body.n_data > 6:
+        axes, inverse = (np.reshape(each, (3, 3)) for each in (data[3:12], data[12:]))
+        x, y, z = omega @ axes
+        return list(axes @ (np.array(data[:3]) * [y * z, z * x, x * y]) + inverse @ torque)
+    coefficients, reciprocals = body.coefficients or data[:3], body.reciprocals or data[3:6]
     products = y * z, z * x, x * y
-    rates = [
+    return [
         a * product_ + component * reciprocal
         for a, product_, component, reciprocal in zip(
-            coefficients, products, total, reciprocals, strict=True
+            coefficients, products, torque, reciprocals, strict=True
         )
     ]
-    return recorder.tape(rates + quaternion_rates((x, y, z), q) if attitude else rates)
 
 
 def initial_state(scene: Scene, equations: VariedEquations) -> tuple[Array, Array]:
@@ -228,9 +270,10 @@ def _torque(
     others = [(f"torque.{name}", value) for name, value in part.parameters]
     if part.varied is not None and any(name in given for name, _ in others):
         numbers = [given.get(name, [value])[0] for name, value in others]
-        return np.array(evaluate(part.varied, [time, *omega, *q, *numbers], SYMBOLS), dtype=object)
+        inputs = [time, *omega, *q, *own, *numbers]
+        return np.array(evaluate(part.varied, inputs, SYMBOLS), dtype=object)
     assert part.tape is not None
-    return torque_of(part.tape, time, omega, q)
+    return torque_of(part.tape, time, omega, q, *own)
 
 
 def _rates(

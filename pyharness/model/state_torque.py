@@ -53,7 +53,7 @@ class StateTorque:
     parameters : tuple of pairs
         Name and value of each argument of the function whose default is a number.
     varied : Tape or None
-        The recorded operations, with `parameters` as further inputs.
+        The recorded operations, with `parameters` as further inputs, after own states.
     own : tuple of str
         The names of the scene's own states (`Scene.states`). Their values are further inputs of the
         tape, and their time derivatives further outputs.
@@ -245,10 +245,13 @@ def recorded(function: Function, states: Sequence[str] = ()) -> StateTorque:
 def _with_states(function: Function, names: tuple[str, ...]) -> StateTorque:
     takes_attitude = count_inputs(function, "[torque]", f"allowed: {_WITH_STATES}", 3, 4) == 4
 
-    def called(time: Symbol, omega: Any, attitude: Any, *states: Symbol) -> list[Any]:
+    def called(
+        time: Symbol, omega: Any, attitude: Any, *states: Symbol, **values: Symbol
+    ) -> list[Any]:
         own = dict(zip(names, states, strict=True))
         given = (time, omega, attitude, own) if takes_attitude else (time, omega, own)
-        parts = called_once(function, given, time.recorder, _WITH_STATES)
+        with_values = partial(function, **values) if values else function
+        parts = called_once(with_values, given, time.recorder, _WITH_STATES)
         if len(parts) != 2:
             raise InputError(
                 f"[torque]: the function returned {len(parts)} values; it must be {_WITH_STATES}"
@@ -257,7 +260,8 @@ def _with_states(function: Function, names: tuple[str, ...]) -> StateTorque:
 
     new = partial(Recorder, n_inputs=N_INPUTS + len(names))
     tape = recorded_twice(lambda recorder: _recorded_with(recorder, called), new)
-    return StateTorque(tape, None, tape.needs_attitude, own=names)
+    torque = StateTorque(tape, None, tape.needs_attitude, own=names)
+    return _with_parameters(torque, function, called)
 
 
 def _checked_components(components: list[Any]) -> list[Any]:
@@ -390,12 +394,14 @@ def _with_parameters(torque: StateTorque, function: Function, called: Function) 
     }
 
     def recorded_with(names: Sequence[str]) -> Tape | None:
-        recorder = Recorder(n_inputs=N_INPUTS + len(names))
+        n_own = len(torque.own)
+        recorder = Recorder(n_inputs=N_INPUTS + n_own + len(names))
         # An exponent is no parameter: its value determines which operations are recorded.
         recorder.has_powers = not names
 
         def named(time: Symbol, omega: Any, attitude: Any, *inputs: Symbol) -> Any:
-            return called(time, omega, attitude, **dict(zip(names, inputs, strict=True)))
+            values = dict(zip(names, inputs[n_own:], strict=True))
+            return called(time, omega, attitude, *inputs[:n_own], **values)
 
         try:
             return _recorded_with(recorder, named)

@@ -9,9 +9,10 @@ import pytest
 
 from pyharness import Scene, TorqueLaw, prepare, solve, solve_many, torques
 from pyharness.checks.scenes.state_scenes import draw
-from pyharness.engine.many_prepared import NO_PARAMETERS, solve_lanes
+from pyharness.engine.many_tape import Bodies, Equations, solve_tape
 from pyharness.model.arrays import unit_quaternions
 from pyharness.model.attitude import angle_between
+from pyharness.model.codes import Statuses
 from pyharness.model.ensemble import Ensemble
 
 MOMENTS = (1.0, 2.0, 2.5)
@@ -32,10 +33,11 @@ def lanes(
         np.full((n, 3), np.nan), np.full(n, 99, np.int8),
         None if turns is None else np.full((n, 4), np.nan),
     )  # fmt: skip
-    left = solve_lanes(
-        solver.packed, NO_PARAMETERS, starts, np.atleast_1d(np.asarray(times, float)), turns, found,
-        slice(0, n), np.zeros(1, np.int32),
-    )  # fmt: skip
+    bodies = Bodies(starts, np.atleast_2d(np.asarray(times, float)), turns)
+    rows = found.with_times(np.zeros(1))
+    solve_tape(Equations(solver.packed, np.empty(0)), bodies, rows, slice(0, n), np.zeros(1, "i"))
+    left = np.flatnonzero(found.status != Statuses.COMPLETE).tolist()
+    found.omega[left] = np.nan
     return found, left
 
 

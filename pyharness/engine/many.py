@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from pyharness.engine.many_details import prepare_details
+from pyharness.engine.many_mistakes import reasons_of
 from pyharness.engine.many_recorded import NO_ATTITUDE, needs_equations, solve_recorded
 from pyharness.engine.many_scenes import (
     BODIES,
@@ -45,7 +46,7 @@ from pyharness.model.values import Number, Numbers, boolean, checked_effort, fin
 
 # Kinds of scenes under torque laws: about principal axes, and with an inertia matrix.
 _LAWS = _PLAIN, _TILTED = -2, -1
-_NO_DETAILS: dict[str, Any] = dict.fromkeys(("t_events", "y_events", "sensitivities", "refusals"))
+_NO_DETAILS: dict[str, Any] = dict.fromkeys(("t_events", "y_events", "sensitivities"))
 
 
 @with_hints
@@ -211,12 +212,15 @@ def solve_many(
     settings |= {"estimates": boolean("estimates", estimates), "compiled": compiled}
     with bar_of_bodies(boolean("progress", progress)):
         solved = _solve(scene, t_end, rows, arrays, states, out, step, threads=threads, **settings)
+    reasons = reasons_of(solved, scene, arrays, states, t_end, method)
     if details is None:
         # `out` may have the details of an earlier call.
-        has_details = solved.t_events is not None or solved.sensitivities is not None
-        return replace(solved, **_NO_DETAILS) if has_details else solved
+        no_details = {**_NO_DETAILS, "refusals": reasons}
+        is_new = any(getattr(solved, name) != value for name, value in no_details.items())
+        return replace(solved, **no_details) if is_new else solved
     with bar_of_bodies(progress):
-        return details(solved)
+        found = details(solved)
+    return replace(found, refusals={**(reasons or {}), **(found.refusals or {})})
 
 
 def _solve(
@@ -315,7 +319,7 @@ def _kind_of(scene: Scene, row: int) -> object:
     body = next((name for name in BODIES if getattr(scene, name) is not None), scene.changing)
     torque: object = scene.torque
     if isinstance(torque, TorqueLaw):
-        torque = len(torque.sines), len(torque.cosines), any(torque.rate)
+        torque = torque.frame, len(torque.sines), len(torque.cosines), any(torque.rate)
     return body, torque
 
 

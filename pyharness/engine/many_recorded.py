@@ -21,14 +21,17 @@ from pyharness.engine.many_scenes import (
     axes_of_inertia,
     checked_rows,
     keep_with,
+    scene_of_row,
 )
 from pyharness.engine.many_tape import Bodies, Equations, solve_tape
 from pyharness.engine.parameters import BatchBody, tape_of_bodies
 from pyharness.engine.recorded import packed_tape
 from pyharness.engine.registry import check_prepared, check_torque
+from pyharness.engine.solve import solve
 from pyharness.engine.solver import Solver, prepare
 from pyharness.model.arrays import (
     count_bodies,
+    row_of,
     rows_of,
     spread,
     threads_of,
@@ -36,7 +39,8 @@ from pyharness.model.arrays import (
 )
 from pyharness.model.codes import Statuses
 from pyharness.model.ensemble import Ensemble, place_for
-from pyharness.model.errors import InputError, kind_of
+from pyharness.model.errors import InputError, TimedError, kind_of
+from pyharness.model.extension import ENDS
 from pyharness.model.principal import PrincipalScene
 from pyharness.model.progress import for_each_piece
 from pyharness.model.scene import Scene, Triple
@@ -122,6 +126,12 @@ def solve_recorded(
             solve_with(equations, bodies, result, piece, given_up)
 
     for_each_piece(enter, n, threads_of(threads))
+    if scene.states:
+        # `solve` takes omegas and states of any size, and tells endings apart.
+        has_result = np.isin(result.status, (Statuses.COMPLETE, Statuses.SENSITIVE)).all(axis=1)
+        options = {"method": method, "tolerance": tolerance, "effort": effort}
+        for i in np.flatnonzero(~has_result).tolist():
+            _solve_alone(scene, {**counted, **rows}, i, times, result, options)
     if result.attitude is not None:
         # At time 0 attitudes are normalised as by the kernel of torque laws.
         at_start = (spread(columns.T, n) == 0.0) & (result.status == Statuses.COMPLETE)
@@ -136,6 +146,38 @@ def solve_recorded(
         names = tuple(each.name for each in scene.states)
         place = replace(place, own=own_values, names=names)
     return place if place.leaves == leaves else replace(place, leaves=leaves)
+
+
+def _solve_alone(
+    scene: Scene, rows: Mapping[str, Array], i: int, times: Array | None, result: Ensemble,
+    options: dict[str, Any],
+) -> None:  # fmt: skip
+    own = {each.name: float(row_of(rows[f"states: {each.name}"], i)) for each in scene.states}
+    data = {name: each for name, each in rows.items() if name != "t_end" and name[8:] not in own}
+    ends = row_of(rows["t_end"], i)[None] if times is None else times
+    result.status[i] = Statuses.REFUSED
+    for array in (result.omega, result.attitude, result.own, result.estimates):
+        if array is not None:
+            array[i] = np.nan
+    try:
+        states = tuple(each._replace(start=own[each.name]) for each in scene.states)
+        one = solve(replace(scene_of_row(scene, data, i), states=states), ends, **options)
+    except TimedError:
+        result.status[i] = Statuses.GAVE_UP
+        return
+    except InputError:
+        return
+    # Either side of time 0 may end early.
+    row = i, np.isin(ends, one.time)
+    result.status[i] = ENDS.index(one.ended)
+    if not one.has_all_rows:
+        result.status[row] = Statuses.COMPLETE
+    result.omega[row] = one.omega
+    for array, values in ((result.attitude, one.attitude), (result.own, one.own)):
+        if array is not None:
+            array[row] = values
+    if result.estimates is not None:
+        result.estimates[row] = np.array([one.error, one.growth], float)
 
 
 def _own_states(scene: Scene, states: object) -> dict[str, Array]:

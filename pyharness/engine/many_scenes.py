@@ -230,12 +230,12 @@ def rows_of_alike(scenes: Sequence[Scene]) -> tuple[Scene, dict[str, Any]]:
         if getattr(first, name) is not None:
             arrays[name] = np.array([getattr(each, name) for each in scenes])
     if not isinstance(first.torque, StateTorque):
-        laws = [each.law for each in scenes]
+        laws: list[Any] = [each.torque for each in scenes]
         arrays["torque_constant"] = np.array([each.constant for each in laws])
-        if any(first.law.rate):
+        if any(laws[0].rate):
             arrays["torque_rate"] = np.array([each.rate for each in laws])
         for name in _WAVES:
-            if getattr(first.law, name):
+            if getattr(laws[0], name):
                 waves = [[[*size, f] for size, f in getattr(each, name)] for each in laws]
                 arrays[name] = np.array(waves)
     return first, arrays

@@ -46,7 +46,8 @@ class Ensemble(BatchResult):
         By name of a parameter with m values, the derivatives of the final states with respect to
         it, shape (n, 3, m) or (n, 7, m); NaN for a body without a result.
     refusals : dict of str, or None
-        The reasons for missing events and sensitivities, by index of the body.
+        The reasons for refused bodies (at most a hundred), and for missing events and
+        sensitivities, by index of the body.
     own, names : ndarray, shape (n, k), or None, and tuple of str
         The values and names of the scene's own states (`Scene.states`).
     times : ndarray, shape (m,), or None

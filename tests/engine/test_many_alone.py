@@ -267,11 +267,13 @@ def test_arrays_of_torques_in_space_are_those_of_scenes() -> None:
     starts, attitudes = rng.standard_normal((5, 3)), rng.standard_normal((5, 4))
     torques = rng.standard_normal((5, 3))
     scene = replace(TOP, torque=TorqueLaw((1.0, 0.5, 2.0), frame="space"))
-    found = solve_many(scene, 1.5, omega=starts, attitude=attitudes, torque_constant=torques)
     scenes = [
         replace(scene, omega=start, attitude=turn, torque=TorqueLaw(torque, frame="space"))
         for start, turn, torque in zip(starts, attitudes, torques, strict=True)
     ]
+    # Scenes and arrays normalise quaternions with other roundings.
+    attitudes = np.array([each.attitude for each in scenes])
+    found = solve_many(scene, 1.5, omega=starts, attitude=attitudes, torque_constant=torques)
     # The torque of the last scene of the list turns with the body.
     body = replace(TOP, torque=TorqueLaw((1.0, 0.5, 2.0)), attitude=IDENTITY)
     listed = solve_many([*scenes, body], 1.5, threads=2)

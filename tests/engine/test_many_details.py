@@ -11,6 +11,7 @@ from pyharness import ChangingMoments, InputError, Scene, TorqueLaw, prepare, so
 from pyharness.engine.many_scenes import scene_of_row
 from pyharness.events import crosses, flip
 from pyharness.model.arrays import unit_quaternions
+from pyharness.model.attitude import angle_between
 from pyharness.model.codes import Statuses
 from pyharness.model.extension import extension
 from pyharness.torques import damping
@@ -24,6 +25,7 @@ TURNS = RNG.standard_normal((N, 4))
 TIMES = RNG.uniform(2.0, 6.0, N)
 MATRIX: Any = ((3.0, 0.1, 0.1), (0.1, 2.0, 0.1), (0.1, 0.1, 1.0))
 LAW = TorqueLaw((0.1, 0.2, 0.0), sines=[((0.1, 0.0, 0.2), 1.5)])
+RECORDED = "in space", "damped"
 CASES: dict[str, tuple[Scene, dict[str, Any], list[str]]] = {
     "free": (TOP, {"moments": RNG.uniform(2.0, 3.0, (N, 3))}, ["omega", "moments"]),
     "law": (replace(TOP, torque=LAW), {}, ["torque.constant", "torque.sines"]),
@@ -145,7 +147,8 @@ def test_a_body_without_result_has_no_details() -> None:
     assert [each is None for each in found.y_events[0]] == [False, True, True]
     missing = np.isnan(found.sensitivities["moments"]).all(axis=(1, 2))
     assert missing.tolist() == [False, True, True]
-    assert found.refusals == {}  # `status` has their reasons
+    assert list(found.refusals) == [1]
+    assert "I2 is -3" in found.refusals[1]
 
 
 def test_a_refused_body_has_its_reason_and_no_influence() -> None:
@@ -217,11 +220,19 @@ def test_rows_over_time_are_those_of_final_times(name: str) -> None:
         one = MANY(
             scene, time, omega=STARTS, tolerance=1e-10, estimates=True, sensitivities=names, **own
         )  # fmt: skip
-        assert found.omega[:, k].tobytes() == one.omega.tobytes()
         assert found.ended[:, k].tolist() == one.ended.tolist()
-        assert np.array_equal(found.estimates[:, k], one.estimates, equal_nan=True)
         assert (found.attitude is None) == (one.attitude is None)
-        if one.attitude is not None:
+        if name in RECORDED:  # one integration has all rows
+            away = np.abs(found.omega[:, k] - one.omega).max(axis=1)
+            allowed = found.error[:, k] + one.error
+            assert (away <= allowed * np.abs(STARTS).max(axis=1) + 1e-15).all()
+            assert (allowed <= 1e-10).all()
+        else:
+            assert found.omega[:, k].tobytes() == one.omega.tobytes()
+            assert np.array_equal(found.estimates[:, k], one.estimates, equal_nan=True)
+        if one.attitude is not None and name in RECORDED:
+            assert angle_between(found.attitude[:, k], one.attitude).max() <= allowed.max() + 1e-15
+        elif one.attitude is not None:
             assert found.attitude[:, k].tobytes() == one.attitude.tobytes()
         for each in names:
             slopes = found.sensitivities[each]
@@ -237,7 +248,7 @@ def test_rows_over_time_are_those_of_final_times(name: str) -> None:
 def test_scenes_have_rows_over_time() -> None:
     scenes = [replace(TOP, torque=damping(0.1)), replace(TOP, moments=(2.0, 2.0, 1.0))]
     found = MANY(scenes, times=[1.0, 2.0])
-    assert found.omega[:, 1].tobytes() == solve_many(scenes, 2.0).omega.tobytes()
+    assert found.omega[:, 1] == pytest.approx(solve_many(scenes, 2.0).omega, rel=1e-11)
     assert found.omega.shape == (2, 2, 3)
     assert solve_many(TOP, times=[1.0, 2.0], omega=np.empty((0, 3))).omega.shape == (0, 2, 3)
     final = solve_many(TOP, 2.0).to_pandas()

@@ -42,12 +42,14 @@ def test_bodies_are_those_of_single_calls(threads: int) -> None:
     for i, time in enumerate((3.0, 20.0, -2.0)):
         states = {"wheel1": 0.0, "wheel2": 0.0, "wheel3": wheel[i]}
         wanted = one(i, time, states=states)
-        assert (found.omega[i] == wanted.omega[0]).all()
-        assert found.attitude is not None
-        assert (found.attitude[i] == wanted.attitude[0]).all()
-        assert [each[i] for each in found.states.values()] == wanted.own[0].tolist()
         assert found.error is not None
-        assert found.error[i] == wanted.error
+        allowed = found.error[i] + wanted.error
+        assert allowed <= 2e-10
+        assert found.omega[i] == pytest.approx(wanted.omega[0], abs=0.3 * allowed)
+        assert found.attitude is not None
+        assert found.attitude[i] == pytest.approx(wanted.attitude[0], abs=allowed)
+        own = [each[i] for each in found.states.values()]
+        assert own == pytest.approx(wanted.own[0], abs=allowed * np.abs(wanted.own[0]).max())
         assert found.ended[i] == "complete"
 
 
@@ -56,9 +58,9 @@ def test_rows_over_time_and_other_bodies(tmp_path: Path) -> None:
     found = solve_many(SCENE, times=[1.0, 5.0, 9.0], omega=STARTS, moments=bodies, tolerance=1e-10)
     for i in range(3):
         wanted = one(i, [1.0, 5.0, 9.0], moments=bodies[i])
-        assert (found.omega[i] == wanted.omega).all()
+        assert found.omega[i] == pytest.approx(wanted.omega, abs=3e-11)
         assert found.own is not None
-        assert (found.own[i] == wanted.own).all()
+        assert found.own[i] == pytest.approx(wanted.own, abs=1e-10 * np.abs(wanted.own).max())
     frame = found.to_pandas()
     assert frame.loc[(1, 5.0), "wheel2"] == found.states["wheel2"][1, 1]
     assert (found.to_xarray()["wheel3"].values == found.states["wheel3"]).all()

@@ -157,7 +157,7 @@ end subroutine solve_packed_many
 subroutine inertia_frames(n, matrices, m, vectors, coefficients, axes, components, status)
   ! Compute A, B, C of n bodies, their principal axes, and torques over moments about these.
   !f2py threadsafe
-  use principal_frames, only: find_frame
+  use levels, only: find_frames
   implicit none
   integer(4), intent(in) :: n
   real(8), intent(in) :: matrices(3, 3, n)      ! symmetric, finite, kg m2
@@ -167,10 +167,6 @@ subroutine inertia_frames(n, matrices, m, vectors, coefficients, axes, component
   real(8), intent(out) :: axes(3, 3, n)         ! in columns
   real(8), intent(out) :: components(3, m, n)
   integer(4), intent(out) :: status(n)          ! 0 complete, 3 not positive definite, 4 too thin
-  integer :: i
 
-  do i = 1, n
-    call find_frame(matrices(:, :, i), vectors(:, :, i), coefficients(:, i), axes(:, :, i), &
-                    components(:, :, i), status(i))
-  end do
+  call find_frames(n, matrices, m, vectors, coefficients, axes, components, status)
 end subroutine inertia_frames

@@ -13,6 +13,8 @@ typedef void free_solver(const void *bodies, int n, double *omega, int8_t *statu
 typedef void series_solver(const void *bodies, int n, double *omega, int8_t *status, int *interrupted);
 typedef void fixed_solver(const void *bodies, int method, int n, double *omega, int8_t *status,
                           int *interrupted);
+typedef void frame_finder(int n, const double *matrices, int m, const double *vectors,
+                          double *coefficients, double *axes, double *components, int *status);
 typedef void runner(void *ensemble);
 typedef void reader(int pieces, const double *edges, const double *points, int m, const double *values,
                     int n, const double *times, double *states);
@@ -23,6 +25,7 @@ typedef void reader(int pieces, const double *edges, const double *points, int m
   free_solver solve_many_free_##level;                                                         \
   series_solver solve_many_taylor_##level;                                                     \
   fixed_solver solve_many_fixed_##level;                                                       \
+  frame_finder find_frames_##level;                                                            \
   runner run_lanes_##level;                                                                    \
   runner solve_tape_bodies_##level;                                                            \
   solver solve_tape_##level;                                                                   \
@@ -35,7 +38,7 @@ typedef void reader(int pieces, const double *edges, const double *points, int m
    solve_many_taylor_##level,  solve_many_fixed_##level, run_lanes_##level,                    \
    solve_tape_##level,         step_tape_##level,        vary_solution_##level,                \
    solve_tape_bodies_##level,  read_pieces_##level,      ready_leaves_##level,                 \
-   number, width},
+   find_frames_##level,        number, width},
 
 /* The levels that are compiled, and the width of their registers. The build for one processor has
    one of them. */
@@ -75,6 +78,7 @@ static struct {
   runner *bodies;
   reader *pieces;
   const struct leaves *leaves; /* of ready torques, in the order of ready_keys */
+  frame_finder *frames;
   int level;                   /* 0 plain, 1 AVX2 with FMA, 2 AVX-512 */
   int width;                   /* numbers in a register */
 } chosen, known[] = {EACH_LEVEL(TAKEN)};
@@ -118,6 +122,12 @@ void taylor_solve(const void *problem, const void *request, void *solution)
 void quick_solve(const void *problem, const void *request, int contest, void *solution)
 {
   chosen.quick(problem, request, contest, solution);
+}
+
+void find_frames(int n, const double *matrices, int m, const double *vectors, double *coefficients,
+                 double *axes, double *components, int *status)
+{
+  chosen.frames(n, matrices, m, vectors, coefficients, axes, components, status);
 }
 
 void many_free(const void *bodies, int n, double *omega, int8_t *status)

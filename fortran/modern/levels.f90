@@ -7,7 +7,7 @@ module levels
   implicit none(type, external)
   private
 
-  public :: choose_level, fits_lanes, many_fixed, many_free, many_taylor, quick_solve, &
+  public :: choose_level, find_frames, fits_lanes, many_fixed, many_free, many_taylor, quick_solve, &
             read_pieces, ready_leaves, run_lanes, tape_bodies, tape_solve, tape_step, &
             tape_variation, taylor_solve
 
@@ -70,6 +70,16 @@ module levels
       integer(c_int), intent(in), value :: contest
       type(*), intent(inout) :: solution
     end subroutine quick_solve
+
+    subroutine find_frames(n, matrices, m, vectors, coefficients, axes, components, status) &
+        bind(c, name="find_frames")
+      import :: c_double, c_int
+      implicit none(type, external)
+      integer(c_int), intent(in), value :: n, m
+      real(c_double), intent(in) :: matrices(3, 3, n), vectors(3, m, n)
+      real(c_double), intent(out) :: coefficients(3, n), axes(3, 3, n), components(3, m, n)
+      integer(c_int), intent(out) :: status(n)
+    end subroutine find_frames
 
     subroutine many_free(bodies, n, omega, status) bind(c, name="many_free")
       import :: c_double, c_int, c_ptr, i1

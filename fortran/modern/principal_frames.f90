@@ -1,35 +1,57 @@
 module principal_frames
   !! Principal axes of many inertia matrices, by Jacobi's method in double-double: in double
   !! precision the differences of nearly equal moments, and a small moment, would have few digits.
+  use, intrinsic :: iso_c_binding, only: c_int
   use kinds, only: dp
   use statuses, only: COMPLETE, GAVE_UP, REFUSED
-  use word_pairs, only: operator(*), operator(+), operator(-), operator(/), pair_t, root
+  use word_pairs, only: operator(*), operator(+), operator(-), operator(/), pair_t, product_of, root
   implicit none(type, external)
   private
 
   integer, parameter :: MOST_ROTATIONS = 60 ! some ten suffice
   ! A smaller element off the diagonal changes no digit that is returned.
   real(dp), parameter :: NOTHING = 2.0_dp**(-100)
+  real(dp), parameter :: ROUGH = 2.0_dp**(-56), SMALL = 2.0_dp**(-28)
   ! Least over largest moment that double-double resolves.
   real(dp), parameter :: THIN = 2.0_dp**(-40)
   type(pair_t), parameter :: ZERO = pair_t(0.0_dp, 0.0_dp), ONE = pair_t(1.0_dp, 0.0_dp)
 
-  public :: find_frame
+  public :: find_frames
 
 contains
 
-  pure subroutine find_frame(matrix, vectors, coefficients, axes, components, status)
+  subroutine find_frames(n, matrices, m, vectors, coefficients, axes, components, status) &
+      bind(c, name="find_frames_level")
+    !! Compute the frames of n bodies, each with m vectors.
+    integer(c_int), intent(in), value :: n, m
+    real(dp), intent(in) :: matrices(3, 3, n)
+    real(dp), intent(in) :: vectors(3, m, n)
+    real(dp), intent(out) :: coefficients(3, n)
+    real(dp), intent(out) :: axes(3, 3, n)
+    real(dp), intent(out) :: components(3, m, n)
+    integer(c_int), intent(out) :: status(n)
+    integer :: i
+
+    do i = 1, n
+      call find_frame(m, matrices(:, :, i), vectors(:, :, i), coefficients(:, i), axes(:, :, i), &
+                      components(:, :, i), status(i))
+    end do
+  end subroutine find_frames
+
+  pure subroutine find_frame(m, matrix, vectors, coefficients, axes, components, status)
     !! Compute A, B, C, the axes as columns, and the components of vectors about them, over the
     !! moments; each is rounded once. Each axis is near the body's own axis of the same number, and
     !! the frame is right-handed. The status is COMPLETE, REFUSED if the matrix is not positive
     !! definite, or GAVE_UP if the body is too thin; the numbers are then 0.
+    integer, intent(in) :: m
     real(dp), intent(in) :: matrix(3, 3)        !! symmetric, finite
-    real(dp), intent(in) :: vectors(:, :)       !! (3, m), torques
+    real(dp), intent(in) :: vectors(3, m)       !! torques
     real(dp), intent(out) :: coefficients(3)
     real(dp), intent(out) :: axes(3, 3)
-    real(dp), intent(out) :: components(:, :)   !! (3, m)
+    real(dp), intent(out) :: components(3, m)
     integer, intent(out) :: status
     type(pair_t) :: a(3, 3), v(3, 3), moments(3), part
+    real(dp) :: scaled(3, 3)
     integer :: order(3)
     integer :: i, j, k, scaling
 
@@ -38,19 +60,18 @@ contains
     components = 0.0_dp
     ! The elements are at most 1, so that no product overflows.
     scaling = exponent(maxval(abs(matrix)))
-    a = ZERO
-    a%high = scale(matrix, -scaling)
-    v = ZERO
     do i = 1, 3
-      v(i, i) = ONE
+      scaled(:, i) = scale(matrix(:, i), -scaling)
     end do
+    call begin(scaled, a, v)
     call diagonalise(a, v)
     status = REFUSED
     if (.not. min(a(1, 1)%high, a(2, 2)%high, a(3, 3)%high) > 0.0_dp) return
     status = GAVE_UP
     if (min(a(1, 1)%high, a(2, 2)%high, a(3, 3)%high) < THIN) return
     status = COMPLETE
-    order = nearest_axes(v%high)
+    axes = v%high
+    order = nearest_axes(axes)
     v = v(:, order)
     do i = 1, 3
       moments(i) = a(order(i), order(i))
@@ -67,12 +88,84 @@ contains
       k = 1 + mod(j, 3)
       part = (moments(j) - moments(k))/moments(i)
       coefficients(i) = part%high + part%low
-      do j = 1, size(vectors, 2)
+      do j = 1, m
         part = (v(1, i)*vectors(1, j) + v(2, i)*vectors(2, j) + v(3, i)*vectors(3, j))/moments(i)
         components(i, j) = scale(part%high + part%low, -scaling)
       end do
     end do
   end subroutine find_frame
+
+  pure subroutine begin(matrix, a, v)
+    !! Set `v` to axes that are right to double precision, and orthogonal to double-double, and `a`
+    !! to the matrix about them. Few rotations are then left, by small angles.
+    real(dp), intent(in) :: matrix(3, 3)
+    type(pair_t), intent(out) :: a(3, 3), v(3, 3)
+    type(pair_t) :: sum, b(3, 3)
+    real(dp) :: turned(3, 3), axes(3, 3), off(3, 3)
+    integer :: i, j, k
+
+    turned = matrix
+    call diagonalise_roughly(turned, axes)
+    ! One step of Newton's method for the polar factor.
+    do j = 1, 3
+      do i = 1, j
+        sum = product_of(axes(1, i), axes(1, j)) + product_of(axes(2, i), axes(2, j)) &
+              + product_of(axes(3, i), axes(3, j))
+        off(i, j) = 0.5_dp*((merge(1.0_dp, 0.0_dp, i == j) - sum%high) - sum%low)
+        off(j, i) = off(i, j)
+      end do
+    end do
+    do j = 1, 3
+      do i = 1, 3
+        v(i, j) = pair_t(axes(i, j), 0.0_dp) &
+                  + pair_t(axes(i, 1)*off(1, j) + axes(i, 2)*off(2, j) + axes(i, 3)*off(3, j), 0.0_dp)
+      end do
+    end do
+    do j = 1, 3
+      do i = 1, 3
+        b(i, j) = v(1, j)*matrix(i, 1) + v(2, j)*matrix(i, 2) + v(3, j)*matrix(i, 3)
+      end do
+      do k = 1, j
+        a(k, j) = v(1, k)*b(1, j) + v(2, k)*b(2, j) + v(3, k)*b(3, j)
+        a(j, k) = a(k, j)
+      end do
+    end do
+  end subroutine begin
+
+  pure subroutine diagonalise_roughly(a, v)
+    !! Make `a` diagonal, and compute its axes, the columns of `v`.
+    real(dp), intent(inout) :: a(3, 3)
+    real(dp), intent(out) :: v(3, 3)
+    real(dp) :: ratio, t, c, s, first(3), second(3)
+    integer :: p, q, r, rotation, k
+
+    v = reshape([1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp], [3, 3])
+    do rotation = 1, MOST_ROTATIONS
+      r = maxloc([abs(a(2, 3)), abs(a(1, 3)), abs(a(1, 2))], 1)
+      p = merge(2, 1, r == 1)
+      q = merge(2, 3, r == 3)
+      if (abs(a(p, q)) <= ROUGH) exit
+      ratio = (a(q, q) - a(p, p))/(2.0_dp*a(p, q))
+      t = sign(1.0_dp/(abs(ratio) + sqrt(1.0_dp + ratio*ratio)), ratio)
+      c = 1.0_dp/sqrt(1.0_dp + t*t)
+      s = c*t
+      first = c*a(:, p) - s*a(:, q)
+      second = s*a(:, p) + c*a(:, q)
+      a(:, p) = first
+      a(:, q) = second
+      first = c*a(p, :) - s*a(q, :)
+      second = s*a(p, :) + c*a(q, :)
+      a(p, :) = first
+      a(q, :) = second
+      a(p, q) = 0.0_dp
+      a(q, p) = 0.0_dp
+      do k = 1, 3
+        first(1) = v(k, p)
+        v(k, p) = c*first(1) - s*v(k, q)
+        v(k, q) = s*first(1) + c*v(k, q)
+      end do
+    end do
+  end subroutine diagonalise_roughly
 
   pure subroutine diagonalise(a, v)
     !! Make `a` diagonal by rotations, which also turn the columns of `v`.
@@ -89,8 +182,11 @@ contains
       ratio = (a(q, q)%high - a(p, p)%high)/(2.0_dp*a(p, q)%high)
       tangent = sign(1.0_dp/(abs(ratio) + sqrt(1.0_dp + ratio*ratio)), ratio)
       ! The tangent is rounded; sine and cosine belong to this tangent to all digits.
-      c = pair_t(tangent, 0.0_dp)*tangent + ONE
-      c = ONE/root(c)
+      if (abs(tangent) < SMALL) then
+        c = pair_t(1.0_dp, -0.5_dp*tangent*tangent)
+      else
+        c = ONE/root(pair_t(tangent, 0.0_dp)*tangent + ONE)
+      end if
       s = c*tangent
       do k = 1, 3
         first = a(k, p)
@@ -117,11 +213,13 @@ contains
     real(dp), intent(in) :: v(3, 3)
     integer :: order(3)
     logical :: is_left(3)
+    real(dp) :: sizes(3)
     integer :: i
 
     is_left = .true.
     do i = 1, 3
-      order(i) = maxloc(abs(v(i, :)), 1, is_left)
+      sizes = abs(v(i, :))
+      order(i) = maxloc(sizes, 1, is_left)
       is_left(order(i)) = .false.
     end do
   end function nearest_axes

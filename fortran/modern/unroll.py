@@ -17,6 +17,8 @@ from unroll_many import attitude_sums, many_steps, paired
 
 MODULES = (
     "two_words",
+    "word_pairs",
+    "principal_frames",
     "step_nodes",
     "torque_terms",
     "scaled_motion",

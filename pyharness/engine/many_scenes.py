@@ -64,15 +64,17 @@ def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Array, Ar
     vectors = np.concatenate(
         [constant[:, None], rate[:, None], sines[..., :3], cosines[..., :3]], axis=1
     )
-    coefficients, axes, components = _frames(matrices, vectors)
+    parts = np.zeros_like(vectors)
+    coefficients, axes, components = _frames(matrices, vectors[:, : vectors.any() * vectors.shape[1]])
+    parts[:, : components.shape[1]] = components
     last = 2 + sines.shape[1]
     found: dict[str, Any] = {
         **rows,
         "coefficients": coefficients,
-        "torque_constant": components[:, 0],
-        "torque_rate": components[:, 1],
-        "sines": np.concatenate([components[:, 2:last], sines[..., 3:]], axis=2),
-        "cosines": np.concatenate([components[:, last:], cosines[..., 3:]], axis=2),
+        "torque_constant": parts[:, 0],
+        "torque_rate": parts[:, 1],
+        "sines": np.concatenate([parts[:, 2:last], sines[..., 3:]], axis=2),
+        "cosines": np.concatenate([parts[:, last:], cosines[..., 3:]], axis=2),
     }
     found = {name: np.ascontiguousarray(each) for name, each in found.items()}
     axes, turns = np.ascontiguousarray(axes), None

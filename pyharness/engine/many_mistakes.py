@@ -23,6 +23,8 @@ def reasons_of(
     states: Mapping[str, Any] | None, t_end: Any, method: str,
 ) -> dict[int, str] | None:  # fmt: skip
     """Return by index why bodies are refused; None if none is."""
+    if found.status.max(initial=0) == Statuses.COMPLETE:
+        return None
     status = found.status if found.status.ndim > 1 else found.status[:, None]
     refused = np.flatnonzero((status == Statuses.REFUSED).any(axis=1))[:_MOST_NAMED]
     if any(name.startswith(PARAMETER) for name in arrays):

@@ -46,6 +46,7 @@ from pyharness.model.values import Number, Numbers, boolean, checked_effort, fin
 
 # Kinds of scenes under torque laws: about principal axes, and with an inertia matrix.
 _LAWS = _PLAIN, _TILTED = -2, -1
+_NO_ARRAYS: dict[str, Any] = dict.fromkeys(("omega", "attitude"))
 _NO_DETAILS: dict[str, Any] = dict.fromkeys(("t_events", "y_events", "sensitivities"))
 
 
@@ -247,25 +248,11 @@ def _solve(
         kinds = [_kind_of(each, row) for row, each in enumerate(scene)]
         if len(set(kinds)) > 1 or any(each not in _LAWS for each in kinds):
             return _solve_groups(scene, kinds, t_end, times, step, out, **settings)
-    if times is None:
-        return _solve_laws(scene, t_end, arrays, out, step, **settings)
-    # A copy of each body for each time.
-    if isinstance(scene, Scene):
-        # Normalised twice, a quaternion may have another last bit.
-        copies = checked_copies(arrays, as_given=True)
-        n = count_bodies(copies)
-        arrays |= {
-            name: each if len(each) == 1 else np.repeat(each, len(times), axis=0)
-            for name, each in copies.items()
-        }
-    else:
-        n, scene = len(scene), [each for each in scene for _ in times]
-    found = _solve_laws(scene, np.tile(times, n), arrays, out, step, **settings)
-    return found.with_times(times)
+    return _solve_laws(scene, t_end, times, arrays, out, step, **settings)
 
 
 def _solve_laws(
-    scene: Scene | Sequence[Scene], t_end: Any, arrays: dict[str, Any],
+    scene: Scene | Sequence[Scene], t_end: Any, times: Array | None, arrays: dict[str, Any],
     out: "Ensemble | Array | None", step: Number | None, **settings: Any,
 ) -> Ensemble:  # fmt: skip
     own = {name: value for name, value in arrays.items() if value is not None}
@@ -290,8 +277,16 @@ def _solve_laws(
     if step is not None:
         step_size = finite("step", step)
     code, tolerance = _choose_kernel(method, settings["tolerance"])
-    own["t_end"] = t_end
-    found, omega0, times = solve_bodies(
+    if times is None:
+        own["t_end"] = t_end
+    else:  # a copy of each body for each time
+        # Normalised twice, a quaternion may have another last bit.
+        copies: Any = checked_copies({**_NO_ARRAYS, **own}, as_given=True)
+        n = count_bodies(copies)
+        own = {name: _repeated(each, len(times)) for name, each in copies.items()}
+        own["t_end"] = np.tile(times, n)
+        axes, turns = (each if each is None else _repeated(each, len(times)) for each in (axes, turns))
+    found, omega0, ends = solve_bodies(
         ready, own, (code, tolerance, step_size, checked_effort(settings["effort"])),
         method=method, is_rounded=axes is not None, threads=settings["threads"], out=out,
         with_estimates=settings["estimates"],
@@ -302,8 +297,14 @@ def _solve_laws(
             found.attitude[:] = turned_back(found.attitude, turns)
             if found.error is not None:
                 # The initial omega was rounded after the rotation to principal axes.
-                found.error[:] += ROUNDING * np.max(np.abs(omega0), axis=1) * np.abs(times)
+                found.error[:] += ROUNDING * np.max(np.abs(omega0), axis=1) * np.abs(ends)
+    if times is not None:
+        found = found.with_times(times)
     return found if found.leaves is None else replace(found, leaves=None)
+
+
+def _repeated(rows: Array, count: int) -> Array:
+    return rows if len(rows) == 1 else np.repeat(rows, count, axis=0)
 
 
 def _kind_of(scene: Scene, row: int) -> object:

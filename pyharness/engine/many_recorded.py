@@ -25,7 +25,7 @@ from pyharness.engine.many_scenes import (
 )
 from pyharness.engine.many_tape import Bodies, Equations, solve_tape
 from pyharness.engine.parameters import BatchBody, tape_of_bodies
-from pyharness.engine.recorded import packed_tape
+from pyharness.engine.recorded import listing, packed_tape
 from pyharness.engine.registry import check_prepared, check_torque
 from pyharness.engine.solve import solve
 from pyharness.engine.solver import Solver, prepare
@@ -45,6 +45,7 @@ from pyharness.model.principal import PrincipalScene
 from pyharness.model.progress import for_each_piece
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.state_torque import StateTorque
+from pyharness.model.tape import Tape, slots_of
 from pyharness.model.trajectory import Array
 
 _REST: Triple = (0.0, 0.0, 0.0)
@@ -257,5 +258,23 @@ def _equations(
     )
     address, leaves = leaves_of(tape) if compiled else (0, "interpreter")
     packed = packed_tape(tape, scene.step_size, tolerance, effort, address)
-    alone = packed if bound is tape else packed_tape(bound, scene.step_size, tolerance, effort)
+    alone = packed
+    if bound is not tape:
+        alone = packed_tape(bound, scene.step_size, tolerance, effort * _extra_work(bound))
     return Equations(packed, alone, data), leaves_of_many(packed, leaves)
+
+
+def _extra_work(bound: Tape) -> float:
+    """Return the size of equations with data, relative to those with the numbers in their place.
+
+    The work limit is lower for more slots.
+    """
+    constants: set[int] = set()
+    saved = 0
+    for slot, each in enumerate(bound.operations, bound.n_inputs):
+        known = [operand in constants for operand in slots_of(each)]
+        if each.table is None and all(known):
+            constants.add(slot)
+        saved += slot in constants or (each.kind == "product" and any(known))
+    n_slots = listing(bound).n_slots
+    return n_slots / (n_slots - saved)

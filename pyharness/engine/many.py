@@ -285,7 +285,9 @@ def _solve_laws(
         n = count_bodies(copies)
         own = {name: _repeated(each, len(times)) for name, each in copies.items()}
         own["t_end"] = np.tile(times, n)
-        axes, turns = (each if each is None else _repeated(each, len(times)) for each in (axes, turns))
+        axes, turns = (
+            each if each is None else _repeated(each, len(times)) for each in (axes, turns)
+        )
     found, omega0, ends = solve_bodies(
         ready, own, (code, tolerance, step_size, checked_effort(settings["effort"])),
         method=method, is_rounded=axes is not None, threads=settings["threads"], out=out,

@@ -8,13 +8,7 @@ from numpy.typing import NDArray
 
 from pyharness.engine.many_scenes import rows_of_scene, solve_bodies
 from pyharness.engine.many_tape import Bodies, Equations, solve_tape
-from pyharness.model.arrays import (
-    buffer_of,
-    check_rows,
-    row_of,
-    rows_of,
-    threads_of,
-)
+from pyharness.model.arrays import buffer_of, check_rows, row_of, rows_of, threads_of
 from pyharness.model.attitude import IDENTITY, rotated, scalar_first
 from pyharness.model.codes import Methods, Places, Statuses
 from pyharness.model.constant_body import uses_principal_axes

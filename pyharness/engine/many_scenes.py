@@ -65,7 +65,9 @@ def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Array, Ar
         [constant[:, None], rate[:, None], sines[..., :3], cosines[..., :3]], axis=1
     )
     parts = np.zeros_like(vectors)
-    coefficients, axes, components = _frames(matrices, vectors[:, : vectors.any() * vectors.shape[1]])
+    coefficients, axes, components = _frames(
+        matrices, vectors[:, : vectors.any() * vectors.shape[1]]
+    )
     parts[:, : components.shape[1]] = components
     last = 2 + sines.shape[1]
     found: dict[str, Any] = {

@@ -72,7 +72,8 @@ def solve_tape(
             attitude=np.empty((len(first), m, 4)), own=np.empty((states.shape[1], n, m)),
             estimates=np.empty((0 if found.estimates is None else n, m, 2)),
         )  # fmt: skip
-        assert result.attitude is not None and result.own is not None
+        assert result.attitude is not None
+        assert result.own is not None
         assert result.estimates is not None
         extension().tape_many(
             equations.packed, equations.alone.copy(), starts.T, np.asfortranarray(columns[rows]),
@@ -103,4 +104,3 @@ def _set_rows(found: Ensemble, result: Ensemble, piece: slice, rows: NDArray[np.
         if name == "estimates":
             values[~(values >= 0.0)] = np.nan
         array[piece, rows] = values
-

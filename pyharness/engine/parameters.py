@@ -140,7 +140,9 @@ def tape_of_bodies(
         for part in _list_summands(torque)
     ]
     total = sum(np.array(part[:3], dtype=object) for part in parts)
-    own_rates = [sum(each) for each in zip(*(part[3:] for part in parts if len(part) > 3), strict=True)]
+    own_rates = [
+        sum(each) for each in zip(*(part[3:] for part in parts if len(part) > 3), strict=True)
+    ]
     rates = list(_rates_of_batch(body, data, time, omega, total))
     if attitude:
         rates += quaternion_rates((omega[0], omega[1], omega[2]), q)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from pyharness.engine.plan import plan
+from pyharness.engine.problem import rows_trajectory
 from pyharness.engine.sensitivity import calm_until, closed_form_estimate, judge_ending
 from pyharness.engine.solver import Solver
 from pyharness.model.array_type import Array
@@ -17,12 +18,7 @@ from pyharness.model.attitude import IDENTITY
 from pyharness.model.constant_body import integrated, with_constant_body
 from pyharness.model.extension import COMPLETE
 from pyharness.model.inertia import principal_frame
-from pyharness.model.principal import (
-    PrincipalScene,
-    attitude_in_scene_axes,
-    in_scene_axes,
-    principal,
-)
+from pyharness.model.principal import PrincipalScene, in_scene_axes, principal
 from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Trajectory
@@ -66,7 +62,7 @@ class Problem:
         if self.axes is None:
             return found
         if isinstance(self.scene, PrincipalScene):
-            found = in_scene_axes(found, self.axes)
+            return in_scene_axes(found, self.axes)
         return found.changed(axes=self.axes.copy())
 
     def end(self, method: str, tolerance: float, effort: float) -> End:
@@ -76,41 +72,28 @@ class Problem:
         solver: Any = Solver(scene, chosen, tolerance, method, effort, self.with_attitude)
         kind = "closed" if chosen.closed_form else ""
         calm = calm_until(scene, tolerance) if scene.torque.is_zero else 0.0
-        known = Trajectory(
-            omega, omega, omega, None, 0, 0, moments=self.moments, tolerance=tolerance,
-            scene=self.given,
-        ).__dict__  # fmt: skip
-        turned = None
-        if self.axes is not None and isinstance(scene, PrincipalScene):
-            turned = self.axes.T
+        known = {"moments": self.moments, "tolerance": tolerance, "scene": self.given}
 
         def solved(time: float) -> Trajectory | None:
             self.check(time, time)
             state = solver(omega, time)
             number, steps, _, _, spent, *_ = solver._ending
-            content = known.copy()
-            content["time"] = content["recorded_time"] = np.array((time,))
-            content["steps"], content["evaluations"] = steps or 1, int(spent) if steps else 0
+            attitude = None
+            if self.with_attitude:
+                state, attitude = state[0], state[1][None]
+            found = rows_trajectory(
+                (time,), state[None], int(spent) if steps else 0, steps or 1, "complete",
+                attitude=attitude, **known,
+            )  # fmt: skip
             if kind and not steps and number == COMPLETE and abs(time) < calm:
-                del content["error"], content["growth"]
-                content["_estimates"] = partial(closed_form_estimate, scene, scene.omega, time)
+                estimates = partial(closed_form_estimate, scene, scene.omega, time)
+                found = found.estimated_later(estimates)
             else:
                 status, error, growth = judge_ending(scene, kind, tolerance, solver._ending)
                 if status != "complete":
                     return None
-                content["error"], content["growth"] = error, growth
-            rows, attitude = state if self.with_attitude else (state, None)
-            rows = rows[None]
-            if turned is not None:
-                rows = rows @ turned
-                if attitude is not None:
-                    attitude = attitude_in_scene_axes(attitude[None], turned.T)[0]
-            content["omega"] = rows
-            content["attitude"] = None if attitude is None else attitude[None]
-            content["axes"] = None if self.axes is None else self.axes.copy()
-            found = object.__new__(Trajectory)
-            found.__dict__.update(content)
-            return found
+                found = found.changed(error=error, growth=growth)
+            return self.in_axes_of_scene(found)
 
         return solved
 

@@ -94,7 +94,10 @@ def rows_trajectory(
 ) -> Trajectory:
     """Return a trajectory from omega (rad/s, shape (n, 3)) at `times` (s)."""
     time = np.array(times, dtype=float)
-    return Trajectory(time, time, omega, None, steps, evaluations, ended, **more)
+    return Trajectory.made(
+        time=time, recorded_time=time, omega=omega, velocity=None, steps=steps,
+        evaluations=evaluations, ended=ended, **more,
+    )  # fmt: skip
 
 
 def closed_form(scene: Scene) -> str | None:

@@ -1,6 +1,5 @@
 """Transformation of scenes to principal axes, and of results back."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields
 from fractions import Fraction
 from functools import cached_property
@@ -16,6 +15,9 @@ from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.model.values import triple
 from pyharness.model.waves import exact_law
+
+# By field, how it turns.
+_TURNED = {name: each.turns for name, each in ROWS.items() if each.turns}
 
 
 @dataclass(frozen=True)
@@ -106,17 +108,13 @@ def _fields(scene: Scene) -> dict[str, Any]:
 
 def in_scene_axes(found: Trajectory, axes: Array) -> Trajectory:
     """Return a trajectory transformed from principal `axes` (columns) to the body axes."""
-    turn: dict[str, Callable[[Array], Array]] = {
-        "": lambda each: each,
-        "vector": lambda each: each @ axes.T,
-        "quaternion": lambda each: attitude_in_scene_axes(each, axes),
-    }
-    turned: dict[str, Any] = {
-        name: turn[ROWS[name].turns](each)
-        for name, each in found.with_rows().items()
-        if name in ROWS
-    }
-    return found.changed(**turned)
+    turned: dict[str, Any] = {}
+    for name, kind in _TURNED.items():
+        each = getattr(found, name)
+        if each is not None:
+            is_vector = kind == "vector"
+            turned[name] = each @ axes.T if is_vector else _attitude_in_scene_axes(each, axes)
+    return found.changed(axes=axes.copy(), **turned)
 
 
 def states_in_scene_axes(states: Array, axes: Array, own: int) -> Array:
@@ -126,11 +124,11 @@ def states_in_scene_axes(states: Array, axes: Array, own: int) -> Array:
     """
     turned, rest = states[:, 3:own], states[:, own:]
     if own > 3:
-        turned = attitude_in_scene_axes(turned, axes)
+        turned = _attitude_in_scene_axes(turned, axes)
     return np.column_stack([states[:, :3] @ axes.T, turned, rest])
 
 
-def attitude_in_scene_axes(attitude: Array, axes: Array) -> Array:
+def _attitude_in_scene_axes(attitude: Array, axes: Array) -> Array:
     w, x, y, z = quaternion_of_axes(axes)
     return np.array(product(tuple(attitude.T), (w, -x, -y, -z))).T
 

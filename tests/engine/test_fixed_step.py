@@ -41,6 +41,7 @@ def _formula(method: str, scene: Scene) -> Callable[[float, Array, float], Array
             products = [k1[i - 2] * y[i - 1] + y[i - 2] * k1[i - 1] for i in range(3)]
             second = slope + np.array(scene.euler_coefficients) * products
             return np.asarray(y + h * k1 + h * h / 2 * second)
+        assert method == "rk4", f"write the formula of {method} here"
         k2 = f(t + h / 2, y + h / 2 * k1)
         k3 = f(t + h / 2, y + h / 2 * k2)
         k4 = f(t + h, y + h * k3)

@@ -129,3 +129,12 @@ def run_javascript(modules: Mapping[str, Path], body: str, **given: Any) -> Any:
     )  # fmt: skip
     assert done.returncode == 0, done.stderr[-500:]
     return json.loads(done.stdout)
+
+
+def with_fault(folder: Path, name: str, here: str, planted: str) -> Path:
+    """Return a copy of the web's folder, in which a passage of a file is replaced."""
+    web = Path(shutil.copytree(WEB, folder / "web"))
+    text = (web / name).read_text()
+    assert text.count(here) == 1
+    (web / name).write_text(text.replace(here, planted))
+    return web

@@ -1,24 +1,26 @@
-"""`python -m tests.campaigns.event_campaign COUNT SEED`: search for planted roots of functions.
+"""A campaign of functions with planted roots.
+
+The command is ``python -m tests.campaigns.event_campaign COUNT SEED [FIRST]``.
 
 Each function has known roots: simple and double ones, and corners at 0 without a change of sign.
 Some are at random times, some pairs within a step of the integrator, some at the ends of the
 integration or of its intervals. Most functions depend on time alone, some on an omega in closed
 form, and some are above 0.
-The command prints the numbers of planted, missed and invented roots, and the largest error of a
-time, relative to the last time. Exit status 1 if a root is missed or invented, if its direction is
-wrong, or if the error of a time exceeds LARGEST in addition to its rounding error.
+A missed or invented root is a fault, and so are a wrong direction, and an error of a time above
+LARGEST in addition to its rounding error.
 """
 
 import math
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from pyharness import Scene, solve
 from pyharness.model.array_type import Array
+from tests.campaigns import driver
 
 LARGEST = 1e-12
 _EPS = 2.0**-52
@@ -211,20 +213,7 @@ def _of_omega(end: float, rng: np.random.Generator) -> Planted:
     return replace(planted, scene=scene)
 
 
-@dataclass
-class Tally:
-    """The results of a campaign so far."""
-
-    roots: int = 0
-    missed: int = 0
-    invented: int = 0
-    wrong: int = 0
-    largest: float = 0.0
-    largest_alone: float = 0.0
-    examples: list[str] = field(default_factory=list)
-
-
-def run(kind: str, seed: int, tally: Tally) -> None:
+def search(kind: str, seed: int, tally: driver.Tally) -> None:
     """Search for the roots of one random function, and add the result to the tally."""
     given = planted(kind, np.random.default_rng(seed))
 
@@ -236,47 +225,27 @@ def run(kind: str, seed: int, tally: Tally) -> None:
     times, rises = found.t_events
     # A root at the start is no event.
     given = given.only(given.roots > 0.0)
-    tally.roots += len(given.roots)
-    tally.missed += max(0, len(given.roots) - len(times))
-    tally.invented += max(0, len(times) - len(given.roots))
+    tally.counts["roots"] += len(given.roots)
     what = f"{kind} {seed}: {given.roots.tolist()}, found {times.tolist()}"
     if len(times) != len(given.roots):
-        tally.examples.append(what)
+        tally.fault(f"{'missed' if len(times) < len(given.roots) else 'invented'} roots, {what}")
         return
     expected = given.roots[(given.roots < given.end) & (given.changes == 1)]
-    got = rises[rises < given.end]
+    if np.count_nonzero(rises < given.end) != len(expected):
+        tally.fault(f"{what}, rises {rises.tolist()}")
     error = np.abs(times - given.roots)
     excess = np.max(np.maximum(error - given.rounding, 0.0) / given.end, initial=0.0)
-    tally.largest = max(tally.largest, float(excess))
+    tally.judge("error beyond rounding", float(excess), LARGEST, f", {what}")
     is_exact = given.rounding < 1e-13 * given.end
-    alone = float(np.max(error[is_exact], initial=0.0) / given.end)
-    tally.largest_alone = max(tally.largest_alone, alone)
-    if excess > LARGEST or len(got) != len(expected):
-        tally.wrong += 1
-        tally.examples.append(f"{what}, error {excess:.1e}, rises {rises.tolist()}")
+    alone = np.max(error[is_exact], initial=0.0) / given.end
+    tally.record("error where rounding explains at most 1e-13", float(alone))
 
 
-def campaign(count: int, seed: int, kinds: Sequence[str] = KINDS) -> Tally:
-    """Return the results for random functions with at least `count` roots in all."""
-    tally = Tally()
-    number = seed * 1_000_000
-    while tally.roots < count:
-        run(kinds[number % len(kinds)], number, tally)
-        number += 1
-    return tally
-
-
-def main(arguments: list[str]) -> int:
-    tally = campaign(int(arguments[0]), int(arguments[1]))
-    print(
-        f"{tally.roots} roots planted, {tally.missed} missed, {tally.invented} invented, "
-        f"{tally.wrong} functions with a wrong time or direction; largest error of a time "
-        f"{tally.largest:.1e} of the last time beyond rounding, and {tally.largest_alone:.1e} "
-        "where rounding explains at most 1e-13"
-    )
-    print(*tally.examples[:10], sep="\n")
-    return 1 if tally.missed or tally.invented or tally.wrong else 0
+def try_function(tally: driver.Tally, kinds: Sequence[str] = KINDS) -> None:
+    """Search for the roots of a random function of one of the kinds, by the number."""
+    number = int(tally.seed) * 1_000_000 + tally.number
+    search(kinds[number % len(kinds)], number, tally)
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(driver.run("tests.campaigns.event_campaign", try_function, sys.argv[1:]))

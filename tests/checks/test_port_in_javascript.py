@@ -2,7 +2,6 @@
 
 import math
 import random
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw, Wave
 from pyharness.thesis.linear_solver import leqt1f
-from tests.ports import WEB, node, run_javascript, sample
+from tests.ports import WEB, node, run_javascript, sample, with_fault
 
 
 @pytest.mark.campaign
@@ -88,11 +87,7 @@ FAULTS = {
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_in_the_javascript_is_found(fault: str, tmp_path: Path) -> None:
     name, here, planted, shows = FAULTS[fault]
-    web = Path(shutil.copytree(WEB, tmp_path / "web"))
-    path = web / "programs" / name
-    text = path.read_text()
-    assert text.count(here) == 1
-    path.write_text(text.replace(here, planted))
+    web = with_fault(tmp_path, f"programs/{name}", here, planted)
     failed = [check for check in port(node(web), sample()) if not check.passed]
     assert all("step" in check.note or "stop" in check.note for check in failed)
     assert {check.id.split("/")[1] for check in failed} == set(shows.split())

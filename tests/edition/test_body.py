@@ -5,7 +5,6 @@ import json
 import math
 import random
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -24,7 +23,7 @@ from tests.attitude_errors import largest_error
 from tests.checks.scenes.free_motions import KINDS, Motion, draw
 from tests.conftest import Printed
 from tests.exact_attitude import exact
-from tests.ports import WEB, run_javascript
+from tests.ports import WEB, run_javascript, with_fault
 
 BODY = WEB / "body"
 IDENTITY = [1.0, 0.0, 0.0, 0.0]
@@ -128,11 +127,7 @@ FAULTS = {
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_in_the_closed_form_is_found(fault: str, tmp_path: Path) -> None:
     name, here, planted = FAULTS[fault]
-    web = Path(shutil.copytree(WEB, tmp_path / "web"))
-    path = web / "body" / name
-    text = path.read_text()
-    assert text.count(here) == 1
-    path.write_text(text.replace(here, planted))
+    web = with_fault(tmp_path, f"body/{name}", here, planted)
     assert max(_differences(_drawn(40), web / "body")) > AGREEMENT
 
 

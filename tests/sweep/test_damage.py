@@ -31,23 +31,9 @@ CHUNK = "status/c/0/0"
 OTHER = "status/c/1/0"
 
 
-@pytest.fixture(scope="module")
-def intact(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder with a sweep file, `sweep.toml`, and its store, `store`: 8 chunks."""
-    folder = tmp_path_factory.mktemp("intact")
-    run_sweep(read_sweep(written(folder, SWEEP)), str(folder / "store"))
-    return folder
-
-
 @pytest.fixture
 def sweep(intact: Path) -> Sweep:
     return read_sweep(intact / "sweep.toml")
-
-
-@pytest.fixture
-def store(intact: Path, tmp_path: Path) -> Path:
-    """Return a copy of the store."""
-    return Path(shutil.copytree(intact / "store", tmp_path / "store"))
 
 
 def flip(path: Path, at: int = -1, bit: int = 0) -> None:

@@ -13,7 +13,7 @@ from pyharness.model.errors import InputError
 from pyharness.sweep import run
 from pyharness.sweep.sweep import Sweep
 from pyharness.sweep.sweep_file import read_sweep
-from tests.sweep.sweeps import TILT, axis, files, run_sweep, text, written
+from tests.sweep.sweeps import TILT, axis, files, run_sweep, text
 
 SWEEP = text(
     TILT.replace("6", "4"), axis("t_end", [1.0, 2.0]), top='chunk = 1\nreductions = ["end"]'
@@ -22,23 +22,10 @@ FOLDERS = ("end", "end/c", "end/c/0", "end/c/0/1", "checksums", "checksums/c", "
            "component", "component/c", "tilt/c")  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def intact(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder with a sweep file, `sweep.toml`, and its store, `store`: 8 chunks."""
-    folder = tmp_path_factory.mktemp("intact")
-    run_sweep(read_sweep(written(folder, SWEEP)), str(folder / "store"))
-    return folder
-
-
 @pytest.fixture
 def sweep(intact: Path, monkeypatch: pytest.MonkeyPatch) -> Sweep:
     monkeypatch.setattr(run, "forecast", lambda *given: 0.0)
     return read_sweep(intact / "sweep.toml")
-
-
-@pytest.fixture
-def store(intact: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(intact / "store", tmp_path / "store"))
 
 
 def moved(path: Path, outside: Path) -> Path:

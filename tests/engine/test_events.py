@@ -4,23 +4,22 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pyharness import InputError, Scene, TorqueLaw, case_scene, load, solve
-from pyharness.engine import event_fits
+from pyharness import Scene, TorqueLaw, case_scene, solve
 from pyharness.engine.event_fits import Solution
 from pyharness.engine.event_functions import event_functions
-from pyharness.events import Event, crosses, extremum, flip, rest, tilt
+from pyharness.events import Event, crosses, extremum, flip, rest
 from pyharness.model.dense_output import Pieces
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.torques import damping, opaque, pulses
 from tests.campaigns import driver
 from tests.campaigns.event_campaign import BODY, CORNERS, KINDS, planted, search, try_function
+from tests.engine.entry_points import ball
 
 METHODS = ("auto", "closed-form", "taylor", "dop853", "gauss-4", "reference")
 
@@ -125,27 +124,66 @@ def test_long_motion_misses_no_event() -> None:
     np.testing.assert_allclose(np.diff(times), np.diff(times).mean(), rtol=1e-10)
 
 
-def test_double_root_counts_once_and_for_direction_0_alone() -> None:
-    def touch(t: Any, omega: Any) -> Any:
-        return (t - 3.0) ** 2
+@pytest.mark.parametrize("direction", [-1, 1])
+def test_double_root_counts_for_direction_0_alone(direction: int) -> None:
+    touch = with_attributes(lambda t, omega: (t - 3.0) ** 2, False, direction)
+    assert times_of(BODY, 9.0, touch) == []
 
-    assert times_of(BODY, 9.0, touch) == pytest.approx([3.0], rel=1e-13)
-    for direction in (-1, 1):
-        assert (
-            times_of(BODY, 9.0, with_attributes(lambda *x: touch(*x[:2]), False, direction)) == []
+
+_AT_REST = Scene("", (0.0, 0.0, 0.0), moments=(1.0, 2.0, 3.0))
+_LATER = replace(_AT_REST, torque=pulses([5.0], [1.0], [(0.0, 1e-10, 0.0)]))
+_WAVE = TorqueLaw((0.0, 0.0, 0.0), cosines=[((0.2, 0.0, 0.0), 1.0)])
+_DAMPED = ball(damping(1.0), (3.0, 0.0, 4.0))
+_OPAQUE = ball(opaque(lambda t, omega: [-w for w in omega]), (3.0, 0.0, 4.0))
+# omega1 = (t - 1)**2 reaches 0 without a change of sign.
+_TOUCHING = ball(TorqueLaw((-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)), (1.0, 0.0, 0.0))
+# Scene, end (s), event, its times, and their error.
+ROOTS: dict[str, tuple[Scene, float, Any, list[float], Any]] = {
+    "double": (BODY, 9.0, lambda t, w: (t - 3.0) ** 2, [3.0], {"rel": 1e-13}),
+    "near": (
+        BODY, 9.0, lambda t, w: (t - 2.0) * (t - 2.000001), [2.0, 2.000001], {"rel": 5e-10}
+    ),
+    **{
+        f"of multiplicity {n}": (BODY, 9.0, lambda t, w, n=n: (t - 3.25) ** n, [3.25], {"rel": 0.1})
+        for n in (3, 4, 5)
+    },
+    "corners": (BODY, 9.0, lambda t, w: abs(t - 3.1) - 0.5, [2.6, 3.6], {"rel": 1e-6}),
+    "jump": (BODY, 9.0, lambda t, w: 1.0 if t > math.pi else -1.0, [math.pi], {"rel": 1e-12}),
+    "sudden": (BODY, 9.0, lambda t, w: np.tanh(1e6 * (t - 4.4)), [4.4], {"rel": 1e-12}),
+    "kinks of an interval of zeros": (
+        Scene("ball", (0.3, 0.2, 0.9), moments=(2.0, 2.0, 2.0), torque=_WAVE), 7.0,
+        lambda t, w: min(float(w[0]) - 0.33, 0.0), [math.asin(0.3), 2.0 * math.pi + math.asin(0.3)],
+        {"abs": 1e-7},
+    ),
+    "small value at rest": (_AT_REST, 1e3, lambda t, w: w[1] - 3e-11, [], {}),
+    "small value after a push": (_LATER, 1e3, lambda t, w: w[1] - 3e-11, [5.6], {}),
+    **{
+        f"narrow dead zone, {rate:g}": (
+            ball(TorqueLaw((rate, 0.0, 0.0)), (-0.1, 0.0, 0.0)), 80.0 * rate,
+            lambda t, w: np.where(np.abs(w[0]) < 0.0015, 0.0, w[0]), [math.copysign(1.97, rate)],
+            {"abs": 1e-9},
         )
+        for rate in (-0.05, 0.05)
+    },
+    "rest": (_DAMPED, 3.0, rest(0.5), [math.log(10.0)], {}),
+    "rest, rising": (_DAMPED, 3.0, rest(0.5, direction=1), [], {}),
+    "rest under an opaque torque": (_OPAQUE, 3.0, rest(0.5), [math.log(10.0)], {"rel": 1e-8}),
+    "no flip of a case": (case_scene(1), 2.0, flip(1), [], {}),
+    "touched by omega": (_TOUCHING, 3.0, crosses(1, 0.0), [1.0], {}),
+    "no flip where omega touches 0": (_TOUCHING, 3.0, flip(1), [], {}),
+}  # fmt: skip
 
 
-@pytest.mark.parametrize(("function", "expected", "rel"), [
-    (lambda t: (t - 2.0) * (t - 2.000001), [2.0, 2.000001], 5e-10),
-    *((lambda t, n=n: (t - 3.25) ** n, [3.25], 0.1) for n in (3, 4, 5)),
-    (lambda t: abs(t - 3.1) - 0.5, [2.6, 3.6], 1e-6),
-    (lambda t: 1.0 if t > math.pi else -1.0, [math.pi], 1e-12),
-    (lambda t: np.tanh(1e6 * (t - 4.4)), [4.4], 1e-12),
-])  # fmt: skip
-def test_near_multiple_and_sudden_roots(function: Any, expected: list[float], rel: float) -> None:
-    found = times_of(BODY, 9.0, lambda t, omega: function(t))
-    assert found == pytest.approx(expected, rel=rel)
+@pytest.mark.parametrize("name", ROOTS)
+def test_roots_are_where_they_are_known(name: str) -> None:
+    scene, end, event, expected, limit = ROOTS[name]
+    method = "dop853" if scene is _OPAQUE else "auto"
+    times = [1.0, end] if "small value" in name else end
+    assert times_of(scene, times, event, method=method) == pytest.approx(expected, **limit)
+
+
+def test_flips_are_where_omega_is_0() -> None:
+    assert times_of(BODY, 30.0, flip(2)) == pytest.approx(times_of(BODY, 30.0, second))
 
 
 def test_value_of_an_extremum_of_omega_counts_once() -> None:
@@ -159,8 +197,7 @@ def test_value_of_an_extremum_of_omega_counts_once() -> None:
 @pytest.mark.sampled
 @pytest.mark.parametrize("end", [1.0, 2.7, -2.0, 40.0])
 def test_roots_of_odd_multiplicity_are_as_exact_as_the_sign(end: float) -> None:
-    # Omega is the time.
-    scene = Scene("", (0.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=TorqueLaw((1.0, 0.0, 0.0)))
+    scene = ball(TorqueLaw((1.0, 0.0, 0.0)), (0.0, 0.0, 0.0))  # omega is the time
     root = math.copysign(1.0, end)
     for direction in (0, root, -root):
         events = [
@@ -170,90 +207,6 @@ def test_roots_of_odd_multiplicity_are_as_exact_as_the_sign(end: float) -> None:
         expected = [root] if root * direction >= 0.0 else []
         for found in events_of(solve(scene, end, events=events))[0]:
             assert found.tolist() == pytest.approx(expected, abs=2.0**-52 * abs(end))
-
-
-def test_function_that_is_0_everywhere_has_no_event() -> None:
-    spin = Scene("spin", omega=(0.0, 0.0, 2.0), moments=(1.0, 1.0, 3.0))
-    for times in (9.0, -9.0, [-9.0, 9.0]):
-        for event in (crosses(1), crosses(3, 2.0), crosses(1, direction=1), flip(1)):
-            assert times_of(spin, times, event) == []
-
-
-def test_a_kink_within_a_step_ends_an_interval_of_zeros() -> None:
-
-    law = TorqueLaw((0.0, 0.0, 0.0), cosines=[((0.2, 0.0, 0.0), 1.0)])
-    scene = Scene("ball", (0.3, 0.2, 0.9), moments=(2.0, 2.0, 2.0), torque=law)
-    found: Any = solve(scene, [7.0], events=lambda t, omega: min(float(omega[0]) - 0.33, 0.0))
-    wanted = [math.asin(0.3), 2.0 * math.pi + math.asin(0.3)]
-    assert found.t_events[0] == pytest.approx(wanted, abs=1e-7)
-
-
-@pytest.mark.campaign
-@pytest.mark.parametrize("direction", [-1, 0, 1])
-def test_an_interval_of_zeros_is_one_event_wherever_the_integration_ends(direction: int) -> None:
-    # Omega is 0, rises from 1 s to 1 in 2 s, and falls from 3 s to 0 in 4 s.
-    push = pulses([1.0, 3.0], [1.0, 1.0], [(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)])
-    scene = Scene("", (0.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=push)
-    dead = 0.25  # of a function that is 0 about 0.5
-    knots: list[tuple[Callable[..., Any], list[tuple[float, int]]]] = [
-        (lambda t, omega: omega[0], [(4.0, -1)]),
-        (lambda t, omega: omega[0] - 1.0, [(2.0, 1)]),
-        (lambda t, omega: (omega[0] - 1.0) ** 3, [(2.0, 1)]),
-        (lambda t, omega: np.sign(np.round(2.0 * omega[0] - 1.0)), [(1.25, 1), (3.25, -1)]),
-        (
-            lambda t, omega: (
-                np.maximum(omega[0] - 0.5 - dead, 0.0) + np.minimum(omega[0] - 0.5 + dead, 0.0)
-            ),
-            [(1.25, 1), (3.25, -1)],
-        ),
-    ]
-    functions = [with_attributes(function, False, direction) for function, _ in knots]
-    for end in (0.5, 1.5, 2.0, 2.2, 2.9, 3.6, 4.0, 4.4, 9.0):
-        found = events_of(solve(scene, end, events=functions))[0]
-        for times, (_, events) in zip(found, knots, strict=True):
-            expected = [t for t, change in events if t <= end and direction in (0, change)]
-            assert times.tolist() == pytest.approx(expected, abs=1e-12), end
-
-
-def test_a_body_at_rest_has_no_error_that_hides_a_small_value() -> None:
-    rest = Scene("", (0.0, 0.0, 0.0), moments=(1.0, 2.0, 3.0))
-    assert times_of(rest, [1.0, 1e3], lambda t, w: w[1] - 3e-11) == []
-    pushed = replace(rest, torque=pulses([5.0], [1.0], [(0.0, 1e-10, 0.0)]))
-    assert times_of(pushed, [1.0, 1e3], lambda t, w: w[1] - 3e-11) == pytest.approx([5.6])
-
-
-def test_periodic_roots_after_an_interval_of_zeros_are_found() -> None:
-    ball = Scene("", (0.0, 0.0, 1.0), moments=(1.0, 1.0, 1.0))
-    found = times_of(ball, 6.5, lambda t, w: np.where(t < 1.0, 0.0, np.sin(np.pi * t)))
-    assert found == pytest.approx([2.0, 3.0, 4.0, 5.0, 6.0], abs=1e-12)
-    nutation = Scene("", (0.3, 2.0, 0.1), moments=(1.0, 2.0, 3.0))
-    flips = times_of(nutation, 40.0, flip(2))
-    jumps = times_of(nutation, 40.0, lambda t, w: np.where(t < flips[0], -1.0, w[1]))
-    assert jumps == pytest.approx(flips, abs=1e-9)
-    assert len(flips) == 7
-
-
-@pytest.mark.parametrize(
-    ("rate", "tolerance"), [(0.03, 1e-9), (0.03, 1e-12), (3e-3, 1e-12), (3e-4, 1e-9), (3e-5, 1e-9)]
-)
-@pytest.mark.parametrize("part", [0.2, 0.47])
-def test_a_slow_state_has_one_event_in_a_dead_zone(
-    rate: float, tolerance: float, part: float
-) -> None:
-    """Omega is 5 + rate (t - 1) exactly; its rounding errors are many spacings of time."""
-    torque = TorqueLaw((rate, 0.0, 0.0))
-    ball = Scene("", (5.0 - rate, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=torque)
-    dead = part * rate
-
-    def relay(t: Any, omega: Any) -> Any:
-        return np.sign(omega[0] - 5.0) * (np.abs(omega[0] - 5.0) > dead)
-
-    def spring(t: Any, omega: Any) -> Any:
-        return np.maximum(omega[0] - 5.0 - dead, 0.0) - np.maximum(5.0 - dead - omega[0], 0.0)
-
-    for event in (relay, spring):
-        found = times_of(ball, 3.0, event, tolerance=tolerance)
-        assert found == pytest.approx([1.0 - part], abs=20.0 * tolerance / rate)
 
 
 @pytest.mark.parametrize("power", [3, 5, 7])
@@ -275,214 +228,10 @@ def test_roots_of_a_power_are_those_of_its_base(power: int) -> None:
         assert high == pytest.approx(simple, abs=1e-3)
 
 
-@pytest.mark.parametrize("rate", [-0.05, 0.05])
-def test_a_narrow_dead_zone_is_an_event_at_its_near_end(rate: float) -> None:
-    torque = TorqueLaw((rate, 0.0, 0.0))
-    ball = Scene("", (-0.1, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=torque)
-    found = times_of(ball, 80.0 * rate, lambda t, w: np.where(np.abs(w[0]) < 0.0015, 0.0, w[0]))
-    assert found == pytest.approx([math.copysign(1.97, rate)], abs=1e-9)
-
-
-@pytest.mark.campaign
-def test_an_interval_of_zeros_is_shorter_than_a_polynomial() -> None:
-    omega = (-0.0038222917854609335, -5.41380616570781, -0.00823360074077185)
-    moments = (2.4789830764403558, 1.8552293637606434, 2.991871515393006)
-    high, low = -5.413800119471218, -5.4138030326532895
-
-    def spring(t: Any, w: Any) -> Any:
-        return np.maximum(w[1] - high, 0.0) - np.maximum(low - w[1], 0.0)
-
-    scene = Scene("", omega, moments=moments)
-    # From a run at the tolerance 1e-13.
-    for end, wanted in ((-1.0, [-0.61028]), (1.5, [0.2478, 1.0683])):
-        found = times_of(scene, end, spring, tolerance=1e-6)
-        assert found == pytest.approx(wanted, abs=1e-4)
-
-
 @pytest.mark.parametrize("end", [20.0, 33.0, 40.0, 60.0, 100.0, 300.0])
 def test_a_body_that_comes_to_rest_slowly_has_no_events(end: float) -> None:
-    ball = Scene("", (1.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=damping(1.0))
-    events = [crosses(1), flip(1), extremum(1)]
-    assert [x.tolist() for x in events_of(solve(ball, end, events=events))[0]] == [[], [], []]
-
-
-def scipy_events(scene: Scene, end: float, event: Callable[..., Any]) -> list[float]:
-    found = solve_ivp(lambda t, w: -w, (0.0, end), scene.omega, events=event, rtol=1e-10)
-    return list(found.t_events[0])
-
-
-@pytest.mark.parametrize("end", [2.0, -2.0])
-@pytest.mark.parametrize("direction", [-1, 0, 1])
-@pytest.mark.parametrize("sign", [-1.0, 1.0])
-@pytest.mark.parametrize("root", [0.0, 0.6, 1.0])
-def test_direction_and_ends_as_in_scipy(
-    end: float, direction: int, sign: float, root: float
-) -> None:
-    scene = Scene("ball", (1.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=damping(1.0))
-    event = with_attributes(lambda t, omega: sign * (t - root * end), False, direction)
-    # SciPy also reports a root at the start.
-    expected = scipy_events(scene, end, event) if root else []
-    assert times_of(scene, end, event) == pytest.approx(expected, abs=1e-12)
-
-
-@pytest.mark.parametrize("terminal", [True, 1, 2, 3])
-def test_terminal_event_removes_what_follows(terminal: bool | int) -> None:
-    event = with_attributes(lambda t, omega: omega[1], terminal)
-    rows = np.linspace(0.0, 30.0, 301)
-    found: Any = solve(BODY, rows, events=[event, lambda t, omega: t - 4.0, crosses(1)],
-                  dense_output=True)  # fmt: skip
-    times, states = events_of(found)
-    expected = times_of(BODY, 30.0, second)[: int(terminal)]
-    assert times[0].tolist() == pytest.approx(expected)
-    assert states[0].shape == (int(terminal), 3)
-    assert (times[1].size == 1) == (expected[-1] > 4.0)
-    assert times[2].max(initial=0.0) <= expected[-1]
-    assert found.time.tolist() == rows[rows <= expected[-1]].tolist()
-    assert found.omega.shape == (len(found.time), 3)
-    assert (found.status, found.success, found.ended) == (1, True, "event")
-    assert "terminal event" in found.message
-    assert not found.has_all_rows
-    assert found.sol.t_max == times[0][-1]
-
-
-def test_terminal_event_that_does_not_occur() -> None:
-    found = solve(BODY, [0.0, 1.0], events=crosses(1, BODY.omega[0], terminal=True))
-    assert (events_of(found)[0][0].size, found.time.tolist()) == (0, [0.0, 1.0])
-    found = solve(BODY, [10.0, 30.0], events=with_attributes(lambda t, omega: omega[1], 9))
-    assert (found.status, found.ended, len(found.time)) == (0, "complete", 2)
-
-
-def test_each_side_of_0_has_its_terminal_event() -> None:
-    rows = [-20.0, -10.0, -1.0, 0.0, 1.0, 10.0, 20.0]
-    found = solve(BODY, rows, events=with_attributes(lambda t, omega: omega[1], True))
-    (times,), (states,) = events_of(found)
-    before, after = times_of(BODY, -20.0, second)[0], times_of(BODY, 20.0, second)[0]
-    assert times.tolist() == pytest.approx([before, after])
-    assert states.shape == (2, 3)
-    assert found.time.tolist() == [t for t in rows if before <= t <= after]
-    descending = solve(BODY, rows[::-1], events=with_attributes(lambda t, omega: omega[1], True))
-    assert events_of(descending)[0][0].tolist() == times[::-1].tolist()
-    np.testing.assert_array_equal(events_of(descending)[1][0], states[::-1])
-
-
-@pytest.mark.parametrize(("method", "trials"), [("auto", [200.0, 800.0]), ("lsoda", [10.0, 40.0])])
-def test_motion_is_computed_little_beyond_a_terminal_event(
-    method: str, trials: list[float]
-) -> None:
-    damped = Scene("at 1 rad/s", (0.3, 0.2, 1.0), moments=(1.0, 2.0, 2.5), torque=damping(1e-3))
-    late = 0.4 * trials[-1]
-    found = solve(damped, [1.0, 2.0 * late, 1e9], method, 1e-7,
-                  events=with_attributes(lambda t, omega: t - late, True))  # fmt: skip
-    spent = [solve(damped, end, method, 1e-7, events=second).evaluations for end in trials]
-    assert events_of(found)[0][0].tolist() == pytest.approx([late], abs=0.0, rel=1e-14)
-    assert (found.ended, found.time.tolist()) == ("event", [1.0])
-    assert found.evaluations == pytest.approx(sum(spent), rel=0.02)
-
-
-def test_terminal_events_at_the_end_of_a_trial_and_on_both_sides() -> None:
-    body = Scene("at 1 rad/s", (0.3, 0.2, 1.0), moments=(1.0, 2.0, 2.5))
-    for direction in (-1, 0, 1):
-        event = with_attributes(lambda t, omega: abs(t) - 200.0, True, direction)
-        for sign in (1.0, -1.0):
-            rows = [sign * t for t in (100.0, 200.0, 300.0, 900.0)]
-            for times in (rows, [rows[0], *rows[2:]]):
-                found = solve(body, times, events=event)
-                occurs = direction >= 0
-                assert events_of(found)[0][0].tolist() == ([200.0 * sign] if occurs else [])
-                kept = [t for t in times if abs(t) <= 200.0] if occurs else times
-                assert found.time.tolist() == kept
-    event = with_attributes(lambda t, omega: (t + 300.0) * (t - 30.0), True)
-    found = solve(body, [-1e7, -40.0, 40.0, 1e7], events=event)
-    assert events_of(found)[0][0].tolist() == pytest.approx([-300.0, 30.0])
-    assert found.time.tolist() == [-40.0]
-
-
-def test_a_torque_without_a_value_at_time_0_is_told_as_without_events() -> None:
-    event = crosses(2, 0.0, terminal=True)
-    inverse = Scene(
-        "1/t", (1.0, 0.2, 0.1), moments=(1, 2, 2.5), torque=lambda t, w: (1.0 / t, 0, 0)
-    )
-    assert solve(inverse, 1e4, events=event).ended == "overflow"
-    with pytest.raises(InputError, match="the function raised ZeroDivisionError at t = 0 s"):
-        solve(replace(inverse, torque=opaque(lambda t, w: (1.0 / t, 0, 0))), 1e4, events=event)
-
-
-def test_functions_that_change_too_fast_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Many jumps are no reason for a refusal, because only those near 0 are searched."""
-    monkeypatch.setattr(event_fits, "_MOST_PIECES", 1000)
-    for fast in (lambda t, omega: np.sin(2e5 * t), lambda t, omega: np.sin(1e5 * t**4)):
-        with pytest.raises(InputError, match="event 1: the function changes too fast for 1000"):
-            solve(BODY, 2.0, events=fast)
-    # Nowhere smooth, and far from 0.
-    assert times_of(BODY, 0.1, lambda t, omega: 1.0 + 1e-6 * np.sin(1e9 * t)) == []
-    smooth = times_of(BODY, 9.0, lambda t, omega: omega[1] - 0.10005)
-    stairs = times_of(BODY, 9.0, lambda t, omega: np.round(omega[1], 4) - 0.10005)
-    assert len(smooth) == 1
-    assert stairs == pytest.approx(smooth, abs=1e-9)
-
-
-def test_no_events_without_a_request() -> None:
-    found = solve(BODY, 1.0)
-    assert found.t_events is None
-    assert found.y_events is None
-    times, states = events_of(solve(BODY, 0.0, events=second))
-    assert (times[0].shape, states[0].shape) == ((0,), (0, 3))
-    _, states = events_of(solve(BODY, 0.0, attitude=True, events=second))
-    assert states[0].shape == (0, 7)
-    assert events_of(solve(BODY, 1.0, events=[])) == ([], [])
-
-
-def test_very_slow_body() -> None:
-    slow = replace(BODY, omega=(1e-201, 2e-200, 1e-201))
-    found = np.array(times_of(slow, 3e201, second))
-    np.testing.assert_allclose(found, 1e200 * np.array(times_of(BODY, 30.0, second)), rtol=1e-11)
-
-
-def test_attitude_is_an_argument_and_in_the_states() -> None:
-    ball = Scene("ball", (0.5, 0.0, 0.0), moments=(1.0, 1.0, 1.0))
-    (times,), (states,) = events_of(
-        solve(ball, 20.0, attitude=True, events=lambda t, omega, attitude: attitude[0])
-    )
-    assert times == pytest.approx(2.0 * math.pi * np.array([1.0, 3.0]))
-    assert states.shape == (2, 7)
-    np.testing.assert_allclose(np.abs(states[:, 4]), 1.0)
-
-
-@pytest.mark.parametrize("axis", [1, 2, 3])
-def test_tilt_is_the_angle_of_the_rotation_matrix(axis: int) -> None:
-    toward, angle = (1.0, -2.0, 0.5), 1.2
-    event = tilt(axis, toward, angle)
-    (times,), (states,) = events_of(solve(BODY, 30.0, attitude=True, events=event))
-    assert len(times) > 3
-    q0, q = states[:, 3], states[:, 4:]
-    unit = np.eye(3)[axis - 1]
-    turned = unit + 2.0 * np.cross(q, np.cross(q, unit) + q0[:, None] * unit)
-    np.testing.assert_allclose(turned @ toward / np.linalg.norm(toward), math.cos(angle), atol=1e-9)
-    assert str(tilt(axis, toward, 0.0)).startswith(f"Event(name='tilt({axis}, ")
-
-
-def test_extrema_are_those_of_the_rows() -> None:
-    grid = np.linspace(0.0, 30.0, 30001)
-    rows = solve(BODY, grid).omega[:, 1]
-    for direction, sign in ((-1, 1.0), (1, -1.0)):
-        inner = sign * rows[1:-1]
-        tops = grid[1:-1][(inner > sign * rows[:-2]) & (inner > sign * rows[2:])]
-        found = times_of(BODY, 30.0, extremum(2, direction=direction))
-        assert found == pytest.approx(tops.tolist(), abs=2e-3)
-        assert len(found) >= 2
-
-
-def test_rest_and_flip() -> None:
-    ball = Scene("ball", (3.0, 0.0, 4.0), moments=(1.0, 1.0, 1.0), torque=damping(1.0))
-    assert times_of(ball, 3.0, rest(0.5)) == pytest.approx([math.log(10.0)])
-    assert times_of(ball, 3.0, rest(0.5, direction=1)) == []
-    assert times_of(BODY, 30.0, flip(2)) == pytest.approx(times_of(BODY, 30.0, second))
-    assert times_of(case_scene(1), 2.0, flip(1)) == []
-    # omega1 = (t - 1)**2 reaches 0 without a change of sign.
-    law = TorqueLaw((-2.0, 0.0, 0.0), (2.0, 0.0, 0.0))
-    touching = Scene("touching", (1.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=law)
-    assert times_of(touching, 3.0, crosses(1, 0.0)) == pytest.approx([1.0])
-    assert times_of(touching, 3.0, flip(1)) == []
+    found = solve(ball(damping(1.0), (1, 0, 0)), end, events=[crosses(1), flip(1), extremum(1)])
+    assert [x.tolist() for x in events_of(found)[0]] == [[], [], []]
 
 
 @pytest.mark.parametrize("shape", [(), (1,), (1, 1)])
@@ -491,14 +240,6 @@ def test_a_function_may_return_an_array_of_one_number(shape: tuple[int, ...]) ->
         return np.full(shape, float(omega[1]))
 
     assert times_of(BODY, 9.0, of_one) == pytest.approx(times_of(BODY, 9.0, flip(2)))
-
-
-@pytest.mark.parametrize("end", [0.005, -0.005])
-def test_events_are_in_the_order_of_integration(end: float) -> None:
-    fast = Scene("fast", (1.0, 4e4, 1.0), moments=(1.0, 2.0, 3.0))
-    found: Any = solve(fast, end, events=flip(1))
-    assert len(found.t_events[0]) > 3
-    assert (np.diff(np.abs(found.t_events[0])) > 0.0).all()
 
 
 def test_function_of_one_number_alone() -> None:
@@ -516,13 +257,9 @@ def test_function_of_one_number_alone() -> None:
 
 
 def test_a_function_that_mixes_the_times_of_an_array_is_called_for_each() -> None:
-    def largest_so_far(t: Any, omega: Any) -> Any:
-        # A number for one time, and for an array of times the largest of all.
-        return np.max(omega[1]) - 0.5
-
-    assert times_of(BODY, 9.0, largest_so_far) == pytest.approx(
-        times_of(BODY, 9.0, crosses(2, 0.5))
-    )
+    # A number for one time, and for an array of times the largest of all.
+    found = times_of(BODY, 9.0, lambda t, omega: np.max(omega[1]) - 0.5)
+    assert found == pytest.approx(times_of(BODY, 9.0, crosses(2, 0.5)))
 
 
 def test_few_calls_with_arrays() -> None:
@@ -538,20 +275,18 @@ def test_few_calls_with_arrays() -> None:
 
 
 def test_few_calls_of_a_function_that_is_recorded() -> None:
-    calls = 0
+    calls: list[Any] = []
 
     def turned(t: Any, omega: Any, q: Any) -> Any:
+        calls.append(t)
         # The norm of an array of vectors would be one number.
-        nonlocal calls
-        calls += 1
         return np.linalg.norm(q[1:]) - 0.5
 
     found = times_of(BODY, 30.0, turned, attitude=True)
-    assert calls < 60
+    assert len(calls) < 60
     assert len(found) > 4
-    assert found == pytest.approx(
-        times_of(BODY, 30.0, lambda t, omega, q: 0.75 - q[0] ** 2, attitude=True)
-    )
+    same = times_of(BODY, 30.0, lambda t, omega, q: 0.75 - q[0] ** 2, attitude=True)
+    assert found == pytest.approx(same)
 
 
 def test_an_event_of_the_user_is_that_of_its_function() -> None:
@@ -559,45 +294,6 @@ def test_an_event_of_the_user_is_that_of_its_function() -> None:
     expected = times_of(BODY, 30.0, second)
     assert len(expected) > 2
     assert times_of(BODY, 30.0, own) == expected
-
-
-def test_opaque_torque_has_events() -> None:
-    torque = opaque(lambda t, omega: [-w for w in omega])
-    ball = Scene("ball", (3.0, 0.0, 4.0), moments=(1.0, 1.0, 1.0), torque=torque)
-    found = times_of(ball, 3.0, rest(0.5), method="dop853")
-    assert found == pytest.approx([math.log(10.0)], rel=1e-8)
-
-
-def test_overflow_after_the_last_row() -> None:
-    runaway = Scene("", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))
-    found = solve(runaway, [0.5, 0.9, 2.0], events=crosses(1, 4.0))
-    assert (found.ended, found.status) == ("overflow", -1)
-    assert events_of(found)[0][0].tolist() == pytest.approx([0.75])
-    ended = solve(runaway, [0.5, 0.9, 2.0], events=crosses(1, 4.0, terminal=True))
-    assert (ended.ended, ended.time.tolist()) == ("event", [0.5])
-
-
-def test_ending_is_saved(tmp_path: Path) -> None:
-    found = solve(BODY, [1.0, 9.0], events=crosses(2, 0.0, terminal=True))
-    found.save(tmp_path / "found.npz")
-    assert load(tmp_path / "found.npz").status == 1
-
-
-@pytest.mark.sampled
-@pytest.mark.parametrize("tolerance", [1e-12, 1e-9, 1e-6])
-@pytest.mark.parametrize("rate", [1e-3, 1e-4, 1e-6])
-def test_jump_where_omega_is_slow_is_one_event(rate: float, tolerance: float) -> None:
-    """Rounding errors of omega lead there and back across the jump, for as long as they count."""
-
-    def jump(t: float, w: Array) -> float:
-        return 1.0 if w[0] > 1.0 + 3.3 * rate else -1.0
-
-    jump.terminal = 2  # type: ignore[attr-defined]
-    torque = TorqueLaw((rate, 0.0, 0.0))
-    scene = Scene("ball", (1.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=torque)
-    found: Any = solve(scene, [5.0, 10.0], tolerance=tolerance, events=jump)
-    assert found.ended == "complete"
-    assert found.t_events[0] == pytest.approx([3.3], abs=1e-8)
 
 
 @pytest.mark.campaign
@@ -625,19 +321,3 @@ def test_noise_is_the_error_of_omega_and_of_the_time(sign: float) -> None:
         noise = Solution(sol.states, sol, tolerance).noise(g, times)
         due = own * 3.0 * 2.0 + 2.0**-50 * 2.0 * abs(times)
         assert noise == pytest.approx(due, rel=0.01, abs=0.0)
-
-
-def test_small_values_beside_a_jump_are_no_roots() -> None:
-    def remainder(t: Any, w: Any) -> Any:
-        return w[0] % (0.5 + w[1]) + 1e-3
-
-    def late(t: Any, w: Any) -> Any:
-        u = w[0] % (0.5 + w[1])
-        return np.where(u > 0.4, -1.0, 0.01 * u - 1e-3)
-
-    ball = Scene("ball", (0.05, 0.02, 0.1), moments=(1.0,) * 3, torque=TorqueLaw((1.0, 0.3, 0.0)))
-    found: Any = solve(ball, 4.0, events=[remainder, late])
-    assert not found.t_events[0].size
-    # With w1 = 0.05 + t and w2 = 0.02 + 0.3 t.
-    roots = [0.05, 0.35, 0.57 / 0.7, 0.87 / 0.7, 1.09 / 0.4, 1.39 / 0.4]
-    assert found.t_events[1] == pytest.approx(roots, abs=1e-9)

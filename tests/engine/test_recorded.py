@@ -2,7 +2,6 @@
 
 import math
 import pickle
-import threading
 from dataclasses import replace
 from random import Random
 from typing import Any
@@ -18,6 +17,7 @@ from pyharness.engine.recorded import kernel_tape, system_of
 from pyharness.engine.taylor import taylor
 from pyharness.model.codes import Operations
 from pyharness.model.state_torque import recorded, replayed
+from tests.engine.test_prepared_threads import in_threads
 
 MOMENTS = (1.0, 2.0, 2.5)
 SPHERE = (2.0, 2.0, 2.0)
@@ -327,17 +327,9 @@ def test_solutions_in_threads_share_no_memory() -> None:
         scene_of(lambda t, w: [0.1 * np.sin(t), -0.1 * w[1], 0.05 * w[0] * w[1]]),
     ]
     wanted = [solve(each, 60.0) for each in scenes]
-    wrong: list[int] = []
 
-    def work(begin: int) -> None:
-        for k in range(begin, begin + 40):
-            found, alone = solve(scenes[k % 2], 60.0), wanted[k % 2]
-            if (found.error, found.growth) != (alone.error, alone.growth):
-                wrong.append(k)
+    def work(begin: int) -> int:
+        found = [(solve(scenes[k % 2], 60.0), wanted[k % 2]) for k in range(begin, begin + 40)]
+        return sum((a.error, a.growth) != (b.error, b.growth) for a, b in found)
 
-    threads = [threading.Thread(target=work, args=(k,)) for k in range(4)]
-    for each in threads:
-        each.start()
-    for each in threads:
-        each.join()
-    assert not wrong
+    assert in_threads(4, work) == [0] * 4

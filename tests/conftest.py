@@ -2,7 +2,8 @@
 
 import os
 import shlex
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import pytest
 
@@ -22,6 +23,7 @@ pytest_plugins = ["tests.tiers"]
 Printed = Callable[[str], str]
 Patch = pytest.MonkeyPatch
 Capture = pytest.CaptureFixture[str]
+ResultOf = Callable[..., Any]
 # Tests that share the built site and the judgements of all claims, half a minute of work; and
 # tests that take long, at the end of which no process should wait for another.
 _FIRST = (
@@ -41,14 +43,20 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 @pytest.fixture
-def printed(capsys: pytest.CaptureFixture[str]) -> Printed:
-    """Return a function that runs a command line, expects exit status 0, and returns the output."""
+def result_of(capsys: Capture) -> ResultOf:
+    """Return a function that runs a command, checks its exit status, and returns the output."""
 
-    def run(command: str) -> str:
-        assert main(shlex.split(command)) == 0
-        return capsys.readouterr().out
+    def run(words: Sequence[str], status: int = 0) -> Any:
+        assert main(words) == status
+        return capsys.readouterr()
 
     return run
+
+
+@pytest.fixture
+def printed(result_of: ResultOf) -> Printed:
+    """Return a function that runs a command line, expects exit status 0, and returns the output."""
+    return lambda command: str(result_of(shlex.split(command)).out)
 
 
 @pytest.fixture(scope="session")

@@ -9,10 +9,9 @@ from pathlib import Path
 import pytest
 
 from pyharness.checks.plants.port_plants import PLANTS
-from pyharness.cli.main import main
 from pyharness.thesis.cells import all_cells
 from tests.checks.test_port_in_c import FAULTS, SOURCE
-from tests.conftest import Capture
+from tests.conftest import ResultOf
 from tests.ports import ROOT, TEMPLATE, compiled_port, engine
 
 GUIDE = (ROOT / "docs/how-to/ports.md").read_text()
@@ -51,13 +50,12 @@ def test_the_guide_has_commands_of_each_part() -> None:
 
 
 @pytest.mark.external
-def test_the_failure_in_the_guide_is_that_of_today(tmp_path: Path, capsys: Capture) -> None:
+def test_the_failure_in_the_guide_is_that_of_today(tmp_path: Path, result_of: ResultOf) -> None:
     """The port in C computes 2 k2 + 2 k3, as the guide describes it."""
     (fault,) = [each for each in FAULTS if "both middle rates separately" in each["what"]]
     command = compiled_port(tmp_path, SOURCE.replace(fault["from"], fault["to"]))
     cell = "runge-kutta/case-2/original"
-    assert main(["verify", "--port", command, "--cell", cell]) == 1
-    printed = capsys.readouterr().out
+    printed = result_of(["verify", "--port", command, "--cell", cell], 1).out
     (table,) = re.findall(rf"```\n(port/{cell}, step .*?)```", GUIDE, re.DOTALL)
     assert table in printed
     (failure,) = re.findall(rf"```\nFAILED port/{cell} (.*?)\n  python", GUIDE, re.DOTALL)

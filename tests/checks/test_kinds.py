@@ -42,6 +42,7 @@ from pyharness.model.trajectory import Trajectory
 from pyharness.thesis import compiled
 from pyharness.thesis.cells import all_cells, cell_name
 from pyharness.thesis.programs import PROGRAM_REGISTRY, Program
+from tests.conftest import ResultOf
 
 Capture = pytest.CaptureFixture[str]
 BY_NAME = {plant.name: plant for plant in PLANTS}
@@ -88,25 +89,21 @@ def test_json_is_as_agreed(capsys: Capture) -> None:
 
 
 @pytest.mark.campaign
-def test_failure_is_told_with_the_command_that_repeats_it(capsys: Capture) -> None:
+def test_failure_is_told_with_the_command_that_repeats_it(result_of: ResultOf) -> None:
     only = ["verify", "--only", "cells/two-term/case-3"]
     with ONE_BIT.planted(ONE_BIT.size):
-        assert main([*only, "--format", "junit"]) == 1
-        suite = ElementTree.fromstring(capsys.readouterr().out.encode())
+        suite = ElementTree.fromstring(result_of([*only, "--format", "junit"], 1).out.encode())
         assert suite.get("tests") == suite.get("failures") == "32"
         failure = suite.findtext("testcase/failure") or ""
         assert "python -m pyharness verify --only cells/" in failure
-        assert main(only) == 1
-        lines = capsys.readouterr().out.splitlines()
+        lines = result_of(only, 1).out.splitlines()
         assert all(len(line) <= 100 for line in lines if not line.startswith("  python"))
         place = next(i for i, line in enumerate(lines) if line.startswith("FAILED"))
         assert "omega" in lines[place]
         command = shlex.split(lines[place + 1])
         assert command[:3] == ["python", "-m", "pyharness"]
-        assert main(command[3:]) == 1
-        assert lines[place] in capsys.readouterr().out
-    assert main(command[3:]) == 0
-    assert "1 check, all well" in capsys.readouterr().out
+        assert lines[place] in result_of(command[3:], 1).out
+    assert "1 check, all well" in result_of(command[3:]).out
 
 
 @pytest.mark.parametrize("listed", [0, 1])

@@ -23,6 +23,7 @@ from pyharness.cli.main import main
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene_file import case_numbers
 from pyharness.thesis.cells import all_cells
+from tests.conftest import ResultOf
 from tests.ports import ROOT, SAMPLE, WEB, answering, documented, node, sample
 
 Capture = pytest.CaptureFixture[str]
@@ -160,10 +161,9 @@ def test_a_port_that_does_not_answer(script: str, words: str, tmp_path: Path) ->
 
 
 @pytest.mark.campaign
-def test_too_few_rows_and_a_crash_later_end_the_checks(tmp_path: Path, capsys: Capture) -> None:
+def test_too_few_rows_and_a_crash_later_end_the_checks(tmp_path: Path, result_of: ResultOf) -> None:
     command = answering(tmp_path / "port.py", "del rows[50:]")
-    assert main(["verify", "--port", command, "--program", "two-term", "--case", "2"]) == 1
-    captured = capsys.readouterr()
+    captured = result_of(["verify", "--port", command, "--program", "two-term", "--case", "2"], 1)
     assert captured.err == ""
     told = " ".join(captured.out.split())
     assert "50 rows of a run of 100 steps that ended 'complete'" in told
@@ -180,10 +180,9 @@ def test_a_command_that_is_not_there_is_a_line_and_exit_1(command: str, capsys: 
 
 
 @pytest.mark.parametrize("more", [[], ["--self-test"]])
-def test_an_integrator_is_sent_to_its_option(more: list[str], capsys: Capture) -> None:
+def test_an_integrator_is_sent_to_its_option(more: list[str], result_of: ResultOf) -> None:
     command = shlex.join([sys.executable, str(ROOT / "docs/how-to/integrator/rk4.py")])
-    assert main(["verify", "--port", command, *more]) == 2
-    assert "--integrator" in capsys.readouterr().err
+    assert "--integrator" in result_of(["verify", "--port", command, *more], 2).err
 
 
 def _gone(pid: int) -> bool:

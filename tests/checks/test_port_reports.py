@@ -18,7 +18,7 @@ from pyharness.checks.port_protocol import VARIABLES
 from pyharness.cli.main import main
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.scene_file import case_numbers
-from tests.conftest import Capture, Patch
+from tests.conftest import Capture, Patch, ResultOf
 from tests.json_reference import schema_of
 from tests.ports import answering, documented_command, scene_port
 
@@ -34,7 +34,7 @@ def _json(capsys: Capture, *words: str, status: int = 0) -> Any:
 
 
 def test_every_variable_of_the_first_different_step_is_reported(
-    tmp_path: Path, capsys: Capture
+    tmp_path: Path, capsys: Capture, result_of: ResultOf
 ) -> None:
     command = answering(tmp_path / "port.py", BIT)
     (check,) = _json(capsys, command, "--cell", CELL, status=1)["checks"]
@@ -49,8 +49,7 @@ def test_every_variable_of_the_first_different_step_is_reported(
     assert {name: each["ulps"] for name, each in values.items() if each["ulps"]} == {"U2": 1.0}
     theirs, ours = (float.fromhex(values["U2"][whose]) for whose in ("theirs", "ours"))
     assert theirs == math.nextafter(ours, math.inf)
-    assert main(words[3:]) == 1
-    printed = capsys.readouterr().out
+    printed = result_of(words[3:], 1).out
     assert "step 7, U2" in " ".join(printed.split())
     assert f"port/{CELL}, step 7:\nvariable  unit   ours" in printed
     (line,) = [each.split() for each in printed.splitlines() if each.startswith("U2 ")]
@@ -205,9 +204,8 @@ def test_a_wrong_end_alone_is_told_without_a_false_comparison(
 
 
 @pytest.mark.campaign
-def test_every_kind_of_check_has_a_page(capsys: Capture) -> None:
-    assert main(["verify", "--only", "orders", "--format", "markdown"]) == 0
-    page = capsys.readouterr().out
+def test_every_kind_of_check_has_a_page(result_of: ResultOf) -> None:
+    page = result_of(["verify", "--only", "orders", "--format", "markdown"]).out
     assert page.startswith("## verify: ")
     assert _tables(page) == [["checks", "orders"]]
 

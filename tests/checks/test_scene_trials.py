@@ -16,11 +16,10 @@ from pyharness.checks import scene_trials as room
 from pyharness.checks.check import Check
 from pyharness.checks.scenes.random_scenes import random_scene
 from pyharness.checks.stress import SCENE_TRIALS, TRIALS, stress
-from pyharness.cli.main import main
 from pyharness.engine.registry import METHODS
 from pyharness.engine.rotated import restarted_at
 from pyharness.model.scene_file import scene_text
-from tests.conftest import Capture, Patch
+from tests.conftest import Patch, ResultOf
 
 DAMPED = "docs/damped.toml"
 MOMENTS = (4.0, 3.0, 2.0)
@@ -118,15 +117,13 @@ def test_wrong_order_and_other_bits_are_seen() -> None:
 
 
 @pytest.mark.campaign
-def test_verb_stress_with_a_scene(capsys: Capture, tmp_path: Path, monkeypatch: Patch) -> None:
+def test_verb_stress_with_a_scene(result_of: ResultOf, tmp_path: Path, monkeypatch: Patch) -> None:
     path = tmp_path / "a scene.toml"
     path.write_text(scene_text(SCENES["expressions"]()))
     monkeypatch.chdir(tmp_path)
     command = f"stress --scene '{path}' --only length/auto"
-    assert main(shlex.split(f"{command} --format json")) == 0
-    checks = json.loads(capsys.readouterr().out)["checks"]
+    checks = json.loads(result_of(shlex.split(f"{command} --format json")).out)["checks"]
     assert checks
     again = shlex.split(checks[0]["replay"])[3:]
-    assert main([*again, "--format", "json"]) == 0
-    assert json.loads(capsys.readouterr().out)["checks"] == checks[:1]
+    assert json.loads(result_of([*again, "--format", "json"]).out)["checks"] == checks[:1]
     assert [each.name for each in tmp_path.iterdir()] == ["a scene.toml"]

@@ -18,6 +18,7 @@ from pyharness.model import pipes
 from pyharness.model.errors import printable
 from pyharness.model.output_files import check_writable
 from pyharness.model.pipes import read_input
+from tests.conftest import ResultOf
 from tests.refused import refused
 from tests.sweep.sweeps import axis
 
@@ -110,15 +111,13 @@ def test_draws_that_take_long_are_forecast(capsys: Capture) -> None:
     assert told == "pyharness: 100000 random draws take about 58 min and 200 MB of memory\n"
 
 
-def test_name_of_a_sweep_does_not_steer_the_terminal(capsys: Capture) -> None:
+def test_name_of_a_sweep_does_not_steer_the_terminal(result_of: ResultOf) -> None:
     name = 'name = "\\u001b[31mred\\u202e"\n'
     Path("sweep.toml").write_text(name + SWEEP)
     for form in ("table", "csv", "markdown", "json"):
-        assert main(["sweep", "sweep.toml", "--out", "store", "--format", form]) == 0
-        told = capsys.readouterr()
+        told = result_of(["sweep", "sweep.toml", "--out", "store", "--format", form])
         assert (told.out + told.err).replace("\n", "").isprintable()
-    assert main(["sweep", "sweep.toml", "--out", "store"]) == 0
-    assert "\\x1b[31mred\\u202e" in capsys.readouterr().out
+    assert "\\x1b[31mred\\u202e" in result_of(["sweep", "sweep.toml", "--out", "store"]).out
 
 
 @pytest.mark.parametrize("form", ["table", "json", "junit"])
@@ -168,12 +167,11 @@ def test_file_that_can_not_be_written_is_refused_before_any_work(
     assert [(path.name, path.read_text()) for path in Path().iterdir()] == [("there", "old")]
 
 
-def test_large_quaternion_is_normalised(capsys: Capture) -> None:
+def test_large_quaternion_is_normalised(result_of: ResultOf) -> None:
     numbers = "[1e308, 1e308, -1e308, 1e308]"
     Path("scene.toml").write_text(BODY + f"attitude = {numbers}\n[run]\nsteps = 2\n")
     command = "run --method auto --scene scene.toml --attitude quaternion"
-    assert main(command.split()) == 0
-    told = capsys.readouterr()
+    told = result_of(command.split())
     assert "attitude(0) = (0.5, 0.5, -0.5, 0.5)" in told.out
     told_so = "the attitude has a norm above 1.79769e+308; it was normalised"
     assert told.err == f"pyharness: warning: {told_so}\n"
@@ -187,14 +185,12 @@ def test_message_is_one_line_that_a_terminal_can_show() -> None:
     assert printable("ü 日本") == "ü 日本"
 
 
-def test_pipe_without_another_end_is_not_waited_for(tmp_path: Path, capsys: Capture) -> None:
+def test_pipe_without_another_end_is_not_waited_for(tmp_path: Path, result_of: ResultOf) -> None:
     """Regression test: a scene from an unwritten pipe, and a result to an unread one, hung."""
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
-    assert main(["plan", "--scene", str(pipe)]) == 2
-    assert "nothing came within 0.05 s" in capsys.readouterr().err
-    assert main(["doctor", "--out", str(pipe)]) == 2
-    assert "no one read it within 0.05 s" in capsys.readouterr().err
+    assert "nothing came within 0.05 s" in result_of(["plan", "--scene", str(pipe)], 2).err
+    assert "no one read it within 0.05 s" in result_of(["doctor", "--out", str(pipe)], 2).err
     assert [path.name for path in tmp_path.iterdir()] == ["pipe"]
 
 

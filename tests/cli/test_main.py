@@ -26,7 +26,7 @@ from pyharness.model.errors import NotBuiltError
 from pyharness.model.listing import Listing
 from pyharness.model.report import short
 from pyharness.thesis import compiled
-from tests.conftest import Capture, Patch, Printed
+from tests.conftest import Capture, Patch, Printed, ResultOf
 from tests.instruction_sets import CHOSEN, LEVELS, levels_here
 
 
@@ -247,9 +247,8 @@ def test_run_says(options: str, words: str, printed: Printed) -> None:
     ("deck --program runge-kutta --terms 5", "terms: not for this program; allowed: with"),
     ("deck --program four-term --terms 4", "terms is 4; allowed: 3 or 5"),
 ])  # fmt: skip
-def test_an_unsuitable_value_is_refused(line: str, told: str, capsys: Capture) -> None:
-    assert main(line.split()) == 2
-    assert told in capsys.readouterr().err
+def test_an_unsuitable_value_is_refused(line: str, told: str, result_of: ResultOf) -> None:
+    assert told in result_of(line.split(), 2).err
 
 
 def test_options_reach_the_program(printed: Printed) -> None:
@@ -266,12 +265,11 @@ def test_options_reach_the_program(printed: Printed) -> None:
     assert record("--reading do-variable")["listing"]["readings"] == ["do-variable"]
 
 
-def test_scene_file_on_the_command_line(capsys: Capture, tmp_path: Path) -> None:
+def test_scene_file_on_the_command_line(result_of: ResultOf, tmp_path: Path) -> None:
     path = tmp_path / "brick.toml"
     for largest, words in ((3, ""), (200, "no rigid body has these moments")):
         path.write_text(f"[body]\nmoments=[{largest},2,1]\n[initial]\nomega=[0.1,1,0.2]\n")
-        assert main(["plan", "--scene", str(path)]) == 0
-        captured = capsys.readouterr()
+        captured = result_of(["plan", "--scene", str(path)])
         assert captured.out.startswith("brick\n")
         assert words in captured.err
         assert bool(words) == bool(captured.err)
@@ -294,10 +292,9 @@ def test_pipe_is_written_to_and_not_replaced(printed: Printed, tmp_path: Path) -
     assert pipe.is_fifo()
 
 
-def test_unexpected_difference_is_exit_code_1(capsys: Capture, monkeypatch: Patch) -> None:
+def test_unexpected_difference_is_exit_code_1(result_of: ResultOf, monkeypatch: Patch) -> None:
     monkeypatch.setattr("pyharness.checks.compare.comparison.differences", lambda *_: ["omega"])
-    assert main(["compare", "--case", "3", "--program", "two-term"]) == 1
-    shown = capsys.readouterr().out
+    shown = result_of(["compare", "--case", "3", "--program", "two-term"], 1).out
     assert "UNEXPECTED: two-term original: Fortran and twin differ in omega" in shown
 
 
@@ -353,11 +350,10 @@ def test_doctor_prints_what_a_bug_report_needs(printed: Printed, monkeypatch: Pa
 
 
 def test_doctor_fails_if_the_arithmetic_is_not_as_written(
-    capsys: Capture, monkeypatch: Patch
+    result_of: ResultOf, monkeypatch: Patch
 ) -> None:
     monkeypatch.setattr("pyharness._kernels.arithmetic_faults", lambda numbers: (1, 0))
-    assert main(["doctor"]) == 1
-    assert "arithmetic        results may be wrong: built with" in capsys.readouterr().out
+    assert "arithmetic        results may be wrong: built with" in result_of(["doctor"], 1).out
 
 
 @pytest.mark.skipif(

@@ -23,7 +23,7 @@ from pyharness.cli.options import warn
 from pyharness.cli.output import write_folder
 from pyharness.model import output_files
 from pyharness.model.output_files import write_files
-from tests.conftest import Capture, Patch
+from tests.conftest import Patch, ResultOf
 
 RUN = ["run", "--case", "3", "--program", "two-term", "--format", "csv"]
 
@@ -216,13 +216,12 @@ def test_the_root_of_all_folders_is_refused() -> None:
         output.check_tree("/", "edition.json", "--out")
 
 
-def test_a_link_that_leads_nowhere_is_refused(capsys: Capture, tmp_path: Path) -> None:
+def test_a_link_that_leads_nowhere_is_refused(result_of: ResultOf, tmp_path: Path) -> None:
     (tmp_path / "lost").symlink_to(tmp_path / "no folder" / "file")
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
     (tmp_path / "folder").symlink_to(tmp_path)
     for name in ("lost", "loop", "folder"):
-        assert main([*RUN, "--out", str(tmp_path / name)]) == 2
-        assert name in capsys.readouterr().err
+        assert name in result_of([*RUN, "--out", str(tmp_path / name)], 2).err
 
 
 IMPOSSIBLE = "[body]\nmoments=[200,10,20]\n[initial]\nomega=[0.1,1,0.2]\n"

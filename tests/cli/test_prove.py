@@ -10,7 +10,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from pyharness.cli.main import main
-from tests.conftest import Capture, Patch, Printed
+from tests.conftest import Capture, Patch, Printed, ResultOf
 from tests.json_reference import schema_of
 from tests.truth.test_certificate import SCENES, genuine
 
@@ -90,7 +90,7 @@ def test_certificate_and_closed_form_agree(printed: Printed) -> None:
             assert away <= Fraction(one["radius"]) + Fraction(other["radius"])
 
 
-def test_falsified_certificate_has_exit_status_1(capsys: Capture) -> None:
+def test_falsified_certificate_has_exit_status_1(capsys: Capture, result_of: ResultOf) -> None:
     record = json.loads(json.dumps(genuine(next(iter(SCENES)))))
     Path("good.json").write_text(json.dumps(record))
     record["steps"][1][3][0] += 1
@@ -105,20 +105,18 @@ def test_falsified_certificate_has_exit_status_1(capsys: Capture) -> None:
         for each in found:
             assert each["proved"] == (each["file"] == "good.json")
             assert bool(each["reason"]) != each["proved"]
-    assert main(["prove", "--check", "bad.json"]) == 1
-    shown = capsys.readouterr().out
+    shown = result_of(["prove", "--check", "bad.json"], 1).out
     assert "not proved" in shown
     assert "step 2" in shown
 
 
 @pytest.mark.parametrize("content", [None, b"", b"a = 1\n", b"{}", b"\xff\xfe{\0}\0"])
-def test_file_that_is_no_certificate_is_refused(content: bytes | None, capsys: Capture) -> None:
+def test_file_that_is_no_certificate_is_refused(content: bytes | None, result_of: ResultOf) -> None:
     """Regression test: the exit status was 1, as for a certificate that does not hold."""
     if content is not None:
         Path("x.json").write_bytes(content)
     for name in ("x.json", str(Path.cwd())):
-        assert main(["prove", "--check", name]) == 2
-        told = capsys.readouterr()
+        told = result_of(["prove", "--check", name], 2)
         assert told.out == ""
         assert told.err.startswith(f"pyharness: --check '{name}': ")
         assert told.err.count("\n") == 1

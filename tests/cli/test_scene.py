@@ -12,12 +12,11 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from pyharness import InputError, case_scene, read_scene
-from pyharness.cli.main import main
 from pyharness.engine.scene_reader import SCENE_TABLES as TABLES
 from pyharness.engine.scene_reader import scene_of
 from pyharness.engine.term_file import KINDS
 from pyharness.model.facts import facts_folder
-from tests.conftest import Capture, Printed
+from tests.conftest import Printed, ResultOf
 
 ROOT = Path(__file__).parent.parent.parent
 SCHEMA = json.loads((facts_folder() / "scene.schema.json").read_text())
@@ -46,7 +45,7 @@ def test_a_new_scene_file_is_read(tmp_path: Path, printed: Printed) -> None:
     assert read_scene(path).omega == case_scene(3).omega
 
 
-def test_check_describes_a_scene(tmp_path: Path, printed: Printed, capsys: Capture) -> None:
+def test_check_describes_a_scene(tmp_path: Path, printed: Printed, result_of: ResultOf) -> None:
     found = printed(f"scene check {ROOT}/docs/satellite.toml")
     assert "gravity gradient + wheels + damping" in found
     assert max(map(len, found.splitlines())) <= 100
@@ -56,8 +55,7 @@ def test_check_describes_a_scene(tmp_path: Path, printed: Printed, capsys: Captu
     path.write_text(
         "body.moments = [1, 2, 3]\ninitial = { omega = [1, 2, 3], attitude = [2, 0, 0, 0] }\n"
     )
-    assert main(["scene", "check", str(path)]) == 0
-    assert "the attitude has the norm 2" in capsys.readouterr().err
+    assert "the attitude has the norm 2" in result_of(["scene", "check", str(path)]).err
 
 
 def test_the_schema_is_printed_and_is_one(printed: Printed) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from pyharness.cli.main import main
 from pyharness.cli.verbs import sweep as verb
-from tests.conftest import Capture, Patch, Printed
+from tests.conftest import Capture, Patch, Printed, ResultOf
 from tests.sweep.claims import CLAIMS
 from tests.sweep.sweeps import PROGRAM, SQUARE, TILT, text, written
 
@@ -19,14 +19,12 @@ def _beside(tmp_path: Path, monkeypatch: Patch) -> None:
     written(tmp_path, text(TILT, SQUARE, top='reductions = ["end", "status", "growth"]'))
 
 
-def test_report_says_what_was_found_and_the_estimate_came_before(capsys: Capture) -> None:
-    assert main(["sweep", "sweep.toml", "--out", "store"]) == 0
-    captured = capsys.readouterr()
+def test_report_says_what_was_found_and_the_estimate_came_before(result_of: ResultOf) -> None:
+    captured = result_of(["sweep", "sweep.toml", "--out", "store"])
     assert captured.err.startswith("pyharness: 30 scenes in 1 chunks: about ")
     for words in ("growth", "complete", "body.square.1", "30 scenes"):
         assert words in captured.out
-    assert main(["sweep", "sweep.toml", "--out", "store"]) == 0
-    again = capsys.readouterr()
+    again = result_of(["sweep", "sweep.toml", "--out", "store"])
     assert again.err == ""
     assert "all 1 chunks were there" in again.out
 

@@ -17,7 +17,6 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 
-from pyharness.cli.main import main
 from pyharness.edition.citation import CRATE, KEPT, MANIFEST, PACKAGE_MARK
 from pyharness.edition.data_package import data_package, outcomes_table
 from pyharness.edition.decks import TITLES
@@ -35,7 +34,7 @@ from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.thesis.programs import WORD_NAMES
 from pyharness.views.render import render
-from tests.conftest import Printed
+from tests.conftest import Printed, ResultOf
 from tests.json_reference import schema_of
 from tests.test_packaging import ROOT
 
@@ -294,22 +293,20 @@ def _replace(monkeypatch: pytest.MonkeyPatch, made: Callable[..., Any]) -> None:
 
 
 def test_the_command_writes_the_package(
-    package: Package, tmp_path: Path, capsys: pytest.CaptureFixture[str],
+    package: Package, tmp_path: Path, result_of: ResultOf,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     _replace(monkeypatch, lambda progress: package)
     folder = tmp_path / "package"
     for _ in range(2):  # an earlier package is replaced
-        assert main(["edition", "--data", str(folder)]) == 0
-        told = capsys.readouterr().out
+        told = result_of(["edition", "--data", str(folder)]).out
         assert directory_identifier(package) in told
         assert f"sha256sum -c {MANIFEST}" in told
         files = [each for each in folder.rglob("*") if each.is_file()]
         assert {each.relative_to(folder).as_posix(): each.read_bytes() for each in files} == package
         assert [each.name for each in tmp_path.iterdir()] == ["package"]
     (folder / "notes.txt").write_text("mine")
-    assert main(["edition", "--data", str(folder)]) == 2
-    assert "'notes.txt'" in capsys.readouterr().err
+    assert "'notes.txt'" in result_of(["edition", "--data", str(folder)], 2).err
     assert (folder / "notes.txt").read_text() == "mine"
 
 
@@ -400,10 +397,9 @@ def test_tables_of_the_article_follow_from_the_package(package: Package, tmp_pat
 
 @pytest.mark.parametrize("name", ["edition.json", "manifest-sha256.txt", "thesis.txt"])
 def test_a_folder_that_is_no_package_is_refused_before_any_work(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, name: str
+    tmp_path: Path, result_of: ResultOf, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     _replace(monkeypatch, lambda progress: pytest.fail("worked"))
     (tmp_path / name).write_text(json.dumps({"schema": 1, "files": {}}))
-    assert main(["edition", "--data", str(tmp_path)]) == 2
-    assert f"'{name}'" in capsys.readouterr().err
+    assert f"'{name}'" in result_of(["edition", "--data", str(tmp_path)], 2).err
     assert [each.name for each in tmp_path.iterdir()] == [name]

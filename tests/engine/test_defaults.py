@@ -10,7 +10,6 @@ import pytest
 from pyharness import InputError, Scene, TorqueLaw, compare_programs, prepare, solve, solve_many
 from pyharness.checks.compare.batch import Solver
 from pyharness.checks.scenes.random_scenes import draw
-from pyharness.cli.main import main
 from pyharness.engine.plan import plan
 from pyharness.engine.registry import (
     METHODS,
@@ -20,7 +19,7 @@ from pyharness.engine.registry import (
     requested_tolerance,
 )
 from pyharness.model.listing import Listing
-from tests.conftest import Printed
+from tests.conftest import Printed, ResultOf
 
 # Even numbers are possible bodies with a torque of any kind, which turn a few radians a second.
 _NUMBERS = (0, 2, 4, 6, 8)
@@ -101,10 +100,9 @@ def test_plan_is_of_the_default(printed: Printed) -> None:
     assert printed("plan --case 5") == printed("plan --case 5 --tolerance 1e-12")
 
 
-def test_help_names_the_default(capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_names_the_default(result_of: ResultOf) -> None:
     for verb in ("run", "plan", "compare"):
-        assert main(["help", verb]) == 0
-        assert "method's own" in " ".join(capsys.readouterr().out.split())
+        assert "method's own" in " ".join(result_of(["help", verb]).out.split())
 
 
 def test_more_times_than_the_memory_can_hold_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,13 +20,13 @@ import pyharness.engine.solver as solver_module
 from pyharness import InputError, Scene, TorqueLaw, case_scene, prepare, solve, solve_many
 from pyharness.bench.growth import growth
 from pyharness.bench.savings import measured_saving
-from pyharness.cli.main import main
 from pyharness.engine.plan import RK4_OR_TAYLOR, plan
 from pyharness.engine.problem import closed_form
 from pyharness.engine.solver import Solver
 from pyharness.model.trajectory import Array
 from pyharness.torques import damping
 from pyharness.truth.reference import reference
+from tests.conftest import ResultOf
 from tests.refused import refused
 
 PUSHED = case_scene(5)
@@ -203,7 +203,7 @@ def test_closed_forms_are_recognised() -> None:
         assert closed_form(scene) == form
 
 
-def test_plan_says_what_is_skipped_and_why(capsys: pytest.CaptureFixture[str]) -> None:
+def test_plan_says_what_is_skipped_and_why(result_of: ResultOf) -> None:
     assert {"integration", "torque", "C w1 w2", "velocity"} <= plan(case_scene(2)).skipped
     assert {"torque of time", "sines", "cosines"} <= plan(case_scene(5)).skipped
     assert not {"torque of time", "sines", "torque"} & plan(case_scene(7)).skipped
@@ -215,8 +215,7 @@ def test_plan_says_what_is_skipped_and_why(capsys: pytest.CaptureFixture[str]) -
     assert plan(case_scene(5), tolerance=1e-3).method == "taylor"
     assert plan(case_scene(7), tolerance=1e-6, rows=True).method == "taylor"
     for form in ("table", "json", "csv", "markdown"):
-        assert main(["plan", "--case", "7", "--format", form]) == 0
-        assert "torque of time" in capsys.readouterr().out
+        assert "torque of time" in result_of(["plan", "--case", "7", "--format", form]).out
 
 
 def test_plan_says_that_a_torque_depends_on_the_state() -> None:

@@ -29,7 +29,7 @@ from pyharness.model.trajectory import Array
 from pyharness.thesis import compiled
 from pyharness.thesis.linear_solver import SINGULAR, leqt1f
 from pyharness.truth.reference import reference
-from tests.conftest import Capture, Patch, Printed
+from tests.conftest import Capture, Patch, Printed, ResultOf
 from tests.refused import refused
 
 PAGE = (Path(__file__).parent.parent.parent / "docs/explanation/methods.md").read_text()
@@ -66,13 +66,12 @@ ORDERS = {
 
 @pytest.mark.sampled
 @pytest.mark.parametrize("case", ORDERS)
-def test_orders_as_derived(case: int, capsys: Capture, monkeypatch: Patch) -> None:
+def test_orders_as_derived(case: int, result_of: ResultOf, monkeypatch: Patch) -> None:
     part, told = ORDERS[case]
     every = family_members()
     assert len(every) == 200
     monkeypatch.setattr(f"{order_table.__module__}.family_members", lambda: every[part])
-    assert main(["family", "--case", str(case)]) == 0
-    captured = capsys.readouterr()
+    captured = result_of(["family", "--case", str(case)])
     assert captured.err.count("\n") == (case == 6)  # no rigid body has the moments of Case 6
     assert told in captured.out
     assert max(map(len, captured.out.splitlines())) <= 100

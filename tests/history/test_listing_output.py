@@ -5,13 +5,12 @@ from pathlib import Path
 import pytest
 
 from pyharness import InputError, case_scene, run_program
-from pyharness.cli.main import main
 from pyharness.history.listing_output import fits, our_page, read_page
 from pyharness.history.printed_page import Difference, Fit, printed_numbers, split_page
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.thesis.decks import card_steps
 from pyharness.thesis.printer import page
-from tests.conftest import Capture
+from tests.conftest import ResultOf
 
 MACHINE = Path(__file__).parents[2] / "docs" / "machine"
 PAGES = sorted(MACHINE.glob("*.txt"))
@@ -100,15 +99,13 @@ def test_a_page_tells_its_reading(tmp_path: Path) -> None:
     assert {each.listing for each in found if each.is_whole} == {"original with do-variable"}
 
 
-def test_command_exits_with_1_for_no_word(tmp_path: Path, capsys: Capture) -> None:
+def test_command_exits_with_1_for_no_word(tmp_path: Path, result_of: ResultOf) -> None:
     assert len(PAGES) == 6
     path = printed(tmp_path, "two-term", 2, "cdc48")
     asked = ["verify", "--listing-output", str(path), "--program", "two-term", "--case", "2"]
-    assert main(asked) == 0
-    told = " ".join(capsys.readouterr().out.split())
+    told = " ".join(result_of(asked).out.split())
     assert "printed so by two-term, case 2, original, in cdc48" in told
     path.write_text(path.read_text().replace("0.0999", "0.0998"))
-    assert main(asked) == 1
-    told = " ".join(capsys.readouterr().out.split())
+    told = " ".join(result_of(asked, 1).out.split())
     assert "by none; the nearest is two-term, case 2, original" in told
     assert "theirs ours 2 1 0.0998 0.0999" in told

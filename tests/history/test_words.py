@@ -12,7 +12,6 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from pyharness.cli import options
-from pyharness.cli.main import main
 from pyharness.history.words import (
     WordCell,
     WordRun,
@@ -28,7 +27,7 @@ from pyharness.thesis.programs import run_program
 from pyharness.thesis.vectors import OURS
 from pyharness.thesis.word import RULES
 from pyharness.views.render import csv_text, render
-from tests.conftest import Printed
+from tests.conftest import Printed, ResultOf
 from tests.json_reference import schema_of
 
 ROOT = Path(__file__).parents[2]
@@ -147,13 +146,11 @@ def test_verb(printed: Printed, tmp_path: Path) -> None:
     assert len(picture.with_suffix(".csv").read_text().splitlines()) == 1 + len(runs)
 
 
-def test_vectors_that_differ_end_with_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["words", "--vectors", str(OURS)]) == 0
-    assert "24 of 24 vectors agree" in capsys.readouterr().out
+def test_vectors_that_differ_end_with_1(tmp_path: Path, result_of: ResultOf) -> None:
+    assert "24 of 24 vectors agree" in result_of(["words", "--vectors", str(OURS)]).out
     bad = tmp_path / "bad.json"
     bad.write_text(OURS.read_text().replace("1716 5252 5252 5252 5253", "1716 5252 5252 5252 5252"))
-    assert main(["words", "--vectors", str(bad)]) == 1
-    out = capsys.readouterr().out
+    out = result_of(["words", "--vectors", str(bad)], 1).out
     assert "23 of 24 vectors agree" in out
     assert "1/3 (RX/)" in out
     assert "ours   1716 5252 5252 5252 5253" in out

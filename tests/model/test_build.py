@@ -19,12 +19,11 @@ from pyharness import (
     case_scene,
     solve,
 )
-from pyharness.cli.main import main
 from pyharness.model import arithmetic, extension
 from pyharness.model.arithmetic import check_compiler, check_options
 from pyharness.model.build import build
 from tests.as_written import COMPILER
-from tests.conftest import Capture, Patch
+from tests.conftest import Patch, ResultOf
 from tests.instruction_sets import LEVELS, level_of_processor
 
 ROOT = Path(__file__).parent.parent.parent
@@ -57,15 +56,14 @@ def test_hot_kernels_are_built_for_this_processor_or_for_all() -> None:
     assert built in ([native], [*LEVELS] if has_levels else ["plain"])
 
 
-def test_a_build_for_another_processor_is_refused(monkeypatch: Patch, capsys: Capture) -> None:
+def test_a_build_for_another_processor_is_refused(monkeypatch: Patch, result_of: ResultOf) -> None:
     monkeypatch.setattr("pyharness._kernels.choose_instructions", lambda highest: -1)
     monkeypatch.setattr(_build, "INSTRUCTION_SETS", ("avx512",))
     extension._check_processor.cache_clear()
     try:
         with pytest.raises(NotBuiltError, match="built for avx512, which this processor lacks"):
             solve(case_scene(3), 1.0)
-        assert main(["doctor"]) == 0
-        assert "instructions      none that this processor has" in capsys.readouterr().out
+        assert "instructions      none that this processor has" in result_of(["doctor"]).out
     finally:
         extension._check_processor.cache_clear()
 

@@ -11,14 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from pyharness.cli.main import main
 from pyharness.model.errors import InputError
 from pyharness.model.schema import SCHEMAS
 from pyharness.sweep import run, store_layout
 from pyharness.sweep.batches import solve_chunk
 from pyharness.sweep.sweep import Sweep
 from pyharness.sweep.sweep_file import read_sweep
-from tests.conftest import Capture, Patch
+from tests.conftest import Patch, ResultOf
 from tests.refused import refused
 from tests.sweep.sweeps import TILT, files, run_sweep, text, written
 
@@ -162,18 +161,15 @@ def test_store_of_the_first_schema_is_refused(sweep: Sweep, store: Path) -> None
 
 
 @pytest.mark.campaign
-def test_command_line_repairs(store: Path, intact: Path, capsys: Capture) -> None:
+def test_command_line_repairs(store: Path, intact: Path, result_of: ResultOf) -> None:
     command = ["sweep", str(intact / "sweep.toml"), "--out", str(store)]
     flip(store / CHUNK)
     flip(store / OTHER)
-    assert main(command) == 2
-    said = capsys.readouterr().err
+    said = result_of(command, 2).err
     assert said.count("\n") == 1
     assert f"'{CHUNK}'" in said
-    assert main([*command, "--repair"]) == 0
-    assert ", 2 of them damaged before, 6 were there" in capsys.readouterr().out
-    assert main(command) == 0
-    assert "all 8 chunks were there" in capsys.readouterr().out
+    assert ", 2 of them damaged before, 6 were there" in result_of([*command, "--repair"]).out
+    assert "all 8 chunks were there" in result_of(command).out
 
 
 @pytest.mark.skipif(shutil.which("sha256sum") is None, reason="no sha256sum")

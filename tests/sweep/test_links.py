@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from pyharness.cli.main import main
 from pyharness.model.errors import InputError
 from pyharness.sweep import run
 from pyharness.sweep.sweep import Sweep
 from pyharness.sweep.sweep_file import read_sweep
+from tests.conftest import ResultOf
 from tests.sweep.sweeps import TILT, axis, files, run_sweep, text
 
 SWEEP = text(
@@ -126,13 +126,12 @@ def test_the_store_itself_may_be_a_link(sweep: Sweep, store: Path, tmp_path: Pat
 
 
 def test_the_command_refuses_in_one_line(
-    intact: Path, store: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    intact: Path, store: Path, tmp_path: Path, result_of: ResultOf
 ) -> None:
     moved(store / "end/c", tmp_path)
     command = ["sweep", str(intact / "sweep.toml"), "--out", str(store)]
     for more in ([], ["--repair"]):
-        assert main([*command, *more]) == 2
-        assert capsys.readouterr().err.count("\n") == 1
+        assert result_of([*command, *more], 2).err.count("\n") == 1
 
 
 @pytest.mark.parametrize(

@@ -12,13 +12,13 @@ import pytest
 from pyharness.checks.compare.agreement import differences
 from pyharness.checks.compare.orders import Order, measured_order
 from pyharness.checks.port_protocol import read_answer, request
-from pyharness.cli.main import main
 from pyharness.edition.laboratory import data
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.thesis.cells import subsets
 from pyharness.thesis.programs import PROGRAM_REGISTRY, run_program
 from pyharness.truth.reference import Reference, reference
+from tests.conftest import ResultOf
 from tests.ports import WEB, engine, run_javascript
 
 ASSUMED = [
@@ -111,20 +111,17 @@ def test_laboratory_has_the_same_listing(program: str) -> None:
         assert Listing(program, found["state"]["active"]) == Listing.corrected(program)
 
 
-def test_a_correction_of_what_is_not_active_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_correction_of_what_is_not_active_is_told(result_of: ResultOf) -> None:
     command = ["run", "--case", "4", "--program", "two-term", "--fix", "c1-for-c"]
-    assert main(command) == 0
-    assert "--fix c1-for-c: it is not active" in capsys.readouterr().err
-    assert main([*command, "--reading", "c1-for-c"]) == 0
-    assert capsys.readouterr().err == ""
+    assert "--fix c1-for-c: it is not active" in result_of(command).err
+    assert result_of([*command, "--reading", "c1-for-c"]).err == ""
 
 
 @pytest.mark.campaign
 @pytest.mark.parametrize("case", case_numbers())
-def test_compare_tells_what_is_in_vain(case: int, capsys: pytest.CaptureFixture[str]) -> None:
+def test_compare_tells_what_is_in_vain(case: int, result_of: ResultOf) -> None:
     words = "--listing corrected --reading do-variable,c1-for-c --conjecture initial-torque"
-    assert main(["compare", "--case", str(case), *words.split(), "--format", "json"]) == 0
-    told = capsys.readouterr()
+    told = result_of(["compare", "--case", str(case), *words.split(), "--format", "json"])
     orders = [each["order"] for each in json.loads(told.out)["programs"]]
     assert len(orders) == 3
     # Case 1 has only rounding errors at every step.

@@ -5,14 +5,13 @@ import pytest
 
 from pyharness.checks.cells import decks
 from pyharness.checks.check import Selection
-from pyharness.cli.main import main
 from pyharness.history.claims.laboratory import Laboratory
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
 from pyharness.model.scene_file import case_scene
 from pyharness.thesis import decks as punched
 from pyharness.thesis.cards import deck
 from pyharness.thesis.decks import alterations, compiler, deck_text, run_deck
-from tests.conftest import Capture, Patch
+from tests.conftest import Patch, ResultOf
 
 
 def _cards(text: str) -> dict[int, str]:
@@ -124,14 +123,12 @@ def test_page_and_records(old: str, new: str, told: str, monkeypatch: Patch) -> 
     assert told in check.note
 
 
-def test_without_a_compiler_verify_says_so(monkeypatch: Patch, capsys: Capture) -> None:
+def test_without_a_compiler_verify_says_so(monkeypatch: Patch, result_of: ResultOf) -> None:
     for room in ("checks.cells", "cli.verbs.verify"):
         monkeypatch.setattr(f"pyharness.{room}.compiler", lambda: None)
     assert list(decks(Selection(only=["decks"]))) == []
-    assert main(["verify", "--only", "decks"]) == 2
-    assert "gfortran" in capsys.readouterr().err
-    assert main(["verify", "--only", "decks,orders/rk4/case-5"]) == 0
-    assert "decks: not run" in capsys.readouterr().out
+    assert "gfortran" in result_of(["verify", "--only", "decks"], 2).err
+    assert "decks: not run" in result_of(["verify", "--only", "decks,orders/rk4/case-5"]).out
 
 
 def test_model_of_four_terms_is_the_deck_but_for_its_points() -> None:

@@ -13,11 +13,10 @@ import pytest
 from pyharness import Scene, TorqueLaw, case_scene, solve
 from pyharness.checks.theory.rotations import SteadyRotation, rates, steady_rotations
 from pyharness.checks.theory.rotations_report import growth_of_bodies, polhodes
-from pyharness.cli.main import main
 from pyharness.engine.linearised import jacobians
 from pyharness.model.scene import Triple
 from pyharness.model.trajectory import Array
-from tests.conftest import Printed
+from tests.conftest import Printed, ResultOf
 
 BODY = (40.0, 30.0, 20.0)
 TOP = (40.0, 40.0, 20.0)
@@ -418,9 +417,8 @@ def test_picture_has_its_numbers(case: int, printed: Printed, tmp_path: Path) ->
     assert any(row["curve"] == "separatrix" for row in rows) == (case != 1)
 
 
-def test_picture_of_no_body_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_picture_of_no_body_is_refused(result_of: ResultOf, tmp_path: Path) -> None:
     path = tmp_path / "x.toml"
     path.write_text("[body]\ncoefficients = [0.5, -0.4, 0.1]\n[initial]\nomega = [0, 0, 1]\n")
-    assert main(["rotations", "--scene", str(path), "--plot", str(tmp_path / "x.png")]) == 2
-    found = capsys.readouterr()
+    found = result_of(["rotations", "--scene", str(path), "--plot", str(tmp_path / "x.png")], 2)
     assert (found.out, "--plot" in found.err) == ("", True)

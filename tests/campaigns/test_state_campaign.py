@@ -12,8 +12,8 @@ from pyharness.truth.reference import reference
 from tests.campaigns import driver, entries
 from tests.campaigns.driver import Tally
 from tests.campaigns.entries import Result, truth_of
-from tests.campaigns.state_campaign import MODULE, TOLERANCES, judge, try_scene
-from tests.conftest import Patch, ResultOf
+from tests.campaigns.state_campaign import MODULE, TOLERANCES, judge, main, try_scene
+from tests.conftest import Capture, Patch
 
 BLIND = "estimates below a hundredth of the error"
 
@@ -38,14 +38,15 @@ def test_the_reference_is_that_of_two_series_in_more_digits() -> None:
         assert truth.error(wanted.omega, wanted.attitude, False) < 1e-15
 
 
-def test_a_wrong_result_is_reported(monkeypatch: Patch, result_of: ResultOf) -> None:
+def test_a_wrong_result_is_reported(monkeypatch: Patch, capsys: Capture) -> None:
     right = entries._row
 
     def wrong(entry: str, omega: Array, *others: Any) -> Result:
         return right(entry, omega * (1.0 + 2e-4), *others)
 
     monkeypatch.setattr(entries, "_row", wrong)
-    lines = result_of(["1", "test", "3"], 1).out.splitlines()
+    assert main(["1", "test", "3"]) == 1
+    lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith(
         "python -m tests.campaigns.state_campaign 1 test 3: prepare taylor: "
     )

@@ -17,7 +17,7 @@ from tests.campaigns.estimates import truth
 from tests.campaigns.estimates.__main__ import COMMAND, SENSITIVE, Answer, answers, main
 from tests.campaigns.estimates.scenes import COARSEST, FINEST, KINDS, Draw, drawn
 from tests.campaigns.estimates.truth import truth_of
-from tests.conftest import Capture, Patch, ResultOf
+from tests.conftest import Capture, Patch
 
 BODY = (1.0, 2.0, 2.7)
 TURNED = (0.3, -0.5, 0.2, 0.7)
@@ -131,8 +131,9 @@ def test_number_of_a_seed_is_one_scene() -> None:
 
 
 @pytest.mark.campaign
-def test_few_dozen_scenes(result_of: ResultOf) -> None:
-    printed = result_of(["--scenes", "24", "--seed", "test"]).out
+def test_few_dozen_scenes(capsys: Capture) -> None:
+    assert main(["--scenes", "24", "--seed", "test"]) == 0
+    printed = capsys.readouterr().out
     assert printed.endswith("0 faults\n")
     assert printed.count("growth over K, ") > 10
 
@@ -158,8 +159,9 @@ def test_scenes_whose_reported_error_was_wrong(seed: str, number: int) -> None:
         assert set(answer.faults()) - harmless == set(), answer
 
 
-def test_one_scene_alone(result_of: ResultOf) -> None:
-    printed = result_of(["--only", "3", "--seed", "test", "--tolerances", "1e-6,1e-6"]).out
+def test_one_scene_alone(capsys: Capture) -> None:
+    assert main(["--only", "3", "--seed", "test", "--tolerances", "1e-6,1e-6"]) == 0
+    printed = capsys.readouterr().out
     assert printed.count("ended='complete'") == len(ENTRIES)
     assert "tolerance=1e-06" in printed
 

@@ -129,6 +129,67 @@ subroutine solve_ensemble(code, tolerance, step, effort, by_moments, n_body, bod
   call watch(c_null_ptr)
 end subroutine solve_ensemble
 
+subroutine solve_many_rows(code, tolerance, by_moments, n_body, body, n_constant, constant, n_rate, &
+                           rate, n_sines, n_sine_sets, sines, n_cosines, n_cosine_sets, cosines, &
+                           n, omega0, n_rows, times, given_up, omega, status, n_estimates, &
+                           estimates, raised)
+  ! Solve many bodies under torque laws for several times; see solve_ensemble. The status is 0, or
+  ! -1 of a body that this leaves.
+  !f2py threadsafe
+  use, intrinsic :: iso_c_binding, only: c_loc, c_null_ptr
+  use bodies, only: bodies_t
+  use interruption, only: watch
+  use many_bodies, only: solve_rows
+  implicit none
+  integer(4), intent(in) :: code
+  real(8), intent(in) :: tolerance
+  integer(4), intent(in) :: by_moments
+  integer(4), intent(in) :: n_body
+  real(8), intent(in), target :: body(3, n_body)
+  integer(4), intent(in) :: n_constant
+  real(8), intent(in), target :: constant(3, n_constant)
+  integer(4), intent(in) :: n_rate
+  real(8), intent(in), target :: rate(3, n_rate)
+  integer(4), intent(in) :: n_sines, n_sine_sets
+  real(8), intent(in), target :: sines(4, n_sines, n_sine_sets)
+  integer(4), intent(in) :: n_cosines, n_cosine_sets
+  real(8), intent(in), target :: cosines(4, n_cosines, n_cosine_sets)
+  integer(4), intent(in) :: n
+  real(8), intent(in), target :: omega0(3, n)
+  integer(4), intent(in) :: n_rows
+  real(8), intent(in), target :: times(n_rows) ! s, of one sign, ordered away from 0
+  integer(4), intent(inout), target :: given_up(1)
+  real(8), intent(inout), target :: omega(3, n_rows, n)
+  integer(1), intent(inout) :: status(n)
+  integer(4), intent(in) :: n_estimates        ! n if the estimates are requested, else 0
+  real(8), intent(inout), target :: estimates(2, n_rows, n_estimates)
+  integer(4), intent(out) :: raised
+  type(bodies_t) :: bodies
+  real(8), target :: no_attitude(4, 0), no_estimates(2, 0)
+
+  bodies%by_moments = btest(by_moments, 0)
+  bodies%tolerance = tolerance
+  bodies%step = 1.0d0
+  bodies%effort = 1.0d0
+  bodies%n = n
+  bodies%body => body
+  bodies%constant => constant
+  bodies%rate => rate
+  bodies%sines => sines
+  bodies%cosines => cosines
+  bodies%omega0 => omega0
+  bodies%times => times(n_rows:)
+  bodies%row_times => times
+  bodies%omega_rows => omega
+  bodies%estimate_rows => estimates
+  bodies%attitude0 => no_attitude
+  bodies%attitude => no_attitude
+  bodies%estimates => no_estimates
+  call watch(c_loc(given_up))
+  call solve_rows(bodies, code, status, raised)
+  call watch(c_null_ptr)
+end subroutine solve_many_rows
+
 subroutine solve_packed_many(packed, n_packed, n, omega0, n_times, times, given_up, omega, &
                              status, raised)
   ! Solve many initial omegas with a prepared solver. As for solve_packed, C code calls this

@@ -38,6 +38,11 @@ module bodies
     real(dp), pointer, contiguous :: attitude(:, :)     !! (4, 0 or n), results
     !! (2, 0 or n), results: estimated relative error, and amplification; negative: unknown
     real(dp), pointer, contiguous :: estimates(:, :)
+    !! (n_rows), s: of one sign, ordered away from 0; the last is the time of all bodies; or null
+    real(dp), pointer, contiguous :: row_times(:) => null()
+    real(dp), pointer, contiguous :: omega_rows(:, :, :) => null()    !! (3, n_rows, n), results
+    !! (2, n_rows, 0 or n), results: as `estimates`
+    real(dp), pointer, contiguous :: estimate_rows(:, :, :) => null()
     integer(i1) :: mark         !! status of the bodies that a kernel must solve
     integer :: n_waves          !! largest number of waves that act on one of them
   end type bodies_t

@@ -14,7 +14,7 @@ module many_bodies
   implicit none(type, external)
   private
 
-  public :: solve_bodies, solve_packed_bodies
+  public :: solve_bodies, solve_packed_bodies, solve_rows
 
 contains
 
@@ -120,6 +120,26 @@ contains
       call solve_left(bodies, code, packed, omega, status, raised)
     end if
   end subroutine solve_bodies
+
+  subroutine solve_rows(bodies, code, status, raised)
+    !! Compute omega at the times of all bodies, side by side. Other bodies than those under a torque
+    !! that is no closed form's get the status NEEDS_FALLBACK.
+    type(bodies_t), intent(in), target :: bodies
+    integer, intent(in) :: code                    !! code of the module methods
+    integer(i1), intent(inout) :: status(bodies%n) !! of the module statuses
+    integer, intent(out) :: raised                 !! 1: interrupted by the user
+    real(dp), allocatable :: omega(:, :)
+    integer :: n_waves, failed
+
+    raised = 0
+    status = NEEDS_FALLBACK
+    allocate (omega(3, bodies%n), stat=failed)
+    if (failed /= 0 .or. bodies%n == 0) return
+    call mark_bodies(bodies, code, status, n_waves)
+    call solve_marked(bodies, RAMPED, 0, code, omega, status, raised)
+    if (raised == 0) call solve_marked(bodies, WAVED, n_waves, code, omega, status, raised)
+    where (status < NEEDS_FALLBACK) status = NEEDS_FALLBACK
+  end subroutine solve_rows
 
   subroutine solve_marked(bodies, mark, n_waves, code, omega, status, raised)
     !! Solve the bodies with one mark side by side. Some of them may be left to the single-body

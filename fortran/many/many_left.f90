@@ -204,7 +204,7 @@ contains
                .or. code == CLOSED_FORM_OR_TAYLOR)) return
     enough = UNSURE*packed(TOLERANCE)/ROUNDING/roundings_of(packed, n_packed, omega0, time)
     growth = 1.0_dp
-    if (.not. is_sphere(packed(COEFFICIENTS:COEFFICIENTS + 2))) then
+    if (abs(time) > 0.0_dp .and. .not. is_sphere(packed(COEFFICIENTS:COEFFICIENTS + 2))) then
       growth = -1.0_dp
       if (code < GAUSS .or. .not. (any(abs(packed(CONSTANT:RATE + 2)) > 0.0_dp) &
                                    .or. n_packed > WAVES)) then
@@ -259,7 +259,7 @@ contains
       found = -1.0_dp
     else if (steps == 0 .and. int(packed(METHOD)) < GAUSS .and. int(packed(METHOD)) /= TAYLOR) then
       found = [-1.0_dp, 1.0_dp]
-      if (.not. is_sphere(packed(COEFFICIENTS:COEFFICIENTS + 2))) then
+      if (abs(time) > 0.0_dp .and. .not. is_sphere(packed(COEFFICIENTS:COEFFICIENTS + 2))) then
         found(2) = torque_free_growth_of(packed(COEFFICIENTS:COEFFICIENTS + 2), omega0, time)
       end if
       if (found(2) < 0.0_dp) return

@@ -30,6 +30,13 @@ module many_taylor
   real(dp), parameter :: A_STEP = 3.0_dp     ! largest norm of an exponent that is taken at once
   real(dp), parameter :: RIDGE = 1.001_dp
 
+  type :: rows_t
+    !! The beginnings of steps, and the number of the next row of each slot.
+    real(dp), dimension(SLOTS, 3) :: w, low, error
+    real(dp), dimension(SLOTS) :: t, h
+    integer :: next(SLOTS)
+  end type rows_t
+
   public :: many_taylor_solve
 
 contains
@@ -52,6 +59,8 @@ contains
     real(dp) :: ready_waves(KIND_OF, MOST_WAVES, LANES)
     logical :: is_turned
     real(dp) :: error, error_of_attitude
+    type(rows_t) :: rows
+    logical :: has_rows
     integer :: n_waves, order, active, n_slots, i, j, unseen
 
     call c_f_pointer(bodies_at, bodies)
@@ -60,6 +69,7 @@ contains
     order = order_for(bodies%tolerance)
     call fill(s)
     is_turned = with_attitude(bodies)
+    has_rows = associated(bodies%row_times)
     if (is_turned) call plan_attitudes(bodies%tolerance, s, attitudes)
     body = 0
     waves = 0.0_dp
@@ -81,7 +91,12 @@ contains
                                  status(body(i)), error_of_attitude)
               error = error + WRONG_ANGLE*error_of_attitude
             end if
-            call put_estimates(bodies, body(i), error, s%growth(i))
+            if (has_rows) then
+              call put_row(bodies, body(i), size(bodies%row_times), omega(:, body(i)), error, &
+                           s%growth(i))
+            else
+              call put_estimates(bodies, body(i), error, s%growth(i))
+            end if
             active = active - 1
           end if
           body(i) = 0
@@ -99,6 +114,7 @@ contains
             call put_in(ready, j, s, i)
             if (n_waves > 0) waves(:, :n_waves, i) = ready_waves(:, :n_waves, j)
             body(i) = ready%block%at(j)
+            rows%next(i) = 1
             if (is_turned) call begin_attitude(bodies, body(i), i, A_STEP, s, attitudes)
             active = active + 1
             exit
@@ -111,11 +127,17 @@ contains
           call wave_terms(order, n_waves, i, waves, s)
         end do
       end if
-      if (is_turned) then
-        if (n_waves == 0) s%torque(:, :, :order) = 0.0_dp
-        call remember(s, attitudes)
+      if ((is_turned .or. has_rows) .and. n_waves == 0) s%torque(:, :, :order) = 0.0_dp
+      if (is_turned) call remember(s, attitudes)
+      if (has_rows) then
+        rows%w = s%w
+        rows%low = s%low
+        rows%error = s%error
+        rows%t = s%t
+        rows%h = s%h
       end if
-      call step(order, n_waves > 0 .or. is_turned, n_slots, s)
+      call step(order, n_waves > 0 .or. is_turned .or. has_rows, n_slots, s)
+      if (has_rows) call put_rows(bodies, order, n_slots, body, s, rows)
       if (is_turned) call turn(n_slots, A_STEP, s, attitudes)
       unseen = unseen + 1
       if (unseen >= BETWEEN_LOOKS) then
@@ -125,6 +147,55 @@ contains
       end if
     end do
   end subroutine many_taylor_solve
+
+  subroutine put_rows(bodies, order, n_slots, body, s, rows)
+    !! Compute omega of each slot's body at the requested times within its step, by the series.
+    type(bodies_t), intent(in) :: bodies
+    integer, intent(in) :: order, n_slots, body(SLOTS)
+    type(slots_t), intent(in) :: s
+    type(rows_t), intent(inout) :: rows
+    real(dp) :: terms(3, MOST_ORDER), passed, part, share, x, y, z, error
+    integer :: i, k, row, last
+
+    last = size(bodies%row_times)
+    do i = 1, n_slots
+      row = rows%next(i)
+      if (body(i) == 0 .or. row >= last) cycle
+      if (.not. abs(bodies%row_times(row)) <= abs(s%t(i))) cycle
+      terms(:, :order) = s%torque(i, :, :order)
+      error = error_of(s, i)
+      do while (row < last)
+        if (.not. abs(bodies%row_times(row)) <= abs(s%t(i))) exit
+        passed = bodies%row_times(row) - rows%t(i)
+        share = passed/(s%t(i) - rows%t(i))
+        part = passed/rows%h(i)
+        x = 0.0_dp
+        y = 0.0_dp
+        z = 0.0_dp
+        do k = order, 1, -1
+          x = part*(x + terms(1, k))
+          y = part*(y + terms(2, k))
+          z = part*(z + terms(3, k))
+        end do
+        call put_row(bodies, body(i), row, &
+                     rows%w(i, :) + ([x, y, z] + (rows%low(i, :) - rows%error(i, :) &
+                                                  - share*(s%error(i, :) - rows%error(i, :)))), &
+                     error, s%growth(i))
+        row = row + 1
+      end do
+      rows%next(i) = row
+    end do
+  end subroutine put_rows
+
+  subroutine put_row(bodies, i, row, omega, error, growth)
+    !! Store a row of body i, and its estimates if they are requested.
+    type(bodies_t), intent(in) :: bodies
+    integer, intent(in) :: i, row
+    real(dp), intent(in) :: omega(3), error, growth
+
+    bodies%omega_rows(:, row, i) = omega
+    if (size(bodies%estimate_rows, 3) > 0) bodies%estimate_rows(:, row, i) = [error, growth]
+  end subroutine put_row
 
   pure integer function order_for(tolerance)
     !! Return one of the orders of unroll_many.py. It is the same for all bodies, so that the result

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from pyharness.engine.many_details import prepare_details
+from pyharness.engine.many_laws import solve_at, solve_bodies
 from pyharness.engine.many_mistakes import reasons_of
 from pyharness.engine.many_recorded import NO_ATTITUDE, needs_equations, solve_recorded
 from pyharness.engine.many_scenes import (
@@ -24,7 +25,6 @@ from pyharness.engine.many_scenes import (
     from_scenes,
     rows_of_alike,
     rows_of_scene,
-    solve_bodies,
 )
 from pyharness.engine.parameters import check_values
 from pyharness.engine.plan import FINEST
@@ -46,7 +46,6 @@ from pyharness.model.values import Number, Numbers, boolean, checked_effort, fin
 
 # Kinds of scenes under torque laws: about principal axes, and with an inertia matrix.
 _LAWS = _PLAIN, _TILTED = -2, -1
-_NO_ARRAYS: dict[str, Any] = dict.fromkeys(("omega", "attitude"))
 _NO_DETAILS: dict[str, Any] = dict.fromkeys(("t_events", "y_events", "sensitivities"))
 
 
@@ -277,36 +276,33 @@ def _solve_laws(
     if step is not None:
         step_size = finite("step", step)
     code, tolerance = _choose_kernel(method, settings["tolerance"])
+    kernel = code, tolerance, step_size, checked_effort(settings["effort"])
+    options: Any = {"method": method, "is_rounded": axes is not None}
+    options |= {"threads": settings["threads"], "with_estimates": settings["estimates"]}
     if times is None:
         own["t_end"] = t_end
-    else:  # a copy of each body for each time
-        # Normalised twice, a quaternion may have another last bit.
-        copies: Any = checked_copies({**_NO_ARRAYS, **own}, as_given=True)
-        n = count_bodies(copies)
-        own = {name: _repeated(each, len(times)) for name, each in copies.items()}
-        own["t_end"] = np.tile(times, n)
-        axes, turns = (
-            each if each is None else _repeated(each, len(times)) for each in (axes, turns)
-        )
-    found, omega0, ends = solve_bodies(
-        ready, own, (code, tolerance, step_size, checked_effort(settings["effort"])),
-        method=method, is_rounded=axes is not None, threads=settings["threads"], out=out,
-        with_estimates=settings["estimates"],
-    )  # fmt: skip
+        found = solve_bodies(ready, own, kernel, out=out, **options)
+    else:
+        found = solve_at(ready, own, times, kernel, **options)
     if axes is not None:
-        found.omega[:] = rotated(found.omega, axes)
-        if found.attitude is not None and turns is not None:
-            found.attitude[:] = turned_back(found.attitude, turns)
-            if found.error is not None:
-                # The initial omega was rounded after the rotation to principal axes.
-                found.error[:] += ROUNDING * np.max(np.abs(omega0), axis=1) * np.abs(ends)
-    if times is not None:
-        found = found.with_times(times)
+        _turn_back(found, axes, turns, own, t_end)
     return found if found.leaves is None else replace(found, leaves=None)
 
 
-def _repeated(rows: Array, count: int) -> Array:
-    return rows if len(rows) == 1 else np.repeat(rows, count, axis=0)
+def _turn_back(
+    found: Ensemble, axes: Array, turns: Array | None, own: Mapping[str, Any], t_end: Any
+) -> None:
+    """Transform results from principal `axes` (columns) to the body axes."""
+    if found.times is not None:
+        axes, turns = axes[:, None], None if turns is None else turns[:, None]
+    found.omega[:] = rotated(found.omega, axes)
+    if found.attitude is not None and turns is not None:
+        found.attitude[:] = turned_back(found.attitude, turns)
+        if found.error is not None:
+            # The initial omega was rounded after the rotation to principal axes.
+            sizes = np.max(np.abs(own["omega"]), axis=1)
+            ends = rows_of("t_end", t_end) if found.times is None else found.times
+            found.error[:] += ROUNDING * (sizes if found.times is None else sizes[:, None]) * abs(ends)
 
 
 def _kind_of(scene: Scene, row: int) -> object:

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.engine.many_scenes import rows_of_scene, solve_bodies
+from pyharness.engine.many_laws import solve_bodies
+from pyharness.engine.many_scenes import rows_of_scene
 from pyharness.engine.many_tape import Bodies, Equations, solve_tape
 from pyharness.model.arrays import buffer_of, check_rows, row_of, rows_of, threads_of
 from pyharness.model.attitude import IDENTITY, rotated, scalar_first
@@ -79,7 +80,7 @@ def many_states(
         scene, (tolerance, _, effort) = solver.plan.scene, solver.settings
         own = {"omega": starts, "t_end": times, "attitude": turns}
         settings = code, tolerance, scene.step_size, effort
-        found, *_ = solve_bodies(rows_of_scene(scene), own, settings, threads=threads, out=out)
+        found = solve_bodies(rows_of_scene(scene), own, settings, threads=threads, out=out)
     else:
         found = place_for(out, n, with_attitude=True)
         if out is not None:  # the starts may share memory with it

@@ -33,9 +33,7 @@ from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
 from pyharness.model.waves import with_merged_rows
 
-_MERGED = ("torque_constant", "sines", "cosines")  # arrays that `with_merged_rows` may change
-_NOTHING = np.empty((4, 0), order="F")  # in place of attitudes
-_UNKNOWN = -1.0  # in place of an estimate that the kernel does not compute
+MERGED = ("torque_constant", "sines", "cosines")  # arrays that `with_merged_rows` may change
 _MOST_KEPT = 8  # scenes whose arrays are kept
 BODIES = ("moments", "inertia", "coefficients")
 ONES: Triple = (1.0, 1.0, 1.0)
@@ -167,7 +165,7 @@ def rows_of_scene(scene: Scene) -> dict[str, Any]:
 
     def convert() -> dict[str, Any]:
         rows = checked_rows(from_scene(scene))
-        return {**rows, "merged": with_merged_rows(*(rows[name] for name in _MERGED))}
+        return {**rows, "merged": with_merged_rows(*(rows[name] for name in MERGED))}
 
     # Conversion takes longer than solving few bodies.
     found: dict[str, Any] = keep_with(scene, (), convert)
@@ -275,68 +273,3 @@ def scene_of_row(scene: Scene, rows: Mapping[str, Array], i: int) -> Scene:
             law, {name.removeprefix(PARAMETER): value for name, value in values.items()}
         )
     return replace(scene, torque=law, **own)
-
-
-def solve_bodies(
-    ready: dict[str, Any], own: dict[str, Any], settings: tuple[int, float, float, float], *,
-    method: str = "auto", is_rounded: bool = False, threads: int, out: "Ensemble | Array | None",
-    with_estimates: bool = False,
-) -> tuple[Ensemble, Array, Array]:  # fmt: skip
-    """Return final states, initial omegas and times of bodies, by one kernel call.
-
-    Arrays in `own` replace arrays in `ready`.
-    """
-    code, tolerance, step, effort = settings
-    given = checked_rows(own)
-    n = count_bodies(given)
-    rows = {**ready, **given}
-    by_moments = "moments" in (given if "coefficients" in given else rows)
-    body = rows["moments" if by_moments else "coefficients"]
-    rate, times, attitude = rows["torque_rate"], rows["t_end"], rows.get("attitude")
-    law: tuple[Array, Array, Array] | None = ready.get("merged")
-    if law is None or not given.keys().isdisjoint(_MERGED):
-        law = with_merged_rows(*(rows[name] for name in _MERGED))
-    constant, sines, cosines = law
-    omega = spread(rows["omega"], n)
-    if not step > 0.0:
-        raise InputError(f"step is {step:g}; allowed: above 0")
-    if code == Methods.CLOSED_FORM:
-        if any(each.any() for each in (constant, rate, sines[..., :3], cosines[..., :3])):
-            raise InputError(
-                "closed-form can't solve bodies with a torque in one call; allowed: auto, taylor"
-            )
-        if attitude is not None and not by_moments:
-            raise InputError(
-                "closed-form can't compute the attitude of bodies given by coefficients; "
-                "allowed: moments, or methods auto and taylor"
-            )
-    if attitude is not None:
-        check_attitude(method, PREPARED_WITH_ATTITUDE)
-    threads = threads_of(threads)
-    found = place_for(out, n, attitude is not None, with_estimates)
-    if found.estimates is not None:
-        found.estimates[:] = _UNKNOWN
-    # A kernel may write a result before it reads the initial state.
-    if np.may_share_memory(omega, found.omega):
-        omega = omega.copy()
-    if attitude is not None and np.may_share_memory(attitude, found.attitude):
-        attitude = attitude.copy()
-
-    def enter(piece: slice, given_up: NDArray[np.int32]) -> None:
-        def part(array: Array | None) -> Array:
-            if array is None:
-                return _NOTHING
-            return (array if len(array) in (0, 1, piece.stop - piece.start) else array[piece]).T
-
-        extension().solve_ensemble(
-            code, tolerance, step, effort, by_moments + 2 * is_rounded, part(body), part(constant),
-            part(rate), part(sines), part(cosines), part(omega), part(times), part(attitude),
-            given_up, found.omega[piece].T,
-            _NOTHING if found.attitude is None else found.attitude[piece].T, found.status[piece],
-            found.estimates_of(piece),
-        )  # fmt: skip
-
-    for_each_piece(enter, n, threads)
-    if found.estimates is not None:
-        found.estimates[~(found.estimates >= 0.0)] = np.nan
-    return found, omega, times

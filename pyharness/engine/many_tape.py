@@ -63,10 +63,8 @@ def solve_tape(
     states = rows_within(own, piece) if own.size else np.empty((n, 0))
     columns = times if times.shape[1] == 1 else times[:, piece]
     # Kernels integrate away from time 0.
-    for rows in _sides(columns[:, 0]):
-        m = len(rows)
-        if not m:
-            continue
+    for rows in sides_of(columns[:, 0]):
+        m = len(columns[rows])
         result = Ensemble(
             omega=np.empty((n, m, 3)), status=np.empty((n, m), np.int8),
             attitude=np.empty((len(first), m, 4)), own=np.empty((states.shape[1], n, m)),
@@ -86,15 +84,24 @@ def solve_tape(
         _set_rows(found, result, piece, rows)
 
 
-def _sides(times: Array) -> list[NDArray[np.int64]]:
-    """Return the numbers of times on each side of 0, away from it; NaN only if there is one time."""
+def sides_of(times: Array) -> list[slice]:
+    """Return the places of monotonic times on each side of 0, each from 0 on.
+
+    NaN, before or after them, has none, unless there is one time.
+    """
     if len(times) == 1:
-        return [np.zeros(1, np.int64)]
-    order = np.argsort(np.abs(times))
-    return [order[times[order] < 0.0], order[times[order] >= 0.0]]
+        return [slice(0, 1)]
+    known = np.flatnonzero(~np.isnan(times))
+    if not len(known):
+        return []
+    first, last = int(known[0]), int(known[-1]) + 1
+    is_late = times[first:last] >= 0.0 if times[last - 1] >= 0.0 else times[first:last] < 0.0
+    middle = last - int(is_late.sum())
+    before = slice(middle - 1, first - 1 if first else None, -1)
+    return [side for side in (before, slice(middle, last)) if len(times[side])]
 
 
-def _set_rows(found: Ensemble, result: Ensemble, piece: slice, rows: NDArray[np.int64]) -> None:
+def _set_rows(found: Ensemble, result: Ensemble, piece: slice, rows: slice) -> None:
     for name in ("omega", "attitude", "own", "status", "estimates"):
         array, values = getattr(found, name), getattr(result, name)
         if array is None or not values.size:

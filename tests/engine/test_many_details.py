@@ -25,7 +25,8 @@ TURNS = RNG.standard_normal((N, 4))
 TIMES = RNG.uniform(2.0, 6.0, N)
 MATRIX: Any = ((3.0, 0.1, 0.1), (0.1, 2.0, 0.1), (0.1, 0.1, 1.0))
 LAW = TorqueLaw((0.1, 0.2, 0.0), sines=[((0.1, 0.0, 0.2), 1.5)])
-RECORDED = "in space", "damped"
+# One integration has all rows.
+CONTINUED = "law", "constants", "in space", "damped"
 CASES: dict[str, tuple[Scene, dict[str, Any], list[str]]] = {
     "free": (TOP, {"moments": RNG.uniform(2.0, 3.0, (N, 3))}, ["omega", "moments"]),
     "law": (replace(TOP, torque=LAW), {}, ["torque.constant", "torque.sines"]),
@@ -222,7 +223,7 @@ def test_rows_over_time_are_those_of_final_times(name: str) -> None:
         )  # fmt: skip
         assert found.ended[:, k].tolist() == one.ended.tolist()
         assert (found.attitude is None) == (one.attitude is None)
-        if name in RECORDED:  # one integration has all rows
+        if name in CONTINUED:
             away = np.abs(found.omega[:, k] - one.omega).max(axis=1)
             allowed = found.error[:, k] + one.error
             assert (away <= allowed * np.abs(STARTS).max(axis=1) + 1e-15).all()
@@ -230,7 +231,7 @@ def test_rows_over_time_are_those_of_final_times(name: str) -> None:
         else:
             assert found.omega[:, k].tobytes() == one.omega.tobytes()
             assert np.array_equal(found.estimates[:, k], one.estimates, equal_nan=True)
-        if one.attitude is not None and name in RECORDED:
+        if one.attitude is not None and name in CONTINUED:
             assert angle_between(found.attitude[:, k], one.attitude).max() <= allowed.max() + 1e-15
         elif one.attitude is not None:
             assert found.attitude[:, k].tobytes() == one.attitude.tobytes()

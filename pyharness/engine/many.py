@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pyharness.engine.many_details import prepare_details
-from pyharness.engine.many_laws import solve_at, solve_bodies
+from pyharness.engine.many_law_scenes import choose_kernel, solve_laws
 from pyharness.engine.many_mistakes import reasons_of
 from pyharness.engine.many_recorded import NO_ATTITUDE, needs_equations, solve_recorded
 from pyharness.engine.many_scenes import (
@@ -18,22 +18,14 @@ from pyharness.engine.many_scenes import (
     ONES,
     PARAMETER,
     TORQUES,
-    about_principal,
     check_alike,
-    checked_copies,
-    from_scene,
-    from_scenes,
     rows_of_alike,
-    rows_of_scene,
 )
 from pyharness.engine.parameters import check_values
-from pyharness.engine.plan import FINEST
-from pyharness.engine.registry import PREPARED, REGISTRY, requested_tolerance
+from pyharness.engine.registry import PREPARED
 from pyharness.engine.solve import ascending_times
-from pyharness.engine.solver import CODES
-from pyharness.model.arrays import check_rows, count_bodies, only_one, rows_of, spread
-from pyharness.model.attitude import rotated, scalar_first, turned_back
-from pyharness.model.codes import Methods
+from pyharness.model.arrays import check_rows, only_one, rows_of, spread
+from pyharness.model.attitude import scalar_first
 from pyharness.model.ensemble import Ensemble, place_for
 from pyharness.model.errors import InputError, kind_of, known
 from pyharness.model.keywords import with_hints
@@ -41,8 +33,8 @@ from pyharness.model.principal import PrincipalScene, in_double
 from pyharness.model.progress import bar_of_bodies, expect_bodies
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.torque_law import TorqueLaw
-from pyharness.model.trajectory import ROUNDING, Array
-from pyharness.model.values import Number, Numbers, boolean, checked_effort, finite, number_list
+from pyharness.model.trajectory import Array
+from pyharness.model.values import Number, Numbers, boolean, checked_effort, number_list
 
 # Kinds of scenes under torque laws: about principal axes, and with an inertia matrix.
 _LAWS = _PLAIN, _TILTED = -2, -1
@@ -235,7 +227,7 @@ def _solve(
                 scene = replace(scene, changing=None, moments=ONES)
             scene = in_double(scene)
         if needs_equations(scene, {name: own[name] for name in TORQUES if name in own}):
-            settings["tolerance"] = _choose_kernel(settings["method"], settings["tolerance"])[1]
+            settings["tolerance"] = choose_kernel(settings["method"], settings["tolerance"])[1]
             settings["effort"] = checked_effort(settings["effort"])
             return solve_recorded(scene, t_end, times, arrays, states, out, **settings)
     else:
@@ -247,62 +239,7 @@ def _solve(
         kinds = [_kind_of(each, row) for row, each in enumerate(scene)]
         if len(set(kinds)) > 1 or any(each not in _LAWS for each in kinds):
             return _solve_groups(scene, kinds, t_end, times, step, out, **settings)
-    return _solve_laws(scene, t_end, times, arrays, out, step, **settings)
-
-
-def _solve_laws(
-    scene: Scene | Sequence[Scene], t_end: Any, times: Array | None, arrays: dict[str, Any],
-    out: "Ensemble | Array | None", step: Number | None, **settings: Any,
-) -> Ensemble:  # fmt: skip
-    own = {name: value for name, value in arrays.items() if value is not None}
-    method = settings["method"]
-    ready: dict[str, Any] = {}
-    axes = turns = None
-    if isinstance(scene, Scene):
-        step_size = scene.step_size
-        is_moments = "moments" in own or "coefficients" in own
-        if "inertia" in own or (scene.inertia is not None and not is_moments):
-            given = {"inertia": scene.inertia, **from_scene(scene), **own}
-            own, axes, turns = about_principal(given)
-        else:
-            if scene.inertia is not None:
-                scene = replace(scene, inertia=None, moments=ONES)
-            ready = rows_of_scene(scene)
-    else:
-        own = from_scenes(scene)
-        if scene[0].inertia is not None:
-            own, axes, turns = about_principal(own)
-        step_size = scene[0].step_size
-    if step is not None:
-        step_size = finite("step", step)
-    code, tolerance = _choose_kernel(method, settings["tolerance"])
-    kernel = code, tolerance, step_size, checked_effort(settings["effort"])
-    options: Any = {"method": method, "is_rounded": axes is not None}
-    options |= {"threads": settings["threads"], "with_estimates": settings["estimates"]}
-    if times is None:
-        own["t_end"] = t_end
-        found = solve_bodies(ready, own, kernel, out=out, **options)
-    else:
-        found = solve_at(ready, own, times, kernel, **options)
-    if axes is not None:
-        _turn_back(found, axes, turns, own, t_end)
-    return found if found.leaves is None else replace(found, leaves=None)
-
-
-def _turn_back(
-    found: Ensemble, axes: Array, turns: Array | None, own: Mapping[str, Any], t_end: Any
-) -> None:
-    """Transform results from principal `axes` (columns) to the body axes."""
-    if found.times is not None:
-        axes, turns = axes[:, None], None if turns is None else turns[:, None]
-    found.omega[:] = rotated(found.omega, axes)
-    if found.attitude is not None and turns is not None:
-        found.attitude[:] = turned_back(found.attitude, turns)
-        if found.error is not None:
-            # The initial omega was rounded after the rotation to principal axes.
-            sizes = np.max(np.abs(own["omega"]), axis=1)
-            ends = rows_of("t_end", t_end) if found.times is None else found.times
-            found.error[:] += ROUNDING * (sizes if found.times is None else sizes[:, None]) * abs(ends)
+    return solve_laws(scene, t_end, times, arrays, out, step, **settings)
 
 
 def _kind_of(scene: Scene, row: int) -> object:
@@ -356,11 +293,3 @@ def _solve_groups(
                 array[rows] = getattr(part, name)
     texts = "; ".join(sorted(filter(None, leaves))) or None
     return found if found.leaves == texts else replace(found, leaves=texts)
-
-
-def _choose_kernel(method: str, tolerance: Number | None) -> tuple[int, float]:
-    finest = max(FINEST, REGISTRY[method].finest if method == "quick" else 0.0)
-    asked = requested_tolerance(method, tolerance)
-    if not finest <= asked <= 1.0:
-        raise InputError(f"tolerance is {asked:g}; allowed: {finest:g} to 1")
-    return (Methods.CLOSED_FORM_OR_TAYLOR if method == "auto" else CODES[method]), asked

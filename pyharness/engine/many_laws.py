@@ -96,7 +96,8 @@ def solve_bodies(
 
 def solve_at(
     ready: dict[str, Any], own: dict[str, Any], times: Array,
-    settings: tuple[int, float, float, float], *, with_estimates: bool, threads: int, **options: Any,
+    settings: tuple[int, float, float, float], *, with_estimates: bool, threads: int,
+    **options: Any,
 ) -> Ensemble:  # fmt: skip
     """Return the states of bodies at `times` (s)."""
     # Normalised twice, a quaternion may have another last bit.

@@ -43,7 +43,8 @@ def reasons_of(
                 finite(f"states: {name}", row_of(np.atleast_1d(values), i))
             body = scene_of_row(scene, rows, i) if isinstance(scene, Scene) else scene[i]
             if not body.states:
-                prepare(body, method, attitude=body.attitude is not None)
+                options: Any = {"attitude": body.attitude is not None}
+                prepare(body, method, **options)
         except InputError as mistake:
             reasons[i] = str(mistake)
             status[i] = Statuses.REFUSED

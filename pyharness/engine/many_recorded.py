@@ -222,7 +222,7 @@ def _equations(
     if any(name in rows for name in TORQUES) and scene.changing is None:
         # As for scenes in a list, which differ in laws and bodies.
         own = {name: getattr(scene, name) for name in BODIES if getattr(scene, name) is not None}
-        rows = checked_rows(own) | rows if not rows.keys() & BODIES else rows
+        rows = {**checked_rows(own), **rows} if not rows.keys() & BODIES else rows
     kind = next((name for name in BODIES if name in rows), None)
     with np.errstate(all="ignore"):
         if kind == "moments":

@@ -6,10 +6,8 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyharness.engine.parameters import torque_with_values
-from pyharness.engine.registry import PREPARED_WITH_ATTITUDE, check_attitude
 from pyharness.model.arrays import (
     check_rows,
     count_bodies,
@@ -17,17 +15,14 @@ from pyharness.model.arrays import (
     row_of,
     rows_of,
     spread,
-    threads_of,
     unit_quaternions,
 )
 from pyharness.model.attitude import quaternions_of_axes, rotated, turned_back
-from pyharness.model.codes import Methods, Statuses
-from pyharness.model.ensemble import Ensemble, place_for
+from pyharness.model.codes import Statuses
 from pyharness.model.errors import InputError
 from pyharness.model.extension import extension
 from pyharness.model.inertia import SYMMETRIC, nearest_float, principal_frame
 from pyharness.model.principal import PrincipalScene
-from pyharness.model.progress import for_each_piece
 from pyharness.model.scene import STATE_TORQUE, Scene, Triple, checked_scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.model.arrays import rows_within, unit_quaternions
-from pyharness.model.attitude import rotated, turned_back
+from pyharness.model.attitude import Quaternion, rotated, turned_back
 from pyharness.model.ensemble import Ensemble
 from pyharness.model.extension import extension
 from pyharness.model.trajectory import Array
@@ -24,7 +24,7 @@ class Equations(NamedTuple):
     packed: Array
     alone: Array  # empty: bodies that can't be solved side by side are left
     data: Array = _NONE
-    axes: tuple[Array, Array] | None = None
+    axes: tuple[Array, Quaternion] | None = None
 
 
 class Bodies(NamedTuple):
@@ -57,7 +57,7 @@ def solve_tape(
     if equations.axes is not None:
         axes, turn = equations.axes
         starts = rotated(starts, axes.T)
-        first = turned_back(first, turn * np.array([1.0, -1.0, -1.0, -1.0]))
+        first = turned_back(first, np.multiply(turn, [1.0, -1.0, -1.0, -1.0]))
     starts = np.ascontiguousarray(starts)
     data = equations.data if len(equations.data) < 2 else equations.data[piece]
     states = rows_within(own, piece) if own.size else np.empty((n, 0))
@@ -75,8 +75,8 @@ def solve_tape(
         assert result.estimates is not None
         extension().tape_many(
             equations.packed, equations.alone.copy(), starts.T, np.asfortranarray(columns[rows]),
-            first.T, data.T, np.asfortranarray(states), np.array([*sizes, 0.0]), given_up, result.omega.T,
-            result.attitude.T, result.own.T, result.status.T, result.estimates.T,
+            first.T, data.T, np.asfortranarray(states), np.array([*sizes, 0.0]), given_up,
+            result.omega.T, result.attitude.T, result.own.T, result.status.T, result.estimates.T,
         )  # fmt: skip
         if equations.axes is not None:
             result.omega[:] = rotated(result.omega, axes)
@@ -95,10 +95,11 @@ def sides_of(times: Array) -> list[slice]:
     if not len(known):
         return []
     first, last = int(known[0]), int(known[-1]) + 1
-    is_late = times[first:last] >= 0.0 if times[last - 1] >= 0.0 else times[first:last] < 0.0
-    middle = last - int(is_late.sum())
-    before = slice(middle - 1, first - 1 if first else None, -1)
-    return [side for side in (before, slice(middle, last)) if len(times[side])]
+    within = times[first:last]
+    is_early = within < 0.0 if within[0] < within[-1] else within >= 0.0
+    middle = first + int(is_early.sum())
+    early = [slice(middle - 1, first - 1 if first else None, -1)] if middle > first else []
+    return early + ([slice(middle, last)] if last > middle else [])
 
 
 def _set_rows(found: Ensemble, result: Ensemble, piece: slice, rows: slice) -> None:

@@ -1,7 +1,7 @@
 """Random combinations of what differs in a batch of `solve_many`, compared with `solve`.
 
-The command is ``python -m tests.campaigns.combination_campaign COUNT SEED [FIRST]``. Each scene is a
-torque of `TORQUES` with a body of `BODIES`, parameters or none, own states or none, attitudes or
+The command is ``python -m tests.campaigns.combination_campaign COUNT SEED [FIRST]``. Each batch
+has a torque of `TORQUES`, a body of `BODIES`, parameters or none, own states or none, attitudes or
 none, and one time or several. Errors of some bodies are judged; the run time of a body, relative to
 the same torque with constant moments and one time, is only printed.
 """
@@ -129,11 +129,11 @@ def judge(tally: driver.Tally, batch: Batch, found: Ensemble) -> None:
         ends = np.atleast_1d(_LAST if times is None else times)
         one = solve(alone(batch, i), ends, tolerance=1e-13)
         assert one.error is not None
-        pairs = [(found.omega[i], one.omega, np.abs(one.omega).max())]
+        pairs: list[Any] = [(found.omega[i], one.omega, np.abs(one.omega).max())]
         if found.attitude is not None:
             pairs.append((found.attitude[i], one.attitude, 0.5))
         if found.own is not None:
-            pairs.append((found.own[i], one.own, np.abs(one.own).max()))
+            pairs.append((found.own[i], one.own, np.abs(np.array(one.own)).max()))
         apart = max(_largest(ours, theirs) / scale for ours, theirs, scale in pairs)
         tally.judge(f"error, tolerances: {batch.name.partition(',')[0]}", apart, tolerance)
         # A size of an own state is the largest so far, which may be smaller than that of `one`.

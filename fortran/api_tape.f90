@@ -140,8 +140,8 @@ end subroutine tape_derivatives
 
 subroutine tape_many(n_packed, packed, n_alone, alone, n, omega0, n_rows, n_times, times, &
                      n_attitudes, attitude0, n_parameters, n_sets, parameters, n_own, own0, &
-                     n_sizes, own_sizes, given_up, omega, n_results, attitude, n_owned, own, status, &
-                     n_estimates, estimates, raised)
+                     n_sizes, own_sizes, given_up, omega, n_results, attitude, n_owned, own, &
+                     status, n_estimates, estimates, raised)
   ! Solve many bodies under one torque: omega at n_rows times of each body; if n_attitudes > 0, also
   ! its attitude; and n_own own states.
   !f2py threadsafe

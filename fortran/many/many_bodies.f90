@@ -122,8 +122,8 @@ contains
   end subroutine solve_bodies
 
   subroutine solve_rows(bodies, code, status, raised)
-    !! Compute omega at the times of all bodies, side by side. Other bodies than those under a torque
-    !! that is no closed form's get the status NEEDS_FALLBACK.
+    !! Compute omega at the times of all bodies, side by side, by the series. Bodies with another
+    !! mark get the status NEEDS_FALLBACK.
     type(bodies_t), intent(in), target :: bodies
     integer, intent(in) :: code                    !! code of the module methods
     integer(i1), intent(inout) :: status(bodies%n) !! of the module statuses

@@ -2,6 +2,7 @@ module many_tape
   !! Many bodies under one torque that depends on the state: side by side, and one after the other
   !! those that this leaves.
   use, intrinsic :: iso_c_binding, only: c_loc, c_null_ptr
+  use, intrinsic :: iso_fortran_env, only: int64
   use bodies, only: i1, NEEDS_FALLBACK, of_body
   use interruption, only: interrupt_raised
   use kinds, only: dp
@@ -48,6 +49,7 @@ contains
     type(many_t), intent(inout) :: many
     integer, intent(out) :: raised     !! not 0: interrupted by the user
     type(tape_t) :: tape
+    real(dp), pointer, contiguous :: times(:)
     integer :: i, n_left
 
     raised = 0
@@ -66,8 +68,9 @@ contains
         tape%constants(:size(many%parameters, 1)) = &
           many%parameters(:, of_body(size(many%parameters, 2), i))
       end if
-      call solve_alone(tape, request_t(many%omega0(:, i), alone(TOLERANCE), alone(EFFORT), &
-                                       many%times(:, of_body(size(many%times, 2), i))), many, i, raised)
+      times => many%times(:, of_body(size(many%times, 2), i))
+      call solve_alone(tape, request_t(many%omega0(:, i), alone(TOLERANCE), alone(EFFORT), times), &
+                       many, i, raised)
     end do
   end subroutine solve_tape_bodies
 
@@ -141,7 +144,7 @@ contains
     integer :: column
 
     ! ieee_value is not used: its module makes the binary depend on libgfortran.
-    nan = transfer(huge(0_8), 1.0_dp)
+    nan = transfer(huge(0_int64), 1.0_dp)
     column = min(i, size(many%attitude0, 2))
     times = request%times(first:last)
     sizes = many%own_sizes(:many%n_own)

@@ -7,8 +7,8 @@ module levels
   implicit none(type, external)
   private
 
-  public :: choose_level, find_frames, fits_lanes, many_fixed, many_free, many_taylor, quick_solve, &
-            read_pieces, ready_leaves, run_lanes, tape_bodies, tape_solve, tape_step, &
+  public :: choose_level, find_frames, fits_lanes, many_fixed, many_free, many_taylor, &
+            quick_solve, read_pieces, ready_leaves, run_lanes, tape_bodies, tape_solve, tape_step, &
             tape_variation, taylor_solve
 
   interface
@@ -72,7 +72,7 @@ module levels
     end subroutine quick_solve
 
     subroutine find_frames(n, matrices, m, vectors, coefficients, axes, components, status) &
-        bind(c, name="find_frames")
+      bind(c, name="find_frames")
       import :: c_double, c_int
       implicit none(type, external)
       integer(c_int), intent(in), value :: n, m

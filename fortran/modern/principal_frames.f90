@@ -21,7 +21,7 @@ module principal_frames
 contains
 
   subroutine find_frames(n, matrices, m, vectors, coefficients, axes, components, status) &
-      bind(c, name="find_frames_level")
+    bind(c, name="find_frames_level")
     !! Compute the frames of n bodies, each with m vectors.
     integer(c_int), intent(in), value :: n, m
     real(dp), intent(in) :: matrices(3, 3, n)
@@ -101,7 +101,7 @@ contains
     real(dp), intent(in) :: matrix(3, 3)
     type(pair_t), intent(out) :: a(3, 3), v(3, 3)
     type(pair_t) :: sum, b(3, 3)
-    real(dp) :: turned(3, 3), axes(3, 3), off(3, 3)
+    real(dp) :: turned(3, 3), axes(3, 3), off(3, 3), change
     integer :: i, j, k
 
     turned = matrix
@@ -117,8 +117,8 @@ contains
     end do
     do j = 1, 3
       do i = 1, 3
-        v(i, j) = pair_t(axes(i, j), 0.0_dp) &
-                  + pair_t(axes(i, 1)*off(1, j) + axes(i, 2)*off(2, j) + axes(i, 3)*off(3, j), 0.0_dp)
+        change = axes(i, 1)*off(1, j) + axes(i, 2)*off(2, j) + axes(i, 3)*off(3, j)
+        v(i, j) = pair_t(axes(i, j), 0.0_dp) + pair_t(change, 0.0_dp)
       end do
     end do
     do j = 1, 3

@@ -100,8 +100,7 @@ def solve_many(
         `torque_constant`) and a frequency (rad/s).
     parameters : dict of arrays, shape (n,), or of float
         Values of keyword arguments of the torque's function, or of constants of its expressions, by
-        name. Bodies that differ only in these values, moments or coefficients, and initial states
-        are solved side by side.
+        name.
     states : dict of arrays, shape (n,), or of float
         Initial values of the scene's own states (`Scene.states`), by name; the default is the
         scene's values. With own states, `compiled`, `events`, `sensitivities` and
@@ -285,7 +284,10 @@ def _solve_groups(
         arrays = dict.fromkeys((*BODIES, *TORQUES, "omega", "attitude"))
         if kind not in _LAWS:
             own, arrays = rows_of_alike(own)
-        part = _solve(own, ends[rows], times, arrays, None, None, step, **settings)
+        try:
+            part = _solve(own, ends[rows], times, arrays, None, None, step, **settings)
+        except InputError as mistake:
+            raise InputError(f"scene {rows[0]}: {mistake}") from None
         leaves.add(part.leaves)
         for name in ("omega", "status", "attitude", "estimates"):
             array = getattr(found, name)

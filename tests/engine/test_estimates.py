@@ -122,8 +122,11 @@ def test_unknown_estimates_are_nan() -> None:
 def test_many_scenes_have_estimates() -> None:
     scenes = [replace(DAMPED, omega=(0.1, 0.2, 0.3)), BASE, replace(BASE, omega=(1.0, 2.0, 3.0))]
     found = MANY(scenes, 2.0, estimates=True)
-    alone = [MANY(each, 2.0, estimates=True).estimates[0] for each in scenes]
+    alone = [MANY([each], 2.0, estimates=True).estimates[0] for each in scenes]
     np.testing.assert_array_equal(found.estimates, alone)
+    # The moments of scenes in a list are data of their equations, those of one scene are constants.
+    plain = [MANY(each, 2.0, estimates=True).estimates[0] for each in scenes]
+    np.testing.assert_allclose(found.estimates, plain, rtol=1e-3)
 
 
 def test_long_steps_hide_no_amplification() -> None:

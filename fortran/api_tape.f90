@@ -141,7 +141,7 @@ end subroutine tape_derivatives
 subroutine tape_many(n_packed, packed, n_alone, alone, n, omega0, n_rows, n_times, times, &
                      n_attitudes, attitude0, n_parameters, n_sets, parameters, n_own, own0, &
                      n_sizes, own_sizes, given_up, omega, n_results, attitude, n_owned, own, &
-                     status, n_estimates, estimates, raised)
+                     status, n_estimates, estimates, n_left, raised)
   ! Solve many bodies under one torque: omega at n_rows times of each body; if n_attitudes > 0, also
   ! its attitude; and n_own own states.
   !f2py threadsafe
@@ -178,6 +178,7 @@ subroutine tape_many(n_packed, packed, n_alone, alone, n, omega0, n_rows, n_time
   integer(4), intent(in) :: n_estimates         ! n if the estimates are requested, else 0
   ! Relative error of a result, and error amplification; only of bodies with a result.
   real(8), intent(inout), target :: estimates(2, n_rows, n_estimates)
+  integer(4), intent(out) :: n_left             ! number of bodies that are not solved side by side
   integer(4), intent(out) :: raised             ! 1: interrupted by the user
   type(many_t) :: many
 
@@ -196,7 +197,7 @@ subroutine tape_many(n_packed, packed, n_alone, alone, n, omega0, n_rows, n_time
   many%status => status
   many%estimates => estimates
   call watch(c_loc(given_up))
-  call solve_tape_bodies(packed, alone, many, raised)
+  call solve_tape_bodies(packed, alone, many, n_left, raised)
   call watch(c_null_ptr)
 end subroutine tape_many
 

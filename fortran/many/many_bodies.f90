@@ -71,6 +71,7 @@ contains
     integer(i1), intent(inout), target :: status(n)
     integer, intent(out) :: raised
     type(many_t) :: many
+    integer :: n_left
     real(dp), target :: alone(0:n_packed - 1), of_attitudes(4, 1, 0), of_estimates(2, 1, 0)
     real(dp), target :: attitudes(4, 0), states(n, 0), sizes(0), own(1, n, 0), parameters(0, 0)
 
@@ -89,7 +90,7 @@ contains
     many%attitude => of_attitudes
     many%own => own
     many%estimates => of_estimates
-    call solve_tape_bodies(packed, alone, many, raised)
+    call solve_tape_bodies(packed, alone, many, n_left, raised)
   end subroutine solve_packed_tape
 
   subroutine solve_bodies(bodies, code, packed, omega, status, raised)

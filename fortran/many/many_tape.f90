@@ -40,25 +40,26 @@ module many_tape
 
 contains
 
-  subroutine solve_tape_bodies(packed, alone, many, raised)
+  subroutine solve_tape_bodies(packed, alone, many, n_left, raised)
     !! Compute the unknowns of each body at its times.
     real(dp), intent(in), target, contiguous :: packed(0:) !! the scene, as in prepared.f90
     !! The same for one body, with its parameters as the constants of the first combinations. The
     !! constants change. If it is empty, bodies that are left keep the status NEEDS_FALLBACK.
     real(dp), intent(inout), target, contiguous :: alone(0:)
     type(many_t), intent(inout) :: many
+    integer, intent(out) :: n_left     !! number of bodies that are not solved side by side
     integer, intent(out) :: raised     !! not 0: interrupted by the user
     type(tape_t) :: tape
     real(dp), pointer, contiguous :: times(:)
-    integer :: i, n_left
+    integer :: i
 
     raised = 0
+    n_left = 0
     many%status = NEEDS_FALLBACK
     if (many%n_rows == 0) return
     call solve_lanes(packed, many, raised)
     if (size(alone) == 0) return
     tape = tape_of(alone(WAVES:))
-    n_left = 0
     do i = 1, many%n
       if (many%status(1, i) /= NEEDS_FALLBACK) cycle
       n_left = n_left + 1

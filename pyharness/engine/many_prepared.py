@@ -95,18 +95,21 @@ def many_states(
 def solve_with(
     solver: "Solver[Any]", bodies: Bodies, found: Ensemble, piece: slice,
     given_up: NDArray[np.int32],
-) -> None:  # fmt: skip
-    """Solve the bodies in `piece` into `found`, whose arrays have an axis of times."""
+) -> int:  # fmt: skip
+    """Solve the bodies in `piece` into `found`, whose arrays have an axis of times.
+
+    Return how many were not solved side by side.
+    """
     if solver.packed[Places.METHOD] == Methods.TAPE:
         axes = axes_and_turn(solver.scene) if uses_principal_axes(solver.scene) else None
         equations = Equations(solver.packed, solver.packed, axes=axes)
-        solve_tape(equations, bodies, found, piece, given_up)
-        return
+        return solve_tape(equations, bodies, found, piece, given_up)
     for i in range(piece.start, piece.stop):
         for row, times in enumerate(bodies.times):
             if given_up[0]:
-                return
+                return 0
             _solve_row(solver, (i, row), bodies, float(row_of(times, i)), found)
+    return piece.stop - piece.start
 
 
 def _solve_row(

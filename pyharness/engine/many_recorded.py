@@ -44,7 +44,7 @@ from pyharness.model.extension import ENDS
 from pyharness.model.principal import PrincipalScene
 from pyharness.model.progress import for_each_piece
 from pyharness.model.scene import Scene, Triple
-from pyharness.model.state_torque import StateTorque
+from pyharness.model.state_torque import StateTorque, has_switches
 from pyharness.model.tape import Tape, slots_of
 from pyharness.model.trajectory import Array
 
@@ -122,11 +122,15 @@ def solve_recorded(
 
     def enter(piece: slice, given_up: NDArray[np.int32]) -> None:
         if isinstance(equations, Equations):
-            solve_tape(equations, bodies, result, piece, given_up)
+            left.append(solve_tape(equations, bodies, result, piece, given_up))
         else:
-            solve_with(equations, bodies, result, piece, given_up)
+            left.append(solve_with(equations, bodies, result, piece, given_up))
 
+    left: list[int] = []
     for_each_piece(enter, n, threads_of(threads))
+    if leaves is not None and any(left):
+        why = "switches" if has_switches(scene.torque) else "their error estimates"
+        leaves += f"; {sum(left)} of {n} bodies one by one, because of {why}"
     if scene.states:
         # `solve` takes omegas and states of any size, and tells endings apart.
         has_result = np.isin(result.status, (Statuses.COMPLETE, Statuses.SENSITIVE)).all(axis=1)

@@ -40,11 +40,12 @@ class Bodies(NamedTuple):
 def solve_tape(
     equations: Equations, bodies: Bodies, found: Ensemble, piece: slice,
     given_up: NDArray[np.int32],
-) -> None:  # fmt: skip
+) -> int:  # fmt: skip
     """Solve the bodies in `piece` for all times, into `found`, whose arrays have an axis of times.
 
-    The times may be of both signs, ascending.
+    Return how many were not solved side by side, on the side of time 0 with more of them.
     """
+    most_left = 0
     omega, times, turns, own, sizes = bodies
     n = piece.stop - piece.start
     starts = rows_within(omega, piece)
@@ -73,7 +74,7 @@ def solve_tape(
         assert result.attitude is not None
         assert result.own is not None
         assert result.estimates is not None
-        extension().tape_many(
+        n_left, _ = extension().tape_many(
             equations.packed, equations.alone.copy(), starts.T, np.asfortranarray(columns[rows]),
             first.T, data.T, np.asfortranarray(states), np.array([*sizes, 0.0]), given_up,
             result.omega.T, result.attitude.T, result.own.T, result.status.T, result.estimates.T,
@@ -82,6 +83,8 @@ def solve_tape(
             result.omega[:] = rotated(result.omega, axes)
             result.attitude[:] = turned_back(result.attitude, turn)
         _set_rows(found, result, piece, rows)
+        most_left = max(most_left, n_left)
+    return most_left
 
 
 def sides_of(times: Array) -> list[slice]:

@@ -55,7 +55,8 @@ class Ensemble(BatchResult):
         m.
     leaves : str or None
         Whether compiled code (``compiled``) or an ``interpreter`` computed the Taylor series of a
-        recorded torque, with the reason if `compiled` was requested but impossible.
+        recorded torque, with the reason if `compiled` was requested but impossible; and how many
+        bodies could not be solved side by side, with the reason.
 
     Examples
     --------

@@ -67,6 +67,8 @@ def test_no_body_of_a_recorded_torque_is_prepared_alone(
     found = solve_many(scene, 2.0, omega=STARTS, tolerance=1e-9, **arrays)
     assert found.has_result.all()
     assert found.refusals is None
+    alone = f"; {N} of {N} bodies one by one, because of switches"
+    assert found.leaves == "interpreter" + (alone if torque is clipped else "")
 
 
 @pytest.mark.parametrize("law", [TorqueLaw((0.1, 0.2, -0.1)), TorqueLaw(), linear, clipped])
@@ -118,6 +120,23 @@ def test_results_of_own_states_do_not_depend_on_other_bodies(own: dict[str, Any]
         )  # fmt: skip
         assert part.omega[0].tobytes() == whole.omega[i].tobytes()
         assert part.states["x"][0].tobytes() == whole.states["x"][i].tobytes()
+
+
+@pytest.mark.parametrize("start", [(1.0, 0.0), (1.0, 5.0), (1e-3, 0.0)])
+def test_own_states_faster_than_omega_are_solved_side_by_side(start: tuple[float, float]) -> None:
+    def law(t: Any, omega: Any, states: Any, f: float = 20.0) -> Any:
+        return -0.1 * omega, {"x": f * states["y"], "y": -f * states["x"]}
+
+    given: Any = {"x": start, "y": (0.0, start[1])}
+    scene = Scene("", (1.0, 0.5, 0.2), moments=MOMENTS, torque=law, states=given)
+    for own in ({}, {"parameters": {"f": [20.0] * N}}, {"times": [0.7, 2.0]}):
+        arguments: Any = {"t_end": None if "times" in own else 2.0, "omega": STARTS, **own}
+        found = solve_many(scene, **arguments, tolerance=1e-9, estimates=True)
+        assert found.leaves == "interpreter"
+        x = found.states["x"].reshape(N, -1)[:, -1]
+        assert x == pytest.approx(start[0] * np.cos(40.0), abs=1e-9 * max(start))
+        y = found.states["y"].reshape(N, -1)[:, -1]
+        assert y == pytest.approx(-start[0] * np.sin(40.0), abs=1e-9 * max(start))
 
 
 def test_a_state_that_stays_zero_is_solved() -> None:

@@ -109,7 +109,8 @@ def solve_with(
             if given_up[0]:
                 return 0
             _solve_row(solver, (i, row), bodies, float(row_of(times, i)), found)
-    return piece.stop - piece.start
+    count: int = piece.stop - piece.start
+    return count
 
 
 def _solve_row(

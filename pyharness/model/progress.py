@@ -74,7 +74,7 @@ def progress_of(choice: bool | Progress, what: str) -> Iterator[Progress]:
 
 
 def for_each_piece(
-    work: Callable[[slice, NDArray[np.int32]], None],
+    work: Callable[[slice, NDArray[np.int32]], object],
     n: int,
     threads: int,
     pieces: Sequence[slice] | None = None,

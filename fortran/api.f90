@@ -289,7 +289,7 @@ subroutine solve_packed(packed, n_packed, omega0, t_end, omega, status, steps, f
   integer(4), intent(out) :: status
   integer(8), intent(out) :: steps   ! or right-hand sides, of Gauss collocation;
   ! negative if the kernel chose quick instead of the series
-  real(8), intent(out) :: found(3)   ! relative error, amplification, steps in all; negative: unknown
+  real(8), intent(out) :: found(3)   ! error, amplification, steps in all; below 0: unknown
 
   call solve_prepared(packed, n_packed, omega0, t_end, omega, status, steps, found)
 end subroutine solve_packed

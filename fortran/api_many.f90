@@ -130,9 +130,9 @@ subroutine solve_ensemble(code, tolerance, step, effort, by_moments, n_body, bod
 end subroutine solve_ensemble
 
 subroutine solve_many_rows(code, tolerance, by_moments, n_body, body, n_constant, constant, &
-                     n_rate, rate, n_sines, n_sine_sets, sines, n_cosines, n_cosine_sets, cosines, &
-                           n, omega0, n_rows, times, given_up, omega, status, n_estimates, &
-                           estimates, raised)
+                           n_rate, rate, n_sines, n_sine_sets, sines, n_cosines, &
+                           n_cosine_sets, cosines, n, omega0, n_rows, times, given_up, omega, &
+                           status, n_estimates, estimates, raised)
   ! Solve many bodies under torque laws for several times; see solve_ensemble. The status is 0, or
   ! -1 of a body that this leaves.
   !f2py threadsafe

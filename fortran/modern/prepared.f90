@@ -33,7 +33,7 @@ contains
     real(dp), intent(out) :: omega(3)  !! rad/s
     integer, intent(out) :: status     !! code of the module statuses
     integer(int64), intent(out) :: steps !! or right-hand sides, of Gauss collocation
-    real(dp), intent(out) :: found(3)  !! relative error, amplification, steps in all; negative: unknown
+    real(dp), intent(out) :: found(3)  !! error, amplification, steps in all; below 0: unknown
     real(dp) :: largest
 
     largest = max(abs(omega0(1)), abs(omega0(2)), abs(omega0(3)))
@@ -56,7 +56,7 @@ contains
     real(dp), intent(inout), target, contiguous :: state(:) !! as start
     integer, intent(out) :: status     !! code of the module statuses
     integer(int64), intent(out) :: steps
-    real(dp), intent(out) :: found(3)  !! relative error, amplification, steps in all; negative: unknown
+    real(dp), intent(out) :: found(3)  !! error, amplification, steps in all; below 0: unknown
     type(solution_t) :: solution
     real(dp), target :: times(1), attitudes(4, 0:1)
     real(dp) :: largest
@@ -115,7 +115,7 @@ contains
     real(dp), intent(out), target :: omega(3)  !! rad/s
     integer, intent(out) :: ended      !! code of the module statuses
     integer(int64), intent(out) :: count !! or right-hand sides, of Gauss collocation
-    real(dp), intent(out) :: found(3)  !! relative error, amplification, steps in all; negative: unknown
+    real(dp), intent(out) :: found(3)  !! error, amplification, steps in all; below 0: unknown
     type(problem_t) :: problem
     type(solution_t) :: solution
     real(dp), target :: times(1)
@@ -165,7 +165,7 @@ contains
     type(request_t), intent(in) :: request
     integer, intent(in) :: code         !! of the module methods
     type(solution_t), intent(inout) :: solution
-    real(dp), intent(out) :: found(3)   !! relative error, amplification, steps in all; below 0: unknown
+    real(dp), intent(out) :: found(3)   !! error, amplification, steps in all; below 0: unknown
 
     found = -1.0_dp
     if (code == QUICK .or. code == QUICK_OR_TAYLOR) then
@@ -192,7 +192,7 @@ contains
     type(request_t), intent(in) :: request
     real(dp), intent(in) :: omega(3)   !! the result, rad/s
     integer, intent(inout) :: ended    !! SENSITIVE, or COMPLETE if the series excludes that
-    real(dp), intent(inout) :: found(3) !! relative error, amplification, steps in all; below 0: unknown
+    real(dp), intent(inout) :: found(3) !! error, amplification, steps in all; below 0: unknown
     real(dp), target :: other(3, 1)
     type(solution_t) :: solution
 
@@ -219,7 +219,7 @@ contains
     real(dp), intent(out), target :: state(7)
     integer, intent(out) :: status     !! code of the module statuses
     integer(int64), intent(out) :: steps
-    real(dp), intent(out) :: found(3)  !! relative error, amplification, steps in all; negative: unknown
+    real(dp), intent(out) :: found(3)  !! error, amplification, steps in all; below 0: unknown
     type(problem_t) :: problem
     type(solution_t) :: solution
     real(dp), target :: times(1), attitudes(4, 0:1)

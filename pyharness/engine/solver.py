@@ -178,8 +178,8 @@ class Solver(BoundKernel[Result]):
 
     def trajectory(self, omega: Numbers, times: Number | Numbers) -> Trajectory:
         """Return the trajectory from `omega` (rad/s) at `times` (s) by `solve`."""
+        from pyharness import solve  # which prepares solvers
         from pyharness.engine.registry import METHODS
-        from pyharness.engine.solve import solve
 
         scene = replace(self.scene, omega=three("omega", omega))
         tolerance, asked, effort = self.settings

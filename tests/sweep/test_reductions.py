@@ -131,8 +131,9 @@ def test_torque_in_space_may_be_that_of_an_axis_alone(tmp_path: Path) -> None:
     for i, torque in enumerate((0.0, 1.0)):
         law = TorqueLaw((torque, 0.0, 0.0), frame="space")
         rows: Any = solve(replace(sweep.scene, torque=law), 10.0, attitude=True)
-        assert np.abs(found["attitude"][i] - rows.attitude[-1]).max() < 1e-11
-        assert np.abs(found["end"][i] - rows.omega[-1]).max() < 1e-11
+        # Side by side, steps differ; the tolerance is 1e-9 of about 6 rad/s.
+        assert np.abs(found["attitude"][i] - rows.attitude[-1]).max() < 1e-9
+        assert np.abs(found["end"][i] - rows.omega[-1]).max() < 6e-9
     program = text(axes, top="", scene=scene + "[solve]\nprogram = 'two-term'\n")
     with pytest.raises(InputError, match="about the axes of space"):
         _found(tmp_path, program)

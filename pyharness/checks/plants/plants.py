@@ -27,6 +27,7 @@ from pyharness.checks.plants.faults import (
     twin,
 )
 from pyharness.checks.plants.outcome import Outcome, control
+from pyharness.engine.registry import FIXED_STEP, GAUSS
 from pyharness.engine.solver import CODES as _CODES
 from pyharness.model import extension
 from pyharness.model.codes import Methods, Places
@@ -123,7 +124,7 @@ def _refuses(packed: Array, answer: _Answer, size: float) -> _Answer:
     return refused if size and packed[Places.METHOD] == Methods.QUICK else answer
 
 
-_FIXED = [code for name, code in _CODES.items() if name.startswith(("gauss", "rk", "impr"))]
+_FIXED = [_CODES[name] for name in (*GAUSS, *FIXED_STEP)]
 
 
 def _too_large(packed: Array, answer: _Answer, size: float) -> _Answer:

@@ -112,7 +112,8 @@ def problem_of(scene: Scene, with_attitude: bool, exactly: bool = False) -> Prob
 def keep_end(problem: Problem, key: Any, method: str, tolerance: float, effort: float) -> None:
     """Let `kept_end` solve with the arguments `key` of `solve`."""
     kept = problem.given.__dict__[_KEPT]
-    if method in _WITH_END and not problem.given.states and key not in kept:
+    is_known = tuple(map(type, key)) in _TYPES
+    if is_known and method in _WITH_END and not problem.given.states and key not in kept:
 
         def first(time: float) -> Trajectory | None:
             end = kept[key] = problem.end(method, tolerance, effort)

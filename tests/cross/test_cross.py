@@ -13,6 +13,7 @@ import pytest
 
 from pyharness import case_scene
 from pyharness.model.codes import Operations, Statuses
+from pyharness.model.codes import Methods
 from pyharness.model.extension import COMPLETE, GAVE_UP, OVERFLOW
 from pyharness.model.listing import Listing
 from pyharness.model.trajectory import Stop
@@ -162,7 +163,10 @@ def test_guard_lets_through_what_the_answer_tells_of(
     assert not is_told or call() == (status, quotient)
 
 
-@pytest.mark.parametrize(("code", "is_told"), [(8, True), (7, True), (3, False)])
+@pytest.mark.parametrize(
+    ("code", "is_told"),
+    [(Methods.QUICK_OR_TAYLOR, True), (Methods.QUICK, True), (Methods.TAYLOR, False)],
+)
 def test_guard_knows_an_attempt_that_is_refused(
     code: int, is_told: bool, guarded_entry: Guarded
 ) -> None:

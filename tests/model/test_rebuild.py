@@ -82,7 +82,7 @@ def test_a_changed_constant_changes_one_module(tmp_path: Path) -> None:
         changed = {name for name in written if (tmp_path / name).stat().st_mtime > 1}
         for name in written:
             os.utime(tmp_path / name, (1, 1))
-    assert written == {*(f"{name}.f90" for name in CLASSES), "codes.h", "codes.py"}
+    assert written == {*(f"{name}.f90" for name in CLASSES), "listing.f90", "codes.h", "codes.py"}
     assert changed == {"series.f90", "codes.py"}
 
 

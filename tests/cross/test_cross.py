@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from pyharness import case_scene
-from pyharness.model.codes import Operations, Statuses
-from pyharness.model.codes import Methods
+from pyharness.model.codes import Methods, Operations, Statuses
 from pyharness.model.extension import COMPLETE, GAVE_UP, OVERFLOW
 from pyharness.model.listing import Listing
 from pyharness.model.trajectory import Stop

@@ -78,21 +78,20 @@ class Problem:
             self.check(time, time)
             state = solver(omega, time)
             number, steps, _, _, spent, *_ = solver._ending
-            attitude = None
+            attitude = error = growth = None
             if self.with_attitude:
                 state, attitude = state[0], state[1][None]
-            found = rows_trajectory(
-                (time,), state[None], int(spent) if steps else 0, steps or 1, "complete",
-                attitude=attitude, **known,
-            )  # fmt: skip
-            if kind and not steps and number == COMPLETE and abs(time) < calm:
-                estimates = partial(closed_form_estimate, scene, scene.omega, time)
-                found = found.estimated_later(estimates)
-            else:
+            is_later = kind and not steps and number == COMPLETE and abs(time) < calm
+            if not is_later:
                 status, error, growth = judge_ending(scene, kind, tolerance, solver._ending)
                 if status != "complete":
                     return None
-                found = found.changed(error=error, growth=growth)
+            found = rows_trajectory(
+                (time,), state[None], int(spent) if steps else 0, steps or 1, "complete",
+                attitude=attitude, error=error, growth=growth, **known,
+            )  # fmt: skip
+            if is_later:
+                found.estimated_later(partial(closed_form_estimate, scene, scene.omega, time))
             return self.in_axes_of_scene(found)
 
         return solved

@@ -122,11 +122,12 @@ class Fields:
         return found
 
     def estimated_later(self, estimates: Callable[[], tuple[float | None, float | None]]) -> Self:
-        """Return a copy that calls `estimates` for `error` and `growth` when one is read."""
-        found = self.changed(_estimates=estimates)
+        """Let this new object call `estimates` for `error` and `growth` when one is read."""
+        content = self.__dict__
+        content["_estimates"] = estimates
         for name in _ESTIMATED:
-            found.__dict__.pop(name, None)
-        return found
+            del content[name]
+        return self
 
     def __getstate__(self) -> dict[str, Any]:
         return {each.name: getattr(self, each.name) for each in fields(self)}

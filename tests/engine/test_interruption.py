@@ -150,9 +150,8 @@ def keyboard() -> Iterator[_Keyboard]:
 @pytest.mark.sampled
 @pytest.mark.parametrize("name", LONG)
 def test_kernel_ends_at_once(name: str, keyboard: _Keyboard, monkeypatch: Patch) -> None:
-    rooms = ("taylor", "closed_form", "gauss", "many_laws", "many_scenes", "many_tape")
-    rooms += ("many_prepared",)
-    engine = [f"engine.{each}" for each in rooms]
+    rooms = "taylor closed_form gauss many_laws many_scenes many_tape many_prepared"
+    engine = [f"engine.{each}" for each in rooms.split()]
     for each in (*engine, "thesis.compiled", "thesis.many", "model.extension"):
         monkeypatch.setattr(f"pyharness.{each}.extension", keyboard.door)
     if name in DOORLESS:

@@ -96,7 +96,7 @@ def known_solution(
     noise = torque_noise(scene, scene.omega, times[-1])
     if scene.torque.is_zero and abs(times[-1]) < calm_until(scene, tolerance):
         found = trajectory_of(times, rows, n_rows, COMPLETE, len(times), 0, attitudes=attitudes)
-        return found.estimated_later(partial(_largest_estimate, scene, times, noise))
+        return found.estimate_later(partial(_largest_estimate, scene, times, noise))
     error, growth = _largest_estimate(scene, times, noise)
     amplified = growth_of_rounding(scene, growth)
     status = SENSITIVE if is_sensitive(amplified, tolerance, noise) else COMPLETE

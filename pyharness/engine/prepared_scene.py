@@ -25,6 +25,7 @@ from pyharness.model.trajectory import Trajectory
 from pyharness.model.waves import with_merged_waves
 
 _KEPT = "_problems"  # an attribute of a scene that is no field
+_MOST_KEPT = 16  # problems and functions of a scene
 _WITH_END = ("auto", "taylor", "closed-form")
 # Of method, tolerance, effort and attitude.
 _TYPES = set(product((str,), (float, type(None)), (float,), (bool, type(None))))
@@ -63,7 +64,7 @@ class Problem:
             return found
         if isinstance(self.scene, PrincipalScene):
             return in_scene_axes(found, self.axes)
-        return found.changed(axes=self.axes.copy())
+        return found.with_values(axes=self.axes.copy())
 
     def end(self, method: str, tolerance: float, effort: float) -> End:
         """Return a function that solves until one time; None means that `solve` must judge."""
@@ -74,7 +75,7 @@ class Problem:
         calm = calm_until(scene, tolerance) if scene.torque.is_zero else 0.0
         known = {"moments": self.moments, "tolerance": tolerance, "scene": self.given}
 
-        def solved(time: float) -> Trajectory | None:
+        def solve_until(time: float) -> Trajectory | None:
             self.check(time, time)
             state = solver(omega, time)
             number, steps, _, _, spent, *_ = solver._ending
@@ -91,10 +92,10 @@ class Problem:
                 attitude=attitude, error=error, growth=growth, **known,
             )  # fmt: skip
             if is_later:
-                found.estimated_later(partial(closed_form_estimate, scene, scene.omega, time))
+                found.estimate_later(partial(closed_form_estimate, scene, scene.omega, time))
             return self.in_axes_of_scene(found)
 
-        return solved
+        return solve_until
 
 
 def problem_of(scene: Scene, with_attitude: bool, exactly: bool = False) -> Problem:
@@ -113,6 +114,8 @@ def keep_end(problem: Problem, key: Any, method: str, tolerance: float, effort: 
     kept = problem.given.__dict__[_KEPT]
     is_known = tuple(map(type, key)) in _TYPES
     if is_known and method in _WITH_END and not problem.given.states and key not in kept:
+        if len(kept) >= _MOST_KEPT:
+            kept.clear()
 
         def first(time: float) -> Trajectory | None:
             end = kept[key] = problem.end(method, tolerance, effort)

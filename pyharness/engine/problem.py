@@ -7,7 +7,7 @@ columns have three amplitudes (rad/s2) and a frequency (rad/s).
 import math
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,9 +16,6 @@ from pyharness.model.extension import ENDS, columns
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import WITH_ALL_ROWS, Array, Trajectory
-
-if TYPE_CHECKING:
-    pass
 
 _NOT_FINITE = (
     "a coefficient A, B, C or a torque divided by its moment is not finite; use moments nearer "
@@ -94,7 +91,7 @@ def rows_trajectory(
 ) -> Trajectory:
     """Return a trajectory from omega (rad/s, shape (n, 3)) at `times` (s)."""
     time = np.array(times, dtype=float)
-    return Trajectory.made(
+    return Trajectory.create(
         time=time, recorded_time=time, omega=omega, velocity=None, steps=steps,
         evaluations=evaluations, ended=ended, **more,
     )  # fmt: skip

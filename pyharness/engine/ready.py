@@ -41,7 +41,7 @@ def choice(*values: Any) -> Callable[..., Argument]:
     return partial(Argument, {"enum": list(values)})
 
 
-def listed(form: dict[str, Any], fewest: int, most: int) -> dict[str, Any]:
+def list_form(form: dict[str, Any], fewest: int, most: int) -> dict[str, Any]:
     return {"type": "array", "items": form, "minItems": fewest, "maxItems": most}
 
 
@@ -104,7 +104,7 @@ def ready_torque(
     **arguments: Argument,
 ) -> Callable[[Function], Function]:
     """Declare a function as a ready torque, which is a `kind` in scene files."""
-    return _declared(
+    return _declare_in(
         TORQUES, (), arguments, about=about, formula=formula, draw=draw, note=note,
         convention=convention, leaves=leaves,
     )  # fmt: skip
@@ -112,10 +112,10 @@ def ready_torque(
 
 def ready_event(about: str, **arguments: Argument) -> Callable[[Function], Function]:
     """Declare a function as a ready event, which has `terminal` and `direction` too."""
-    return _declared(EVENTS, ("terminal", "direction"), arguments, about=about)
+    return _declare_in(EVENTS, ("terminal", "direction"), arguments, about=about)
 
 
-def _declared(
+def _declare_in(
     ready: dict[str, Ready], common: tuple[str, ...], arguments: dict[str, Argument], **more: Any
 ) -> Callable[[Function], Function]:
     def declare(function: Function) -> Function:

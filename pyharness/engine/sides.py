@@ -12,7 +12,7 @@ _WORST_FIRST = ("singular", "stalled", "sliding", "overflow", "unchecked", "sens
 
 
 def in_reverse(found: Trajectory) -> Trajectory:
-    return found.changed(**{name: each[::-1] for name, each in found.with_rows().items()})
+    return found.with_values(**{name: each[::-1] for name, each in found.with_rows().items()})
 
 
 def joined(before: Trajectory, after: Trajectory) -> Trajectory:

@@ -175,7 +175,7 @@ def solve(
     if names is not None:
         states = partial(_states_of_changed, found.time, effort, found.attitude is not None)
         slopes = sensitivities_at(scene, found, names, effort, states)
-        found = found.changed(sensitivities=slopes)
+        found = found.with_values(sensitivities=slopes)
     if plain and found.ended == "complete":
         keep_end(problem, key, method, tolerance, effort)
     return found
@@ -216,7 +216,7 @@ class _Call(NamedTuple):
         found = problem.in_axes_of_scene(found)
         if sol is not None:
             sol = replace(sol, rates=partial(rates_of, given))
-        found = found.changed(
+        found = found.with_values(
             moments=problem.moments,
             tolerance=None if chosen.is_fixed_step else tolerance,
             scene=given,
@@ -228,11 +228,11 @@ class _Call(NamedTuple):
                 "ends before the last time; allowed: a smooth torque, or opaque(function)"
             )
         if found.reason is not None:
-            found = found.changed(reason=with_text(found.reason, given))
+            found = found.with_values(reason=with_text(found.reason, given))
         rows = partial(_more_rows, given, method, self.effort, found.attitude is not None)
         if needs_steps and sol is None:
             sol = solution_of(given, found, rows, method, tolerance)
-            found = found.changed(sol=sol) if self.dense_output else found
+            found = found.with_values(sol=sol) if self.dense_output else found
         if self.functions is None:
             return found, None
         assert sol is not None

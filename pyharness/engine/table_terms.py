@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.engine.ready import NUMBER, VECTOR, Argument, choice, listed, ready_torque
+from pyharness.engine.ready import NUMBER, VECTOR, Argument, choice, list_form, ready_torque
 from pyharness.engine.term_input import ready_term
 from pyharness.model.array_type import Array
 from pyharness.model.errors import InputError, unknown
@@ -25,7 +25,7 @@ from pyharness.model.values import Numbers, Triple, converted, finite, number_li
 __all__ = ["pulses", "table"]
 _INTERPOLATIONS = ("held", "linear", "cubic")
 _MOST_TIMES, _MOST_PULSES = 1_000_000, 10_000
-_TIMES = listed(NUMBER, 1, _MOST_PULSES)
+_TIMES = list_form(NUMBER, 1, _MOST_PULSES)
 _LARGEST_TIME = 1e300
 # Pulses touch if the gap is at most this many spacings of floats, because the end of a pulse is
 # rounded.
@@ -42,10 +42,10 @@ _TOUCHING = 4.0
     note="constant before the first and after the last time",
     leaves=(),
     times=Argument(
-        listed(NUMBER, 2, _MOST_TIMES), "Times", "s", [-1.0, 0.5, 1.0], remark="ascending"
+        list_form(NUMBER, 2, _MOST_TIMES), "Times", "s", [-1.0, 0.5, 1.0], remark="ascending"
     ),
     values=Argument(
-        listed(VECTOR, 2, _MOST_TIMES), "A row of three numbers for each time", "N m",
+        list_form(VECTOR, 2, _MOST_TIMES), "A row of three numbers for each time", "N m",
         [(0.1, 0.2, 0.3), (0.5, -0.2, 0.1), (0.0, 0.3, 0.2)],
     ),
     interpolation=choice(*_INTERPOLATIONS)("Interpolation between the times", "", "linear"),
@@ -185,7 +185,7 @@ def _rows(where: str, values: Any, count: int, allowed: str, what: str) -> list[
     starts=Argument(_TIMES, "Beginnings", "s", [-1.0, 0.5]),
     durations=Argument(_TIMES, "Durations", "s", [0.3, 0.2]),
     torque=Argument(
-        {"anyOf": [VECTOR, listed(VECTOR, 1, _MOST_PULSES)]},
+        {"anyOf": [VECTOR, list_form(VECTOR, 1, _MOST_PULSES)]},
         "One torque for all pulses, or one for each", "N m", (0.5, -1.0, 0.7),
     ),
 )  # fmt: skip

@@ -48,7 +48,7 @@ class Quantity(NamedTuple):
     values: NDArray[Any]
 
 
-def _numbered(name: str) -> tuple[str, ...]:
+def _name_components(name: str) -> tuple[str, ...]:
     return tuple(f"{name}{axis}" for axis in (1, 2, 3))
 
 
@@ -57,12 +57,12 @@ _RECORDED_TIME = Rows(
     "time in the output file of the program", "s", ("recorded_time",), ("TIME",), rates=-1
 )
 _OMEGA = Rows(
-    "angular velocity about the body axes", "rad/s", _numbered("omega"), _numbered("U"),
-    "axis", rates=1, turns="vector",
+    "angular velocity about the body axes", "rad/s",
+    _name_components("omega"), _name_components("U"), "axis", rates=1, turns="vector",
 )  # fmt: skip
 _VELOCITY = Rows(
-    "translational velocity along the body axes", "m/s", _numbered("velocity"), _numbered("V"),
-    "axis", rates=1, turns="vector",
+    "translational velocity along the body axes", "m/s",
+    _name_components("velocity"), _name_components("V"), "axis", rates=1, turns="vector",
 )  # fmt: skip
 _COMPONENTS = ("q0", "q1", "q2", "q3")
 _ATTITUDE = Rows(
@@ -73,7 +73,7 @@ ESTIMATES = Rows("estimated error and error amplification", "1", ("error", "grow
 _FACT = "a value in the header of files, and in the attributes of xarray"
 
 
-def _declared(owner: type) -> dict[str, Rows]:
+def _find_rows(owner: type) -> dict[str, Rows]:
     """Return the fields of a dataclass with a row for each result."""
     found = {each.name: getattr(each.type, "__metadata__", (None,))[0] for each in fields(owner)}
     return {name: each for name, each in found.items() if isinstance(each, Rows)}
@@ -108,20 +108,20 @@ class Fields:
     sensitivities: dict[str, Array] | None = field(default=None, repr=False)
 
     @classmethod
-    def made(cls, **values: Any) -> Self:
-        """Return an object with defaults for other fields, faster than by the constructor."""
+    def create(cls, **values: Any) -> Self:
+        """Return an object with defaults for other fields; the constructor takes longer."""
         found = object.__new__(cls)
         found.__dict__.update(_DEFAULTS, **values)
         return found
 
-    def changed(self, **values: Any) -> Self:
-        """Return a copy with other values, without a check, and without estimates' computation."""
+    def with_values(self, **values: Any) -> Self:
+        """Return a copy with other values; `dataclasses.replace` would compute the estimates."""
         found = object.__new__(type(self))
         found.__dict__.update(self.__dict__)
         found.__dict__.update(values)
         return found
 
-    def estimated_later(self, estimates: Callable[[], tuple[float | None, float | None]]) -> Self:
+    def estimate_later(self, estimates: Callable[[], tuple[float | None, float | None]]) -> Self:
         """Let this new object call `estimates` for `error` and `growth` when one is read."""
         content = self.__dict__
         content["_estimates"] = estimates
@@ -155,7 +155,7 @@ _ESTIMATED = ("error", "growth")
 for _each in _ESTIMATED:
     setattr(Fields, _each, _Estimate(_each))
 _DEFAULTS = {each.name: each.default for each in fields(Fields) if each.default is not MISSING}
-ROWS = _declared(Fields)
+ROWS = _find_rows(Fields)
 ENSEMBLE_ROWS = {"omega": _OMEGA, "attitude": _ATTITUDE, "estimates": ESTIMATES}
 # By name, the types of facts.
 FACTS: dict[str, Any] = {

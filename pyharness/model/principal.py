@@ -114,7 +114,7 @@ def in_scene_axes(found: Trajectory, axes: Array) -> Trajectory:
         if each is not None:
             is_vector = kind == "vector"
             turned[name] = each @ axes.T if is_vector else _attitude_in_scene_axes(each, axes)
-    return found.changed(axes=axes.copy(), **turned)
+    return found.with_values(axes=axes.copy(), **turned)
 
 
 def states_in_scene_axes(states: Array, axes: Array, own: int) -> Array:

@@ -5,16 +5,17 @@ argument `on` is a `Numbers` or, for the terms of the truncation error, a `Serie
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import legendre
 
 from pyharness.checks.theory.collocation_matrices import PARTS, collocation_matrix, inverse
-from pyharness.model.fixed_steps import FIXED_STEPS, Row
+from pyharness.model.fixed_steps import FIXED_STEPS
 from pyharness.model.fixed_steps import FixedStep as Declared
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
@@ -147,19 +148,19 @@ def runge_kutta_4(on: Numbers, omega: Array, punched: bool = False) -> Array:
 runge_kutta_punched = partial(runge_kutta_4, punched=True)
 
 
+def _advance(omega: Array, weights: Iterable[Any], changes: Sequence[Array]) -> Array:
+    terms = (float(a) * change for a, change in zip(weights, changes, strict=True) if a)
+    return np.asarray(omega + sum(terms))
+
+
 def tableau(method: Declared) -> Scheme:
     """Return the scheme of a method that has a Runge-Kutta matrix."""
 
     def scheme(on: Numbers, omega: Array) -> Array:
         changes: list[Array] = []
-
-        def moved(row: Row) -> Array:
-            terms = (float(a) * change for a, change in zip(row, changes, strict=True) if a)
-            return np.asarray(omega + sum(terms))
-
         for row in method.matrix:
-            changes.append(on.times_step(on.rate(moved(row))))
-        return moved(method.weights)
+            changes.append(on.times_step(on.rate(_advance(omega, row, changes))))
+        return _advance(omega, method.weights, changes)
 
     return scheme
 
@@ -181,13 +182,10 @@ def gauss(stages: int) -> Scheme:
     matrix = integrals @ np.linalg.inv(powers)
 
     def scheme(on: Numbers, omega: Array) -> Array:
-        def moved(row: Array, slopes: list[Array]) -> Array:
-            return np.asarray(omega + sum(a * k for a, k in zip(row, slopes, strict=True)))
-
         slopes = [on.times_step(on.rate(omega))] * stages
         for _ in range(TERMS):
-            slopes = [on.times_step(on.rate(moved(row, slopes))) for row in matrix]
-        return moved(weights, slopes)
+            slopes = [on.times_step(on.rate(_advance(omega, row, slopes))) for row in matrix]
+        return _advance(omega, weights, slopes)
 
     return scheme
 

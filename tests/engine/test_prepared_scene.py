@@ -114,6 +114,15 @@ def test_estimates_are_computed_when_read_and_travel() -> None:
     assert found.growth > 1.0
 
 
+def test_a_scene_keeps_little() -> None:
+    scene = replace(_TOP)
+    for number in range(60):
+        for _ in range(2):
+            found = solve(scene, 2.0, tolerance=1e-9 + 1e-12 * number)
+    assert len(vars(scene)["_problems"]) <= 20
+    _all_equal(found, solve(replace(scene), 2.0, tolerance=1e-9 + 59e-12))
+
+
 def test_scenes_are_pickled_and_freed_without_what_is_kept() -> None:
     scene = replace(_TOP)
     before = pickle.dumps(scene)

@@ -22,7 +22,7 @@ def reasons_of(
     found: Ensemble, scene: Scene | Sequence[Scene], arrays: dict[str, Any],
     states: Mapping[str, Any] | None, t_end: Any, method: str,
 ) -> dict[int, str] | None:  # fmt: skip
-    """Return by index why bodies are refused; None if none is."""
+    """Return the reasons of refused bodies, by index, or None."""
     if found.status.max(initial=0) == Statuses.COMPLETE:
         return None
     status = found.status if found.status.ndim > 1 else found.status[:, None]

@@ -14,7 +14,7 @@ from pyharness.checks import random_methods as room
 from pyharness.checks.check import Check, Selection, make_checks
 from pyharness.checks.compare import candidates
 from pyharness.checks.random_methods import random_torques
-from pyharness.engine import many_prepared, recorded, solve, taylor
+from pyharness.engine import many_recorded, recorded, solve, taylor
 from pyharness.model import arrays
 from pyharness.model.tape import Linear, Tape
 from pyharness.model.trajectory import Trajectory
@@ -49,7 +49,17 @@ def test_only_requested_checks_are_made() -> None:
 
 
 def _off(scene: Any, real: Callable[..., Tape] = recorded.system_of) -> Tape:
-    tape = real(scene)
+    return _with_fault(real(scene))
+
+
+def _all_off(
+    *given: Any, real: Callable[..., tuple[Tape, Tape]] = many_recorded.tape_of_bodies
+) -> tuple[Tape, Tape]:
+    tape, alone = real(*given)
+    return _with_fault(tape), _with_fault(alone)
+
+
+def _with_fault(tape: Tape) -> Tape:
     first, *rest = tape.outputs
     terms = tuple((slot, x * (1.0 + 1e-6)) for slot, x in first.terms)
     return replace(tape, outputs=(Linear(first.constant, terms), *rest))
@@ -60,17 +70,18 @@ def _moved(real: Callable[..., Trajectory], *given: Any, **more: Any) -> Traject
     return replace(found, omega=found.omega * (1.0 + 1e-3))
 
 
+def _turned(name: str, rows: Any, *shape: int, real: Callable[..., Any] = arrays.rows_of) -> Any:
+    found = real(name, rows, *shape)
+    return found + 1e-3 * np.eye(4)[0] if name == "attitude" else found
+
+
 FAULTS: dict[str, tuple[Any, str, Any, str]] = {
     "equations of motion": (taylor, "system_of", _off, "torque-solve-taylor"),
     "prepared": (recorded, "system_of", _off, "torque-prepare-taylor"),
-    "many": (recorded, "system_of", _off, "torque-solve-many"),
+    "many": (many_recorded, "tape_of_bodies", _all_off, "torque-solve-many"),
     "solve": (candidates, "solve", partial(_moved, solve.solve), "torque-solve-auto"),
-    "initial attitude": (
-        many_prepared, "unit_quaternions",
-        lambda rows, real=arrays.unit_quaternions: real(rows + 1e-3 * np.eye(4)[0]),
-        "torque-solve-many",
-    ),
-}  # fmt: skip
+    "initial attitude": (many_recorded, "rows_of", _turned, "torque-solve-many"),
+}
 
 
 @pytest.mark.campaign

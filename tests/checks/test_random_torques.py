@@ -14,7 +14,7 @@ from pyharness.checks import random_methods as room
 from pyharness.checks.check import Check, Selection, make_checks
 from pyharness.checks.compare import candidates
 from pyharness.checks.random_methods import random_torques
-from pyharness.engine import many_recorded, recorded, solve, taylor
+from pyharness.engine import many_recorded, parameters, recorded, solve, taylor
 from pyharness.model import arrays
 from pyharness.model.tape import Linear, Tape
 from pyharness.model.trajectory import Trajectory
@@ -53,7 +53,7 @@ def _off(scene: Any, real: Callable[..., Tape] = recorded.system_of) -> Tape:
 
 
 def _all_off(
-    *given: Any, real: Callable[..., tuple[Tape, Tape]] = many_recorded.tape_of_bodies
+    *given: Any, real: Callable[..., tuple[Tape, Tape]] = parameters.tape_of_bodies
 ) -> tuple[Tape, Tape]:
     tape, alone = real(*given)
     return _with_fault(tape), _with_fault(alone)

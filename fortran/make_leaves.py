@@ -7,11 +7,10 @@ zeros, except some wheels and drag.
 from typing import Any
 
 from pyharness import Scene, TorqueLaw
-from pyharness.engine.leaf_text import key, structure
-from pyharness.engine.leaves import names, source
-from pyharness.engine.recorded import listing, system_of
-from pyharness.engine.term_file import KINDS
-from pyharness.model.constant_body import with_constant_body
+from pyharness.engine.system.leaf_text import key, structure
+from pyharness.engine.system.leaves import names, source
+from pyharness.engine.system.recorded import listing, system_of
+from pyharness.engine.torques.term_file import KINDS
 
 
 def texts() -> dict[str, str]:
@@ -27,7 +26,7 @@ def texts() -> dict[str, str]:
         for attitude in (None, (1.0, 0.0, 0.0, 0.0)):
             scene = Scene("ready", (1.0, 2.0, 3.0), (1.0, 1.2, 1.5), torque=term, attitude=attitude)
             if attitude or not scene.torque.needs_attitude:
-                shape = structure(listing(system_of(with_constant_body(scene))))
+                shape = structure(listing(system_of(scene)))
                 assert shape is not None
                 structures[key(shape)] = shape
     parts = ['#include "tape.h"']

@@ -4,11 +4,11 @@ A sum of terms, torque laws and Python functions is a torque for `pyharness.Scen
 each + must be a term, or a sum with a term.
 """
 
-from pyharness.engine import field_terms, table_terms, terms, wheel_terms
-from pyharness.engine.field_terms import *  # noqa: F403
-from pyharness.engine.table_terms import *  # noqa: F403
-from pyharness.engine.terms import *  # noqa: F403
-from pyharness.engine.wheel_terms import *  # noqa: F403
+from pyharness.engine.torques import field_terms, table_terms, terms, wheel_terms
+from pyharness.engine.torques.field_terms import *  # noqa: F403
+from pyharness.engine.torques.table_terms import *  # noqa: F403
+from pyharness.engine.torques.terms import *  # noqa: F403
+from pyharness.engine.torques.wheel_terms import *  # noqa: F403
 from pyharness.model.state_torque import opaque, recorded
 
 __all__ = ["opaque", "recorded"]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness import Scene
-from pyharness.engine.problem import normalized
+from pyharness.engine.system.kernel_input import normalized
 from pyharness.model.trajectory import Array
 
 COMPILER = os.environ.get("FC", "gfortran")

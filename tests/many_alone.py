@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness import Ensemble, Scene, prepare, solve_many
-from pyharness.engine.registry import FIXED_STEP
+from pyharness.engine.plan.registry import FIXED_STEP
 from pyharness.model.trajectory import Array
 
 BASE = Scene("", (1.0, 1.0, 1.0), moments=(1.0, 1.0, 1.0), step_size=0.05)

@@ -21,11 +21,11 @@ TESTS = {
 
 @pytest.mark.campaign
 @pytest.mark.parametrize(("path", "wanted"), [
-    ("pyharness/engine/taylor.py", ["test_taylor", "test_plan"]),
+    ("pyharness/engine/methods/taylor.py", ["test_taylor", "test_plan"]),
     ("fortran/modern/taylor_march.f90", ["test_other", "test_plan", "test_taylor"]),
     ("tests/truth/test_other.py", ["test_other"]),
     ("docs/index.md", []),
-    ("pyharness/engine/registry.py", ["test_taylor", "test_plan"]),
+    ("pyharness/engine/plan/registry.py", ["test_taylor", "test_plan"]),
     ("fortran/modern/solve_all.c", ["test_taylor", "test_plan"]),
 ])  # fmt: skip
 def test_nearest_tests_come_first(path: str, wanted: list[str]) -> None:
@@ -34,7 +34,7 @@ def test_nearest_tests_come_first(path: str, wanted: list[str]) -> None:
 
 @pytest.mark.campaign
 def test_a_module_has_the_tests_that_import_it() -> None:
-    found = nearest(["pyharness/engine/rescaled.py"], sources())
+    found = nearest(["pyharness/engine/problem/rescaled.py"], sources())
     assert found[0] == "tests/checks/scenes/test_rescaled.py"
     assert "tests/engine/test_sums.py" in nearest(["fortran/modern/tape_terms.c"], sources())[:12]
 

@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.engine.plan import RK4_OR_TAYLOR
-from pyharness.engine.solver import CODES as _CODES
+from pyharness.engine.plan.plan import RK4_OR_TAYLOR
+from pyharness.engine.prepared.solver import CODES as _CODES
 from pyharness.model.codes import Methods, Operations, Places, Statuses
 from pyharness.model.extension import GAVE_UP, OVERFLOW, SENSITIVE
 

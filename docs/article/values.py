@@ -16,7 +16,7 @@ from pyharness.checks.compare.findings import Comparison, ProgramFinding
 from pyharness.edition import ledger, story
 from pyharness.edition.data_package import FAULTS_CASE
 from pyharness.edition.decks import TITLES
-from pyharness.engine.linearised import jacobians
+from pyharness.engine.methods.linearised import jacobians
 from pyharness.history.ablation import CaseEffects, effects_of, entries, entry
 from pyharness.history.cards_report import scan_report
 from pyharness.history.claims.laboratory import Assumptions, Laboratory, largest

@@ -8,7 +8,7 @@ import numpy as np
 from docs.atlas.maps import region_panels, thinned, values_of
 from pyharness.checks.theory.amplification import regions
 from pyharness.checks.theory.rotations import rates
-from pyharness.engine.linearised import jacobians
+from pyharness.engine.methods.linearised import jacobians
 from pyharness.engine.solve import solve
 from pyharness.model.codes import Statuses
 from pyharness.model.facts import facts

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from pyharness.edition.made_pages import table
-from pyharness.engine.ready import VECTOR, Argument, Ready
-from pyharness.engine.ready_events import EVENTS
-from pyharness.engine.registry import METHODS
-from pyharness.engine.term_file import KINDS
+from pyharness.engine.events.ready_events import EVENTS
+from pyharness.engine.plan.registry import METHODS
+from pyharness.engine.torques.ready import VECTOR, Argument, Ready
+from pyharness.engine.torques.term_file import KINDS
 
 ROOT = Path(__file__).parent.parent.parent
 _PLURAL = {"number": "numbers", "vector": "rows", "matrix": "matrices"}

@@ -68,7 +68,7 @@ static inline int recurrence_of(const int *operation)
   return operation[0] == SINE_COSINE && operation[2] > 0 ? WAVE : operation[0];
 }
 
-/* Functions that were compiled for the operations of one tape, by pyharness/engine/leaves.py. Two
+/* Functions that were compiled for the operations of one tape, by pyharness/engine/system/leaves.py. Two
    arguments are the coefficients and constants of the combinations. */
 struct leaves {
   /* As expand_tape of tape_terms.c; the last array is `unknowns` of its working storage. */

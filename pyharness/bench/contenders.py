@@ -12,7 +12,7 @@ from pyharness.checks.compare.candidates import (
     program_candidate,
 )
 from pyharness.checks.stress import LISTINGS
-from pyharness.engine.registry import FIXED_STEP, GAUSS, METHODS
+from pyharness.engine.plan.registry import FIXED_STEP, GAUSS, METHODS
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.thesis.programs import PROGRAM_REGISTRY

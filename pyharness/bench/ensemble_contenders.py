@@ -8,7 +8,7 @@ import numpy as np
 
 from pyharness.bench.contenders import Contender
 from pyharness.checks.scenes.random_scenes import text_generator
-from pyharness.engine.many import solve_many
+from pyharness.engine.many.many import solve_many
 from pyharness.engine.solve import solve
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw

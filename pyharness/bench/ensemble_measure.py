@@ -25,8 +25,8 @@ from pyharness.bench.ensemble_contenders import (
 )
 from pyharness.bench.loop import Call, Say, timed
 from pyharness.checks.compare.timing import Clock, batch_seconds, seconds, silenced
-from pyharness.engine.plan import FINEST
-from pyharness.engine.solver import prepare
+from pyharness.engine.plan.plan import FINEST
+from pyharness.engine.prepared.solver import prepare
 from pyharness.model.attitude import angle_between
 from pyharness.model.errors import InputError
 from pyharness.model.progress import Progress, no_progress

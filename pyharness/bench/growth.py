@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pyharness.engine.problem import closed_form
-from pyharness.engine.solver import prepare
+from pyharness.engine.prepared.solver import prepare
+from pyharness.engine.system.kernel_input import closed_form
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from pyharness.bench.contenders import TOLERANCES, Maker, SceneContender, refuse_rounding
 from pyharness.checks.compare.candidates import End, Ready, copied_result, not_finite
-from pyharness.engine.recorded import slopes_of, system_of
-from pyharness.engine.scipy_ivp import RightHandSide, state_of, with_attitude
+from pyharness.engine.methods.scipy_ivp import RightHandSide, state_of, with_attitude
+from pyharness.engine.system.recorded import slopes_of, system_of
 from pyharness.model.attitude import quaternion_rates
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene

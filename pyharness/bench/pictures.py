@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from pyharness.bench.measure import Finding, Workload
-from pyharness.engine.registry import FIXED_STEP
+from pyharness.engine.plan.registry import FIXED_STEP
 from pyharness.model.report import Picture, Table, numbers
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from pyharness.checks.compare.timing import seconds
-from pyharness.engine.solver import prepare
+from pyharness.engine.prepared.solver import prepare
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
@@ -55,7 +55,7 @@ def savings(t_end: float = 3.0, tolerance: float = 1e-9) -> list[Saving]:
         one = partial(compiled.run, replace(constant, steps=1000), Listing.corrected(program))
         other, where = partial(one, velocity=False), f"{program}, 1000 steps"
         found.append(measured_saving("velocity", where, one, other))
-    code = "import pyharness.engine.solver"
+    code = "import pyharness.engine.prepared.solver"
     for part, module in (("SciPy", "scipy.integrate"), ("reference", "pyharness.truth.reference")):
         one, other = partial(_python, f"{code}, {module}"), partial(_python, code)
         found.append(measured_saving(part, f"a process that imports {module}", one, other))

@@ -21,8 +21,8 @@ from pyharness.bench.ensemble_peers import ensemble_peers
 from pyharness.bench.measure import Workload
 from pyharness.bench.peers import Formula, heyoka_maker, peers
 from pyharness.checks.scenes.random_scenes import text_generator
-from pyharness.engine.solver import prepare
-from pyharness.engine.term_file import KINDS
+from pyharness.engine.prepared.solver import prepare
+from pyharness.engine.torques.term_file import KINDS
 from pyharness.model.scene import Scene
 from pyharness.model.values import Triple
 from pyharness.truth.reference import reference

@@ -21,7 +21,7 @@ from pyharness.checks.theory.amplification import (
 from pyharness.checks.theory.collocation_matrices import Exact, points, solver_roundings
 from pyharness.checks.theory.conditioning import ROUNDING
 from pyharness.checks.theory.schemes import Numbers, runge_kutta_punched, spacing
-from pyharness.engine.linearised import jacobians
+from pyharness.engine.methods.linearised import jacobians
 from pyharness.engine.solve import solve
 from pyharness.model.basis import Basis
 from pyharness.model.listing import Listing

@@ -21,9 +21,9 @@ from pyharness.checks.compare.candidates import (
     program_candidate,
 )
 from pyharness.checks.external_file import UNITS, Problem, Value, problems
-from pyharness.engine.problem import closed_form
-from pyharness.engine.registry import METHODS, REGISTRY
+from pyharness.engine.plan.registry import METHODS, REGISTRY
 from pyharness.engine.solve import finest
+from pyharness.engine.system.kernel_input import closed_form
 from pyharness.model.attitude import angle_between
 from pyharness.model.basis import Basis
 from pyharness.model.errors import InputError

@@ -11,7 +11,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
-from pyharness.engine.scene_reader import scene_of
+from pyharness.engine.torques.scene_reader import scene_of
 from pyharness.model.attitude import IDENTITY, Quaternion, of_angles, unit_quaternion
 from pyharness.model.errors import InputError, kind_of, printable, unknown
 from pyharness.model.scene import Scene, checked_scene

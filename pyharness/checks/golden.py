@@ -22,8 +22,8 @@ from pyharness.checks.check import RECORD, Attempt, Check, Name, Selection
 from pyharness.checks.compare.agreement import ulps
 from pyharness.checks.compare.candidates import method_candidate, program_candidate
 from pyharness.checks.theory.conditioning import FLOW, conditioning
-from pyharness.engine.problem import closed_form
-from pyharness.engine.registry import METHODS, SCIPY_METHODS
+from pyharness.engine.plan.registry import METHODS, SCIPY_METHODS
+from pyharness.engine.system.kernel_input import closed_form
 from pyharness.model.basis import Basis
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing

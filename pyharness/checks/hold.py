@@ -36,8 +36,8 @@ from pyharness.checks.stress import LISTINGS, named
 from pyharness.checks.theory.conditioning import ROUNDING, Conditioning, conditioning
 from pyharness.checks.theory.schemes import SCHEMES, Series, constant
 from pyharness.checks.tolerances import affordable
-from pyharness.engine.problem import closed_form
-from pyharness.engine.registry import FIXED_STEP, GAUSS, PREPARED, REGISTRY, SCIPY_METHODS
+from pyharness.engine.plan.registry import FIXED_STEP, GAUSS, PREPARED, REGISTRY, SCIPY_METHODS
+from pyharness.engine.system.kernel_input import closed_form
 from pyharness.model.basis import Basis
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array

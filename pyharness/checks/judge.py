@@ -14,7 +14,7 @@ import numpy as np
 from pyharness.checks.check import REFUSED, Check, Name
 from pyharness.checks.compare.candidates import Candidate, End, method_candidate
 from pyharness.checks.theory.conditioning import FLOW, LIVELY, Conditioning, conditioning_at
-from pyharness.engine.problem import closed_form
+from pyharness.engine.system.kernel_input import closed_form
 from pyharness.model.attitude import angle_between
 from pyharness.model.basis import Basis
 from pyharness.model.errors import InputError

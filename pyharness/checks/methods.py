@@ -29,9 +29,9 @@ from pyharness.checks.judge import (
     reference_truth,
 )
 from pyharness.checks.tolerances import FEW_DIGITS, OF_CASES, of_case
-from pyharness.engine.problem import closed_form, normalized
-from pyharness.engine.registry import FIXED_STEP, GAUSS, METHODS, SCIPY_METHODS
+from pyharness.engine.plan.registry import FIXED_STEP, GAUSS, METHODS, SCIPY_METHODS
 from pyharness.engine.solve import finest
+from pyharness.engine.system.kernel_input import closed_form, normalized
 from pyharness.model.attitude import Quaternion
 from pyharness.model.basis import Basis
 from pyharness.model.extension import extension

@@ -35,10 +35,10 @@ from pyharness.checks.methods import START, run_of_call, run_of_solve
 from pyharness.checks.scenes import state_scenes
 from pyharness.checks.scenes.random_scenes import COARSEST, Draw, draw
 from pyharness.checks.theory.conditioning import along
-from pyharness.engine.many import solve_many
-from pyharness.engine.problem import closed_form
-from pyharness.engine.registry import METHODS, PREPARED_FOR_STATE, REGISTRY, SCIPY_METHODS
+from pyharness.engine.many.many import solve_many
+from pyharness.engine.plan.registry import METHODS, PREPARED_FOR_STATE, REGISTRY, SCIPY_METHODS
 from pyharness.engine.solve import finest
+from pyharness.engine.system.kernel_input import closed_form
 from pyharness.model.basis import Basis
 from pyharness.model.errors import InputError
 from pyharness.model.extension import ENDS

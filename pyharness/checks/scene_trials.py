@@ -17,9 +17,7 @@ from pyharness.checks.stress import Trial, named
 from pyharness.checks.theory.conditioning import FLOW, conditioning_at
 from pyharness.checks.tolerances import MIDDLING
 from pyharness.checks.trials.threads import BOUND, THREADS, TITLE, Job, different
-from pyharness.engine.problem import closed_form
-from pyharness.engine.recorded import system_of
-from pyharness.engine.registry import (
+from pyharness.engine.plan.registry import (
     FIXED_STEP,
     GAUSS,
     METHODS,
@@ -27,8 +25,10 @@ from pyharness.engine.registry import (
     check_attitude,
     check_torque,
 )
-from pyharness.engine.rotated import axes_of, restarted_at, rotated
+from pyharness.engine.problem.rotated import axes_of, restarted_at, rotated
 from pyharness.engine.solve import solve
+from pyharness.engine.system.kernel_input import closed_form
+from pyharness.engine.system.recorded import system_of
 from pyharness.model.attitude import angle_between, product, quaternion_of_axes
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, Triple

@@ -4,10 +4,10 @@ import math
 
 from pyharness.checks.scenes.extreme import speed
 from pyharness.checks.theory.conditioning import Conditioning
-from pyharness.engine.problem import closed_form
-from pyharness.engine.registry import FIXED_STEP, GAUSS, METHODS, REGISTRY, SCIPY_METHODS
-from pyharness.engine.scipy_ivp import steps_sum
+from pyharness.engine.methods.scipy_ivp import steps_sum
+from pyharness.engine.plan.registry import FIXED_STEP, GAUSS, METHODS, REGISTRY, SCIPY_METHODS
 from pyharness.engine.solve import finest as finest_of
+from pyharness.engine.system.kernel_input import closed_form
 from pyharness.model.scene import Scene
 
 # Tolerances in the cases of Table 1; SciPy's methods run only at two that take less than a second.

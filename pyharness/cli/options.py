@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from pyharness.cli import end_progress as end_progress
 from pyharness.cli import progress as progress
 from pyharness.cli import say, shown, write_text
-from pyharness.engine.scene_reader import read_scene
+from pyharness.engine.torques.scene_reader import read_scene
 from pyharness.model.attitude import NEAR_ONE
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.facts import facts

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.engine import dense
-from pyharness.engine.closed_form import period_of
-from pyharness.engine.event_fits import Solution
-from pyharness.engine.event_functions import EventFunction
-from pyharness.engine.events import FoundEvents, found_events, no_events
-from pyharness.engine.periodic_events import PERIODS, are_of_omega
-from pyharness.engine.registry import METHODS
+from pyharness.engine.events.event_fits import Solution
+from pyharness.engine.events.event_functions import EventFunction
+from pyharness.engine.events.events import FoundEvents, found_events, no_events
+from pyharness.engine.events.periodic_events import PERIODS, are_of_omega
+from pyharness.engine.methods.closed_form import period_of
+from pyharness.engine.plan.registry import METHODS
+from pyharness.engine.steps import dense
 from pyharness.model.dense_output import DenseOutput, Pieces
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory

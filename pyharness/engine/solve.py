@@ -13,29 +13,27 @@ from typing import NamedTuple
 import numpy as np
 
 from pyharness.engine.continuous import solution_of, with_events, with_events_reversed
-from pyharness.engine.event_functions import EventFunction, event_functions
-from pyharness.engine.events import FoundEvents
-from pyharness.engine.parameter_sensitivity import checked_names, sensitivities_at
-from pyharness.engine.prepared_scene import Problem, keep_end, kept_end, problem_of
-from pyharness.engine.registry import (
+from pyharness.engine.events.event_functions import EventFunction, event_functions
+from pyharness.engine.events.events import FoundEvents
+from pyharness.engine.methods.parameter_sensitivity import checked_names, sensitivities_at
+from pyharness.engine.methods.scipy_ivp import finest_tolerance
+from pyharness.engine.plan.registry import (
     METHODS,
     SCIPY_METHODS,
     check_torque,
     computes_attitude,
     requested_tolerance,
 )
-from pyharness.engine.rescaled import integrate, is_ordinary, rescaling_factor, scaled
-from pyharness.engine.scipy_ivp import finest_tolerance
-from pyharness.engine.sides import in_reverse, joined
-from pyharness.engine.stepped import with_reason
-from pyharness.engine.steps import rates as rates_of
-from pyharness.engine.steps import transformed_steps
-from pyharness.engine.switch_text import with_text
+from pyharness.engine.prepared.ends import keep_end, kept_end
+from pyharness.engine.problem.problem import Problem, problem_of
+from pyharness.engine.problem.rescaled import integrate, is_ordinary, rescaling_factor, scaled
+from pyharness.engine.problem.sides import in_reverse, joined
+from pyharness.engine.steps.stepped import with_reason
+from pyharness.engine.system.switch_text import with_text
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.errors import InputError, known
 from pyharness.model.keywords import with_hints
-from pyharness.model.principal import PrincipalScene, states_in_scene_axes
 from pyharness.model.scene import Scene, checked_scene, most_steps
 from pyharness.model.state_torque import is_opaque
 from pyharness.model.trajectory import Trajectory
@@ -77,8 +75,8 @@ def solve(
     times : float or iterable of float, shape (n,)
         Times of the results (s), strictly monotonic, on one or both sides of 0.
     method : str
-        A name in `pyharness.engine.registry.METHODS`. `auto` uses a closed form if there is one,
-        else the Taylor series; for a torque made by ``opaque``, `dop853`.
+        A name in `pyharness.engine.plan.registry.METHODS`. `auto` uses a closed form if there is
+        one, else the Taylor series; for a torque made by ``opaque``, `dop853`.
     tolerance : float
         Largest allowed error at `times`: for a component of omega, relative to the largest |omega|
         since time 0; for the attitude, an angle (rad). The default depends on the method; for
@@ -209,13 +207,8 @@ class _Call(NamedTuple):
         if below:
             parts[0] = in_reverse(parts[0])
         found = parts[0] if len(parts) == 1 else joined(*parts)
-        sol = found.sol if needs_steps else None
-        if isinstance(scene, PrincipalScene) and problem.axes is not None:
-            own = 7 if found.attitude is not None else 3
-            sol = transformed_steps(sol, partial(states_in_scene_axes, axes=problem.axes, own=own))
+        sol = problem.output_in_axes_of_scene(found.sol) if needs_steps else None
         found = problem.in_axes_of_scene(found)
-        if sol is not None:
-            sol = replace(sol, rates=partial(rates_of, given))
         found = found.with_values(
             moments=problem.moments,
             tolerance=None if chosen.is_fixed_step else tolerance,
@@ -261,11 +254,11 @@ def _trial_ends(call: _Call, last: float) -> Iterator[float]:
     is_terminal = any(g.limit < math.inf for g in call.functions or ())
     if not is_terminal or METHODS[call.method].is_fixed_step:
         return
-    scene = call.problem.given
-    attitude = () if call.problem.scene.attitude is None else scene.attitude or IDENTITY
+    scene, has_attitude = call.problem.given, call.problem.with_attitude
+    attitude = (scene.attitude or IDENTITY) if has_attitude else ()
     state = np.array([[*scene.omega, *attitude, *(each.start for each in scene.states)]])
     try:
-        slopes = np.abs(rates_of(scene, np.zeros(1), state)[0, :3])
+        slopes = np.abs(problem_of(scene, has_attitude).rates(np.zeros(1), state)[0, :3])
     except Exception:  # the integration reports what an opaque torque raises
         return
     fastest = max(*map(abs, scene.omega), math.sqrt(slopes.max()))

@@ -4,7 +4,7 @@ Source: Trefethen 2013, Approximation Theory and Approximation Practice, chapter
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -70,6 +70,16 @@ class Pieces:
 
     def numbers(self, times: Array) -> NDArray[np.intp]:
         return np.searchsorted(self.edges[1:-1], times, side="right")
+
+    def up_to(self, last: float) -> "Pieces":
+        """Return the polynomials between time 0 and `last` (s), not 0."""
+        low, high = sorted((0.0, last))
+        kept = (self.edges[1:] > low) & (self.edges[:-1] < high)
+        edges = np.clip(self.edges[np.append(kept, False) | np.append(False, kept)], low, high)
+        values = self.values[kept]
+        cut = 0 if last < 0.0 else len(values) - 1
+        values[cut] = self(nodes(edges[cut : cut + 1], edges[cut + 1 : cut + 2], POINTS)[0])
+        return Pieces(edges, values)
 
 
 def sizes_of(largest: Array, n_own: int) -> Array:
@@ -167,6 +177,26 @@ class DenseOutput:
             q = states[..., 3:own]
             q /= np.sqrt(np.vecdot(q, q))[..., None]
         return states
+
+    def transformed(
+        self, states: Callable[[Array], Array], factor: float = 1.0
+    ) -> "DenseOutput | None":
+        """Return the solution with changed states, and times multiplied by `factor`."""
+        if not isinstance(self.states, Pieces):
+            return None
+        edges, values = self.states.edges * factor, self.states.values
+        changed = states(values.reshape(-1, values.shape[2])).reshape(values.shape)
+        return replace(
+            self, t_min=float(edges[0]), t_max=float(edges[-1]), states=Pieces(edges, changed)
+        )
+
+    def followed_by(self, after: "DenseOutput") -> "DenseOutput":
+        first, second = self.states, after.states
+        assert isinstance(first, Pieces)
+        assert isinstance(second, Pieces)
+        edges = np.concatenate([first.edges, second.edges[1:]])
+        values = np.concatenate([first.values, second.values])
+        return replace(after, t_min=self.t_min, states=Pieces(edges, values))
 
     def _at(self, t: Any, function: Callable[[Array, Array], Array]) -> Array:
         allowed = f"allowed: numbers from {self.t_min:.16g} to {self.t_max:.16g} s"

@@ -1,6 +1,6 @@
 """Recurrences, slopes and rounding errors of recorded operations, as C code.
 
-The interpreter (fortran/make_cases.py) and compiled code (`pyharness.engine.leaves`) use them.
+The interpreter (fortran/make_cases.py) and compiled code (`engine/system/leaves.py`) use them.
 """
 
 import math

@@ -40,7 +40,7 @@ _COUNTABLE_STEPS = 400_000_000
 _LONGEST_NAME = 60
 # Modules whose stack frames may be between the user's call and the creation of a scene.
 _BETWEEN = (
-    *("copy", "dataclasses", "pyharness.engine.scene_reader"),
+    *("copy", "dataclasses", "pyharness.engine.torques.scene_reader"),
     *("pyharness.model.keywords", "pyharness.model.scene_file", __name__),
 )
 # Ratio of the largest moment to an excess that rounding may cause.
@@ -259,7 +259,7 @@ class Scene:
 
     def __getstate__(self) -> dict[str, Any]:
         # Without the problems that `solve` keeps.
-        return {name: each for name, each in self.__dict__.items() if name != "_problems"}
+        return {name: each for name, each in self.__dict__.items() if name != "_kept"}
 
     def _set(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)

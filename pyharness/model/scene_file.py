@@ -1,6 +1,6 @@
 """Scenes of Table 1 of the thesis, and the text of scene files (TOML).
 
-`pyharness.engine.scene_reader` reads scene files.
+`pyharness.engine.torques.scene_reader` reads scene files.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""Writing of trajectory files, which `pyharness.engine.trajectory_reader` reads.
+"""Writing of trajectory files, which `pyharness.engine.torques.trajectory_reader` reads.
 
 The archive has an array for each attribute, the text `scene` of a scene file, and the JSON text
 `header` with the rest, such as recorded operations. A linear combination is its constant and a list

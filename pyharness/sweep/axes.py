@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.engine.parameters import INERTIA_ELEMENTS
+from pyharness.engine.system.parameters import INERTIA_ELEMENTS
 from pyharness.model.errors import InputError, kind_of, kind_or_empty, unknown
 from pyharness.model.scene import most_steps
 from pyharness.model.scene_file import check_keys

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from pyharness.checks.compare.batch import OF_PROGRAMS, Batch
-from pyharness.engine.registry import check_torque
-from pyharness.engine.scene_reader import scene_of
+from pyharness.engine.plan.registry import check_torque
+from pyharness.engine.torques.scene_reader import scene_of
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.listing import Listing, subset

@@ -12,8 +12,13 @@ from typing import Any
 from numpy.typing import NDArray
 
 from pyharness.checks.compare.batch import Batch, Solver
-from pyharness.engine.registry import METHODS, PREPARED_WITH_ATTITUDE, REGISTRY, requested_tolerance
-from pyharness.engine.scene_reader import scene_of, scene_of_file
+from pyharness.engine.plan.registry import (
+    METHODS,
+    PREPARED_WITH_ATTITUDE,
+    REGISTRY,
+    requested_tolerance,
+)
+from pyharness.engine.torques.scene_reader import scene_of, scene_of_file
 from pyharness.model.errors import InputError, kind_of, kind_or_empty, unknown
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.scene import Scene, checked_scene

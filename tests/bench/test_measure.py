@@ -297,7 +297,7 @@ LAWS.append(
 
 @pytest.mark.parametrize("scene", LAWS, ids=lambda scene: scene.name)
 def test_source_written_for_numba_is_runge_kutta_of_the_scene(scene: Scene) -> None:
-    from pyharness.engine.solver import prepare
+    from pyharness.engine.prepared.solver import prepare
 
     function = compiled_function(steps_source(scene, RK4))
     omega0, omega = np.array(scene.omega), np.empty(3)

@@ -31,8 +31,8 @@ from pyharness.bench.term_loads import (
 )
 from pyharness.bench.term_report import Terms, summaries, term_report
 from pyharness.cli.main import main
-from pyharness.engine.recorded import slopes_of
-from pyharness.engine.term_file import KINDS
+from pyharness.engine.system.recorded import slopes_of
+from pyharness.engine.torques.term_file import KINDS
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import opaque

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pyharness import Ensemble, Scene, TorqueLaw, solve, solve_many
-from pyharness.engine.many_scenes import checked_copies, scene_of_row
+from pyharness.engine.prepared.many_scenes import checked_copies, scene_of_row
 from pyharness.model.trajectory import Array
 from pyharness.torques import gravity_gradient
 from tests.campaigns import driver

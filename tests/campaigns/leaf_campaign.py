@@ -22,9 +22,9 @@ from pyharness.checks.scenes.state_scenes import (
     draw,
     draw_ready,
 )
-from pyharness.engine.leaf_cache import leaves_of
-from pyharness.engine.many import solve_many
-from pyharness.engine.recorded import Step, inputs_of, kernel_tape, system_of, taylor_step
+from pyharness.engine.many.many import solve_many
+from pyharness.engine.system.leaf_cache import leaves_of
+from pyharness.engine.system.recorded import Step, inputs_of, kernel_tape, system_of, taylor_step
 from pyharness.model.constant_body import with_constant_body
 from pyharness.model.scene import Scene
 from pyharness.model.tape import Tape, slot_values

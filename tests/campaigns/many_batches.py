@@ -9,7 +9,7 @@ import numpy as np
 
 from pyharness import ChangingMoments, Scene, TorqueLaw
 from pyharness.checks.scenes.state_scenes import READY, ready
-from pyharness.engine.scene_reader import scene_of
+from pyharness.engine.torques.scene_reader import scene_of
 from pyharness.model.trajectory import Array
 from pyharness.torques import recorded, wheels
 

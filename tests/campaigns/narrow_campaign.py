@@ -19,7 +19,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from pyharness import InputError, Scene, Stepper, Taylor, prepare, solve, solve_many
-from pyharness.engine.registry import METHODS
+from pyharness.engine.plan.registry import METHODS
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.state_torque import StateTorque, torque_of
 from tests.campaigns import driver

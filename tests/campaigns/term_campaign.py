@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 
 from pyharness import Scene
-from pyharness.engine.leaf_cache import compiler
-from pyharness.engine.leaf_text import structure
-from pyharness.engine.leaves import source
-from pyharness.engine.recorded import listing, system_of
+from pyharness.engine.system.leaf_cache import compiler
+from pyharness.engine.system.leaf_text import structure
+from pyharness.engine.system.leaves import source
+from pyharness.engine.system.recorded import listing, system_of
 from pyharness.model.constant_body import with_constant_body
 from pyharness.model.tape import Tape
 from tests.campaigns import driver

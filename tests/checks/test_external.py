@@ -18,7 +18,7 @@ from pyharness.checks.check import Check
 from pyharness.checks.external import external_checks
 from pyharness.checks.external_file import Figure, Problem, figure, problems, read_problem
 from pyharness.cli.main import main
-from pyharness.engine.registry import METHODS
+from pyharness.engine.plan.registry import METHODS
 
 Patch = pytest.MonkeyPatch
 _REFUSALS = Path(__file__).parents[1] / "refusals/files.toml"

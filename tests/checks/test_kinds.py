@@ -30,9 +30,9 @@ from pyharness.checks.plants.plants import PLANTS
 from pyharness.checks.random_methods import may_refuse, truth_of
 from pyharness.checks.scenes.random_scenes import draw, weekly_seed
 from pyharness.cli.main import main
-from pyharness.engine import problem
-from pyharness.engine.registry import METHODS
+from pyharness.engine.plan.registry import METHODS
 from pyharness.engine.solve import solve
+from pyharness.engine.system import kernel_input as problem
 from pyharness.model.errors import InputError
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS

@@ -12,8 +12,8 @@ from pyharness.checks.compare.orders import measured_order
 from pyharness.checks.kinds import verify
 from pyharness.checks.plants.faults import TWIN_FAULTS, twin
 from pyharness.checks.plants.plants import PLANTS, Plant
+from pyharness.engine.prepared.solver import prepare
 from pyharness.engine.solve import solve
-from pyharness.engine.solver import prepare
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene_file import case_scene
 from pyharness.thesis import compiled

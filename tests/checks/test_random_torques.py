@@ -14,7 +14,10 @@ from pyharness.checks import random_methods as room
 from pyharness.checks.check import Check, Selection, make_checks
 from pyharness.checks.compare import candidates
 from pyharness.checks.random_methods import random_torques
-from pyharness.engine import many_recorded, parameters, recorded, solve, taylor
+from pyharness.engine import solve
+from pyharness.engine.many import many_recorded
+from pyharness.engine.methods import taylor
+from pyharness.engine.system import parameters, recorded
 from pyharness.model import arrays
 from pyharness.model.tape import Linear, Tape
 from pyharness.model.trajectory import Trajectory

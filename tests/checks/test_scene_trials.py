@@ -16,8 +16,8 @@ from pyharness.checks import scene_trials as room
 from pyharness.checks.check import Check
 from pyharness.checks.scenes.random_scenes import random_scene
 from pyharness.checks.stress import SCENE_TRIALS, TRIALS, stress
-from pyharness.engine.registry import METHODS
-from pyharness.engine.rotated import restarted_at
+from pyharness.engine.plan.registry import METHODS
+from pyharness.engine.problem.rotated import restarted_at
 from pyharness.model.scene_file import scene_text
 from tests.conftest import Patch, ResultOf
 

@@ -20,7 +20,7 @@ from pyharness.checks.theory.collocation_matrices import singular_below, solved
 from pyharness.checks.theory.schemes import SCHEMES, TERMS, Numbers, Series, local_error
 from pyharness.checks.theory.step_errors import Forecaster, path
 from pyharness.cli.main import main
-from pyharness.engine.registry import FIXED_STEP
+from pyharness.engine.plan.registry import FIXED_STEP
 from pyharness.model.listing import Listing
 from pyharness.model.scene_file import case_scene
 from pyharness.thesis import collocation

@@ -18,8 +18,8 @@ from pyharness.checks.compare.candidates import End
 from pyharness.checks.scenes.extreme import EXTREMES, in_steps
 from pyharness.checks.stress import named, stress, worst
 from pyharness.cli.main import main
-from pyharness.engine.scene_reader import read_scene
 from pyharness.engine.solve import solve
+from pyharness.engine.torques.scene_reader import read_scene
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.thesis.programs import PROGRAM_REGISTRY

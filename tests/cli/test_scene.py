@@ -12,9 +12,9 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from pyharness import InputError, case_scene, read_scene
-from pyharness.engine.scene_reader import SCENE_TABLES as TABLES
-from pyharness.engine.scene_reader import scene_of
-from pyharness.engine.term_file import KINDS
+from pyharness.engine.torques.scene_reader import SCENE_TABLES as TABLES
+from pyharness.engine.torques.scene_reader import scene_of
+from pyharness.engine.torques.term_file import KINDS
 from pyharness.model.facts import facts_folder
 from tests.conftest import Printed, ResultOf
 

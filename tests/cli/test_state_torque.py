@@ -16,9 +16,9 @@ from jsonschema import Draft202012Validator
 from pyharness import ChangingMoments, Scene, StateTorque, prepare, principal, solve_many
 from pyharness.cli.main import VERBS, main
 from pyharness.cli.parser import Parser
-from pyharness.engine.registry import METHODS
-from pyharness.engine.scene_reader import read_scene
+from pyharness.engine.plan.registry import METHODS
 from pyharness.engine.solve import solve
+from pyharness.engine.torques.scene_reader import read_scene
 from pyharness.model.errors import InputError
 from pyharness.model.expressions import parsed
 from pyharness.model.scene_file import case_scene

@@ -20,8 +20,8 @@ from pyharness import (
     solve,
     subset,
 )
-from pyharness.engine.from_rows import attitude_from_rows
-from pyharness.engine.plan import plan
+from pyharness.engine.plan.plan import plan
+from pyharness.engine.steps.from_rows import attitude_from_rows
 from pyharness.model.attitude import angle_between
 
 TURNED = (0.5, -0.1, 0.7, 0.5)

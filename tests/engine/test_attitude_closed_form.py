@@ -14,7 +14,7 @@ import pytest
 
 from pyharness import Scene
 from pyharness.checks.scenes.extreme import quarter
-from pyharness.engine.closed_form import known_solution
+from pyharness.engine.methods.closed_form import known_solution
 from pyharness.model.errors import TimedError
 from pyharness.model.extension import extension
 from pyharness.model.trajectory import Array

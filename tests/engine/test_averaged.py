@@ -9,8 +9,8 @@ import pytest
 
 from pyharness import TorqueLaw, solve
 from pyharness.checks.scenes.random_scenes import draw
-from pyharness.engine import averaged_step
-from pyharness.engine.averaged_coordinates import Coordinates, torque_of
+from pyharness.engine.methods import averaged_step
+from pyharness.engine.methods.averaged_coordinates import Coordinates, torque_of
 from pyharness.model.errors import InputError, TimedError
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array, Trajectory
@@ -164,8 +164,8 @@ def test_many_macro_steps_agree_with_few(monkeypatch: pytest.MonkeyPatch) -> Non
     times = [2e5, 5.4e5]
     found: Any = _averaged(SCENE, times)
     assert found.error < 1e-10
-    monkeypatch.setattr("pyharness.engine.averaged._RELATIVE", 0.2)
-    monkeypatch.setattr("pyharness.engine.averaged.NODES", 16)
+    monkeypatch.setattr("pyharness.engine.methods.averaged._RELATIVE", 0.2)
+    monkeypatch.setattr("pyharness.engine.methods.averaged.NODES", 16)
     other = _averaged(SCENE, times)
     assert other.steps > 4 * found.steps
     assert 0.0 < _error(other, found.omega) <= found.error

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, TorqueLaw, prepare, solve, solve_many
-from pyharness.engine.sensitivity import torque_noise
+from pyharness.engine.methods.sensitivity import torque_noise
 from pyharness.model.scene import Triple
 from pyharness.model.torque_law import Wave
 from pyharness.truth.reference import reference

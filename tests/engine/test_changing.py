@@ -26,7 +26,7 @@ from pyharness import (
     solve_many,
     torques,
 )
-from pyharness.engine.registry import METHODS
+from pyharness.engine.plan.registry import METHODS
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.codes import Statuses
 from pyharness.truth.reference import reference

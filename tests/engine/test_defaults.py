@@ -10,8 +10,8 @@ import pytest
 from pyharness import InputError, Scene, TorqueLaw, compare_programs, prepare, solve, solve_many
 from pyharness.checks.compare.batch import Solver
 from pyharness.checks.scenes.random_scenes import draw
-from pyharness.engine.plan import plan
-from pyharness.engine.registry import (
+from pyharness.engine.plan.plan import plan
+from pyharness.engine.plan.registry import (
     METHODS,
     PREPARED,
     REGISTRY,

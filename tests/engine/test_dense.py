@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from pyharness import ChangingMoments, InputError, Scene, TorqueLaw, solve, torques
-from pyharness.engine import dense, taylor
-from pyharness.engine.registry import FIXED_STEP
+from pyharness.engine.methods import taylor
+from pyharness.engine.plan.registry import FIXED_STEP
+from pyharness.engine.steps import dense
 from pyharness.events import crosses
 from pyharness.model.dense_output import DenseOutput, Pieces
 from pyharness.model.trajectory import Trajectory

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-import pyharness.engine.sensitivity as room
+import pyharness.engine.methods.sensitivity as room
 from pyharness import Scene, case_scene, prepare, run_program, solve, solve_many, subset
-from pyharness.engine import solver as solver_module
-from pyharness.engine import taylor
-from pyharness.engine.rescaled import unscaled
-from pyharness.engine.sensitivity import is_sensitive, motion_growth
+from pyharness.engine.methods import taylor
+from pyharness.engine.methods.sensitivity import is_sensitive, motion_growth
+from pyharness.engine.prepared import solver as solver_module
+from pyharness.engine.problem.rescaled import unscaled
 from pyharness.model.codes import Statuses
 from pyharness.model.trajectory import ROUNDING, Trajectory, digits_left
 from pyharness.truth.elliptic import torque_free

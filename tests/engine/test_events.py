@@ -11,8 +11,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pyharness import Scene, TorqueLaw, case_scene, solve
-from pyharness.engine.event_fits import Solution
-from pyharness.engine.event_functions import event_functions
+from pyharness.engine.events.event_fits import Solution
+from pyharness.engine.events.event_functions import event_functions
 from pyharness.events import Event, crosses, extremum, flip, rest
 from pyharness.model.dense_output import Pieces
 from pyharness.model.trajectory import Array, Trajectory

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, TorqueLaw, prepare, solve, solve_many
-from pyharness.engine.registry import FIXED_STEP, PREPARED
+from pyharness.engine.plan.registry import FIXED_STEP, PREPARED
 from tests.refused import refused
 
 
@@ -72,7 +72,7 @@ def test_extreme_motion_ends_in_time_and_says_how(
     scene: Scene, times: list[float], method: str, tolerance: float, end: str,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
-    monkeypatch.setattr("pyharness.engine.gauss._MOST_EVALUATIONS", 1_000_000)
+    monkeypatch.setattr("pyharness.engine.methods.gauss._MOST_EVALUATIONS", 1_000_000)
     if end == "refused":
         refused("", solve, scene, times, method, tolerance)
         return
@@ -101,7 +101,7 @@ def test_errors_relative_to_an_omega_out_of_range_are_unknown(size: float) -> No
 
 def test_scipy_gives_up_by_what_it_costs(monkeypatch: pytest.MonkeyPatch) -> None:
     """Regression test: Radau took half a minute and more, since its right-hand sides cost more."""
-    monkeypatch.setattr("pyharness.engine.scipy_ivp._MOST_EVALUATIONS", 3_000)
+    monkeypatch.setattr("pyharness.engine.methods.scipy_ivp._MOST_EVALUATIONS", 3_000)
     waves = [((1.0, 2.0, 3.0), 1e4 + n) for n in range(8)]
     for law, method, most in (
         (TorqueLaw((1e42, 0.0, 0.0)), "dop853", 3000),

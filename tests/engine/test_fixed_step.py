@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, TorqueLaw, prepare
-from pyharness.engine.registry import FIXED_STEP, METHODS
+from pyharness.engine.plan.registry import FIXED_STEP, METHODS
 from pyharness.engine.solve import solve
 from pyharness.model.trajectory import Array
 

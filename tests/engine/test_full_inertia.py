@@ -13,7 +13,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pyharness import InputError, Scene, TorqueLaw, prepare, principal, solve, solve_many
-from pyharness.engine.many_scenes import about_principal
+from pyharness.engine.prepared.many_scenes import about_principal
 from pyharness.model.scene import Triple
 from pyharness.truth.reference import reference
 

@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, case_scene
-from pyharness.engine.problem import normalized
-from pyharness.engine.registry import GAUSS, METHODS
+from pyharness.engine.plan.registry import GAUSS, METHODS
 from pyharness.engine.solve import solve
+from pyharness.engine.system.kernel_input import normalized
 from pyharness.model.extension import extension
 from pyharness.model.trajectory import Array
 from pyharness.truth.reference import reference
@@ -168,7 +168,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, int]]:
         return found
 
     room = SimpleNamespace(gauss_solution=watched)
-    monkeypatch.setattr("pyharness.engine.gauss.extension", lambda: room)
+    monkeypatch.setattr("pyharness.engine.methods.gauss.extension", lambda: room)
     return calls
 
 
@@ -182,7 +182,7 @@ def test_steps_and_right_hand_sides_of_all_tries_are_told(calls: list[tuple[floa
 def test_time_and_right_hand_sides_of_a_refusal(
     calls: list[tuple[float, int]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("pyharness.engine.gauss._MOST_EVALUATIONS", 50_000)
+    monkeypatch.setattr("pyharness.engine.methods.gauss._MOST_EVALUATIONS", 50_000)
     with pytest.raises(InputError) as refusal:
         solve(case_scene(3), [10.0, 20.0], "gauss-2", 1e-11)
     spent = sum(evaluations for _, evaluations in calls)

@@ -15,9 +15,9 @@ import pytest
 import scipy.integrate  # noqa: F401  (an interrupt within its import may be lost)
 
 from pyharness import torques
-from pyharness.engine.many import solve_many
+from pyharness.engine.many.many import solve_many
+from pyharness.engine.prepared.solver import prepare
 from pyharness.engine.solve import solve
-from pyharness.engine.solver import prepare
 from pyharness.model import extension as room
 from pyharness.model.extension import extension
 from pyharness.model.listing import PROGRAMS, Listing

@@ -18,11 +18,11 @@ import pytest
 
 from pyharness import Scene, TorqueLaw, prepare, solve, solve_many, torques
 from pyharness.checks.scenes.state_scenes import READY, draw, draw_ready
-from pyharness.engine import leaf_cache
-from pyharness.engine.lane_leaves import whole_source
-from pyharness.engine.leaf_text import rule_of, structure
-from pyharness.engine.recorded import kernel_tape, listing, system_of, taylor_step
-from pyharness.engine.term_file import KINDS
+from pyharness.engine.system import leaf_cache
+from pyharness.engine.system.lane_leaves import whole_source
+from pyharness.engine.system.leaf_text import rule_of, structure
+from pyharness.engine.system.recorded import kernel_tape, listing, system_of, taylor_step
+from pyharness.engine.torques.term_file import KINDS
 from pyharness.model.arithmetic import REFUSED
 from pyharness.model.codes import Statuses
 from pyharness.model.constant_body import with_constant_body

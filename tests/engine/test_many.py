@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, prepare, run_many, solve, solve_many, torques
-from pyharness.engine import many_scenes
-from pyharness.engine.problem import normalized
-from pyharness.engine.registry import FIXED_STEP, PREPARED
-from pyharness.engine.solver import CODES
+from pyharness.engine.plan.registry import FIXED_STEP, PREPARED
+from pyharness.engine.prepared import many_scenes
+from pyharness.engine.prepared.solver import CODES
+from pyharness.engine.system.kernel_input import normalized
 from pyharness.model.codes import Methods, Statuses
 from pyharness.model.ensemble import Ensemble
 from pyharness.model.extension import extension

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pyharness import Ensemble, Scene, TorqueLaw, solve, solve_many
-from pyharness.engine import many_prepared
-from pyharness.engine.many_tape import sides_of
+from pyharness.engine.prepared import many_prepared
+from pyharness.engine.prepared.many_tape import sides_of
 from tests.campaigns import driver
 from tests.campaigns.combination_campaign import (
     BODIES,
@@ -62,7 +62,7 @@ def test_no_body_of_a_recorded_torque_is_prepared_alone(
     def refused(*_: Any, **more: Any) -> None:
         raise AssertionError("a body is prepared")
 
-    monkeypatch.setattr("pyharness.engine.many_recorded.prepare", refused)
+    monkeypatch.setattr("pyharness.engine.many.many_recorded.prepare", refused)
     monkeypatch.setattr(many_prepared, "_solve_row", refused)
     found = solve_many(scene, 2.0, omega=STARTS, tolerance=1e-9, **arrays)
     assert found.has_result.all()

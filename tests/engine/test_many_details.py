@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pyharness import ChangingMoments, InputError, Scene, TorqueLaw, prepare, solve, solve_many
-from pyharness.engine.many_scenes import scene_of_row
+from pyharness.engine.prepared.many_scenes import scene_of_row
 from pyharness.events import crosses, flip
 from pyharness.model.arrays import unit_quaternions
 from pyharness.model.attitude import angle_between

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, solve, solve_many
-from pyharness.engine.scene_reader import scene_of
+from pyharness.engine.torques.scene_reader import scene_of
 from pyharness.torques import damping, recorded
 
 MOMENTS = (1.0, 2.0, 2.5)

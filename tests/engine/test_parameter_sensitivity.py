@@ -13,8 +13,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pyharness import InputError, Scene, TorqueLaw, load, solve
-from pyharness.engine.parameters import parameters_of
-from pyharness.engine.scene_reader import scene_of_file
+from pyharness.engine.system.parameters import parameters_of
+from pyharness.engine.torques.scene_reader import scene_of_file
 from pyharness.events import crosses
 from pyharness.model.attitude import product
 from pyharness.model.changing import ChangingMoments

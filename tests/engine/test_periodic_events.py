@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, events, solve
-from pyharness.engine import continuous, periodic_events
-from pyharness.engine.closed_form import period_of
-from pyharness.engine.event_functions import event_functions
-from pyharness.engine.periodic_events import are_of_omega, repeat
+from pyharness.engine import continuous
+from pyharness.engine.events import periodic_events
+from pyharness.engine.events.event_functions import event_functions
+from pyharness.engine.events.periodic_events import are_of_omega, repeat
+from pyharness.engine.methods.closed_form import period_of
 
 WING_NUT = Scene("wing nut", omega=(0.01, 5.0, 0.0), moments=(1.0, 2.0, 3.0))
 FUNCTIONS: dict[str, Callable[[Any, Any], Any]] = {

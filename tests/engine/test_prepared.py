@@ -15,14 +15,14 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-import pyharness.engine.plan as planning
-import pyharness.engine.solver as solver_module
+import pyharness.engine.plan.plan as planning
+import pyharness.engine.prepared.solver as solver_module
 from pyharness import InputError, Scene, TorqueLaw, case_scene, prepare, solve, solve_many
 from pyharness.bench.growth import growth
 from pyharness.bench.savings import measured_saving
-from pyharness.engine.plan import RK4_OR_TAYLOR, plan
-from pyharness.engine.problem import closed_form
-from pyharness.engine.solver import Solver
+from pyharness.engine.plan.plan import RK4_OR_TAYLOR, plan
+from pyharness.engine.prepared.solver import Solver
+from pyharness.engine.system.kernel_input import closed_form
 from pyharness.model.trajectory import Array
 from pyharness.torques import damping
 from pyharness.truth.reference import reference

@@ -15,7 +15,7 @@ import pytest
 from pyharness import InputError, Scene, TorqueLaw, Trajectory, solve, torques
 from pyharness.checks.scenes.random_scenes import KINDS, random_scene
 from pyharness.checks.scenes.state_scenes import STEADY, TURNING, draw
-from pyharness.engine.prepared_scene import kept_end
+from pyharness.engine.prepared.ends import kept_end
 
 _TOP = Scene("top", (0.3, 0.2, 0.9), moments=(1.0, 2.0, 2.5))
 _MATRIX = ((2.0, 0.1, 0.0), (0.1, 1.5, 0.2), (0.0, 0.2, 1.2))
@@ -119,7 +119,7 @@ def test_a_scene_keeps_little() -> None:
     for number in range(60):
         for _ in range(2):
             found = solve(scene, 2.0, tolerance=1e-9 + 1e-12 * number)
-    assert len(vars(scene)["_problems"]) <= 20
+    assert len(vars(scene)["_kept"]) <= 20
     _all_equal(found, solve(replace(scene), 2.0, tolerance=1e-9 + 59e-12))
 
 

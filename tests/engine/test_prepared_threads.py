@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, case_scene, prepare
-from pyharness.engine.compiled_call import check_call
-from pyharness.engine.solver import Solver
+from pyharness.engine.prepared.compiled_call import check_call
+from pyharness.engine.prepared.solver import Solver
 from pyharness.model.trajectory import Array
 from tests.engine.test_prepared import RUNAWAY
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, TorqueLaw, case_scene, prepare, solve
-from pyharness.engine.problem import normalized
+from pyharness.engine.system.kernel_input import normalized
 from pyharness.model.extension import extension
 from pyharness.model.trajectory import Array
 from pyharness.truth.reference import reference

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, TorqueLaw, prepare
-from pyharness.engine.solver import Solver
+from pyharness.engine.prepared.solver import Solver
 from tests.checks.scenes.timed_kinds import KINDS, NASTY, timed_scenes
 
 ROUNDING = 2.0**-53

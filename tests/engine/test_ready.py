@@ -13,9 +13,9 @@ from jsonschema import Draft202012Validator
 from scipy.optimize import brentq
 
 from pyharness import Scene, events, solve
-from pyharness.engine.ready import LAW, TORQUES, Ready, number, ready_event, ready_torque
-from pyharness.engine.ready_events import EVENTS
-from pyharness.engine.term_file import KINDS
+from pyharness.engine.events.ready_events import EVENTS
+from pyharness.engine.torques.ready import LAW, TORQUES, Ready, number, ready_event, ready_torque
+from pyharness.engine.torques.term_file import KINDS
 from pyharness.model.facts import facts_folder
 from pyharness.model.trajectory import Array
 from pyharness.torques import damping
@@ -172,8 +172,8 @@ from random import Random
 from pyharness import Scene, events, prepare, solve, torques
 from pyharness.bench.term_loads import term_scenes
 from pyharness.checks.scenes.state_scenes import READY, ready
-from pyharness.engine.scene_reader import scene_of
-from pyharness.engine.term_file import KINDS
+from pyharness.engine.torques.scene_reader import scene_of
+from pyharness.engine.torques.term_file import KINDS
 from pyharness.model.scene_file import scene_text
 from docs.reference.made_tables import pages
 
@@ -211,7 +211,10 @@ print(json.dumps({
 @pytest.fixture(scope="module")
 def added() -> dict[str, Any]:
     """Return what a process shows in which a ready torque and event were added."""
-    more = {"pyharness.engine.field_terms": TORQUE, "pyharness.engine.ready_events": EVENT}
+    more = {
+        "pyharness.engine.torques.field_terms": TORQUE,
+        "pyharness.engine.events.ready_events": EVENT,
+    }
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT, json.dumps(more)], capture_output=True, text=True, cwd=ROOT
     )

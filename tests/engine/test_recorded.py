@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-import pyharness.engine.recorded as recorded_module
+import pyharness.engine.system.recorded as recorded_module
 from pyharness import Scene, TorqueLaw, case_scene, prepare, solve, solve_many, torques
 from pyharness.checks.scenes.random_scenes import draw as draw_law
 from pyharness.checks.scenes.state_scenes import draw
-from pyharness.engine.recorded import kernel_tape, system_of
-from pyharness.engine.taylor import taylor
+from pyharness.engine.methods.taylor import taylor
+from pyharness.engine.system.recorded import kernel_tape, system_of
 from pyharness.model.codes import Operations
 from pyharness.model.state_torque import recorded, replayed
 from tests.engine.test_prepared_threads import in_threads

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, TorqueLaw, case_scene, prepare, solve_many
-from pyharness.engine.registry import METHODS, REGISTRY, SCIPY_METHODS
-from pyharness.engine.rescaled import scaled
+from pyharness.engine.plan.registry import METHODS, REGISTRY, SCIPY_METHODS
+from pyharness.engine.problem.rescaled import scaled
 from pyharness.engine.solve import solve
 from pyharness.model.errors import TimedError
 from pyharness.thesis.programs import PROGRAM_REGISTRY
@@ -69,8 +69,8 @@ def test_time_of_a_refusal_is_in_the_seconds_of_the_scene(
     method: str, power: int, monkeypatch: Patch
 ) -> None:
     """The time belongs to the result that could not be reached, neither the first nor the last."""
-    monkeypatch.setattr("pyharness.engine.scipy_ivp._MOST_EVALUATIONS", 2000)
-    monkeypatch.setattr("pyharness.engine.gauss._MOST_EVALUATIONS", 2000)
+    monkeypatch.setattr("pyharness.engine.methods.scipy_ivp._MOST_EVALUATIONS", 2000)
+    monkeypatch.setattr("pyharness.engine.methods.gauss._MOST_EVALUATIONS", 2000)
     plain = Scene("", (1.0, 1.0, 2.0), moments=(3.0, 2.0, 1.0))
     factor = math.ldexp(1.0, power)
     scene = scaled(plain, factor)
@@ -91,7 +91,7 @@ def test_time_of_a_refusal_is_in_the_seconds_of_the_scene(
 
 
 def test_time_of_a_refusal_in_a_span_whose_square_is_no_number(monkeypatch: Patch) -> None:
-    monkeypatch.setattr("pyharness.engine.scipy_ivp._MOST_EVALUATIONS", 2000)
+    monkeypatch.setattr("pyharness.engine.methods.scipy_ivp._MOST_EVALUATIONS", 2000)
     law = TorqueLaw(sines=(((1e105, 2e105, 3e105), 1e104),))
     scene = Scene("", (1.0, 2.0, -1.0), moments=(3.0, 2.0, 1.0), torque=law)
     with pytest.raises(TimedError) as refusal:

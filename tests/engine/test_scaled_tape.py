@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from pyharness import ChangingMoments, Scene, TorqueLaw, opaque, prepare, solve, solve_many, torques
-from pyharness.engine import term_file
-from pyharness.engine.rescaled import rescaling_factor, scaled_tape
+from pyharness.engine.problem.rescaled import rescaling_factor, scaled_tape
+from pyharness.engine.torques import term_file
 from pyharness.model.codes import Statuses
 from pyharness.model.constant_body import with_constant_body
 from pyharness.model.expressions import parsed

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, opaque, solve
-from pyharness.engine.registry import SCIPY_METHODS
-from pyharness.engine.scipy_run import series_beside
-from pyharness.engine.sides import joined
+from pyharness.engine.methods.scipy_run import series_beside
+from pyharness.engine.plan.registry import SCIPY_METHODS
+from pyharness.engine.problem.sides import joined
 from pyharness.model.state_torque import StateTorque
 from pyharness.torques import table
 

@@ -12,7 +12,7 @@ import pytest
 
 from pyharness import TorqueLaw, solve
 from pyharness.checks.scenes.state_scenes import draw
-from pyharness.engine.scipy_ivp import FINEST, finest_tolerance, scipy_method
+from pyharness.engine.methods.scipy_ivp import FINEST, finest_tolerance, scipy_method
 from pyharness.model.errors import InputError, TimedError
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque, opaque, replayed
@@ -219,7 +219,7 @@ def test_an_interrupt_is_not_caught(name: str, raised: type[BaseException]) -> N
 
 @pytest.mark.parametrize("name", METHODS)
 def test_the_work_limit_holds(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pyharness.engine.scipy_ivp._MOST_EVALUATIONS", 8000)
+    monkeypatch.setattr("pyharness.engine.methods.scipy_ivp._MOST_EVALUATIONS", 8000)
     calls = 0
 
     def torque(t: Any, w: Any) -> Any:

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, TorqueLaw, case_scene, solve, solve_many
-from pyharness.engine import linearised
-from pyharness.engine.rescaled import scaled
-from pyharness.engine.sensitivity import closed_form_estimate, motion_growth
+from pyharness.engine.methods import linearised
+from pyharness.engine.methods.sensitivity import closed_form_estimate, motion_growth
+from pyharness.engine.problem.rescaled import scaled
 from pyharness.model.scene import Triple
 from pyharness.torques import damping
 

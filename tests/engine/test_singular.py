@@ -9,7 +9,7 @@ import pytest
 
 from pyharness import InputError, Scene, Stepper, solve
 from pyharness.cli.main import main
-from pyharness.engine.singular import SingularError
+from pyharness.engine.system.singular import SingularError
 from pyharness.model.scene_report import ending
 
 

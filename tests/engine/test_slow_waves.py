@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, TorqueLaw, prepare, solve
-from pyharness.engine.registry import METHODS, SCIPY_METHODS
+from pyharness.engine.plan.registry import METHODS, SCIPY_METHODS
 from pyharness.engine.solve import finest
 from pyharness.model.scene import Triple
 from pyharness.truth.integer_series import Path, integer_series

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from pyharness import InputError, Scene, TorqueLaw, case_scene, prepare, solve
 from pyharness.checks.scenes.random_scenes import draw
-from pyharness.engine.plan import plan
+from pyharness.engine.plan.plan import plan
 from pyharness.model.attitude import IDENTITY, angle_between
 from pyharness.model.trajectory import Array, turned_to_space
 

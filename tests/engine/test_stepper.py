@@ -9,8 +9,8 @@ from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 
 from pyharness import InputError, Scene, Stepper, solve
-from pyharness.engine import stepper as engine_stepper
-from pyharness.engine.stepped import step_lengths
+from pyharness.engine.steps import stepper as engine_stepper
+from pyharness.engine.steps.stepped import step_lengths
 from pyharness.torques import in_space, table
 from tests.refused import refused
 

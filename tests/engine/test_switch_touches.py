@@ -296,7 +296,7 @@ def test_results_that_depend_on_a_crossing_switch_are_no_sliding() -> None:
 
 def test_dense_output_ends_with_the_last_row_before_sliding(monkeypatch: Patch) -> None:
     # Nothing is solved again.
-    monkeypatch.setattr("pyharness.engine.dense.state_pieces", None)
+    monkeypatch.setattr("pyharness.engine.steps.dense.state_pieces", None)
     scene = ball(lambda t, w: [-2.0 * np.sign(w[0]), 0.0, 1.0], (1.0, 0.0, 0.0))
     found: Any = solve(scene, [0.2, 0.4, 2.0], dense_output=True, events=lambda t, w: w[2] - 0.3)
     assert (found.ended, found.sol.t_max) == ("sliding", 0.4)

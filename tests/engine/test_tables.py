@@ -11,7 +11,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from pyharness import InputError, Scene, StateTorque, TorqueLaw, solve
-from pyharness.engine.recorded import slopes_of, system_of
+from pyharness.engine.system.recorded import slopes_of, system_of
 from pyharness.model.state_torque import law_of, replayed
 from pyharness.model.symbols import SYMBOLS
 from pyharness.model.tape import TIME, Operation, Table

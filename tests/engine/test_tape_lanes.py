@@ -9,7 +9,7 @@ import pytest
 
 from pyharness import Scene, TorqueLaw, prepare, solve, solve_many, torques
 from pyharness.checks.scenes.state_scenes import draw
-from pyharness.engine.many_tape import Bodies, Equations, solve_tape
+from pyharness.engine.prepared.many_tape import Bodies, Equations, solve_tape
 from pyharness.model.arrays import unit_quaternions
 from pyharness.model.attitude import angle_between
 from pyharness.model.codes import Statuses

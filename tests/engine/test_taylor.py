@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, case_scene
-from pyharness.engine.problem import normalized
 from pyharness.engine.solve import solve
+from pyharness.engine.system.kernel_input import normalized
 from pyharness.model.build import build
 from pyharness.model.extension import extension
 from pyharness.model.torque_law import TorqueLaw

@@ -15,8 +15,8 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from pyharness import Scene, StateTorque, TorqueLaw, read_scene, torques
-from pyharness.engine.scene_reader import scene_of
-from pyharness.engine.term_file import KINDS
+from pyharness.engine.torques.scene_reader import scene_of
+from pyharness.engine.torques.term_file import KINDS
 from pyharness.model.records import scene_record
 from pyharness.model.scene_file import scene_text
 from pyharness.model.scene_report import heading

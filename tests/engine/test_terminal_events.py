@@ -11,7 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pyharness import Scene, load, solve
-from pyharness.engine import event_fits
+from pyharness.engine.events import event_fits
 from pyharness.events import crosses, extremum, flip, tilt
 from pyharness.torques import damping, opaque
 from tests.campaigns.event_campaign import BODY

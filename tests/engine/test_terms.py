@@ -11,10 +11,10 @@ from scipy.interpolate import KroghInterpolator
 from scipy.spatial.transform import Rotation
 
 from pyharness import Scene, StateTorque, TorqueLaw, events, principal, torques
-from pyharness.engine.ready import LAW as LAW_FORM
-from pyharness.engine.ready import MATRIX, QUATERNION, VECTOR, Argument
-from pyharness.engine.recorded import slopes_of
-from pyharness.engine.term_file import KINDS
+from pyharness.engine.system.recorded import slopes_of
+from pyharness.engine.torques.ready import LAW as LAW_FORM
+from pyharness.engine.torques.ready import MATRIX, QUATERNION, VECTOR, Argument
+from pyharness.engine.torques.term_file import KINDS
 from pyharness.model.scene_file import scene_text
 from pyharness.model.trajectory import Array
 from pyharness.torques import damping, gravity_gradient, wheels

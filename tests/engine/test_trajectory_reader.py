@@ -149,7 +149,7 @@ def check_same(found: Trajectory, saved: Trajectory) -> None:
         was, now = getattr(saved, each.name), getattr(found, each.name)
         told = (
             f"{each.name}: write it in model/trajectory_file.py, "
-            "read it in engine/trajectory_reader.py"
+            "read it in engine/torques/trajectory_reader.py"
         )
         assert type(now) is type(was), told
         if isinstance(was, np.ndarray):

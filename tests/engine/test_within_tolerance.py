@@ -15,9 +15,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pyharness import Scene, Stepper, Taylor, TorqueLaw, prepare, principal, solve, solve_many
-from pyharness.engine.problem import closed_form
-from pyharness.engine.recorded import is_recorded
-from pyharness.engine.registry import GAUSS, METHODS, REGISTRY, SCIPY_METHODS
+from pyharness.engine.plan.registry import GAUSS, METHODS, REGISTRY, SCIPY_METHODS
+from pyharness.engine.system.kernel_input import closed_form
+from pyharness.engine.system.recorded import is_recorded
 from pyharness.model.attitude import IDENTITY, quaternion_rates
 from pyharness.model.state_torque import of_law, torque_of
 from pyharness.model.trajectory import Array

@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pyharness import Scene, TorqueLaw, opaque, solve
-from pyharness.engine.term_file import KINDS
+from pyharness.engine.torques.term_file import KINDS
 from pyharness.model.trajectory import Array
 from pyharness.torques import damping, gravity_gradient, wheels
 from tests.engine.test_terms import INERTIA, LAW, H, matrix, stored

@@ -18,7 +18,7 @@ from scipy.integrate import solve_ivp
 
 from pyharness import Taylor
 from pyharness.bench.peers import heyoka_functions
-from pyharness.engine.taylor_ivp import recorded_equation
+from pyharness.engine.steps.taylor_ivp import recorded_equation
 from pyharness.model.tape import evaluate
 from tests.engine.textbook import PROBLEMS, Problem, solution
 

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from pyharness.cli.main import main
-from pyharness.engine.registry import FIXED_STEP, PREPARED
+from pyharness.engine.plan.registry import FIXED_STEP, PREPARED
+from pyharness.engine.prepared.solver import prepare
 from pyharness.engine.solve import solve
-from pyharness.engine.solver import prepare
 from pyharness.model.effort import ProofWork, suggested
 from pyharness.model.errors import InputError, TimedError
 from pyharness.model.listing import Listing

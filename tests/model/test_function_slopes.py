@@ -11,9 +11,9 @@ import mpmath
 import numpy as np
 import pytest
 
-from pyharness.engine import leaf_cache
-from pyharness.engine.recorded import kernel_tape, taylor_step
-from pyharness.engine.taylor_ivp import recorded_equation
+from pyharness.engine.steps.taylor_ivp import recorded_equation
+from pyharness.engine.system import leaf_cache
+from pyharness.engine.system.recorded import kernel_tape, taylor_step
 from pyharness.model.dual import with_derivatives
 from pyharness.model.state_torque import recorded
 from pyharness.model.tape import FLOATS, evaluate

@@ -143,9 +143,9 @@ def test_a_changed_module_is_generated_from_once(tmp_path: Path) -> None:
     for kind, names in {
         "codes.h": ("pyharness/__init__.py", "pyharness/data/cases.toml",
                     "pyharness/model/attitude.py", "pyharness/model/tape.py",
-                    "pyharness/model/recurrences.py", "pyharness/engine/leaves.py",
-                    "pyharness/engine/leaf_text.py", "pyharness/engine/ready.py",
-                    "pyharness/engine/terms.py", "fortran/make_leaves.py",
+                    "pyharness/model/recurrences.py", "pyharness/engine/system/leaves.py",
+                    "pyharness/engine/system/leaf_text.py", "pyharness/engine/torques/ready.py",
+                    "pyharness/engine/torques/terms.py", "fortran/make_leaves.py",
                     "fortran/make_gauss.py"),
         "hot_plain.f90": ("fortran/modern/unroll.py", "fortran/modern/unroll_many.py",
                           "fortran/modern/layout.py"),

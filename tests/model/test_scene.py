@@ -19,8 +19,8 @@ from pyharness import (
     read_scene,
     torques,
 )
-from pyharness.engine.rescaled import scaled
-from pyharness.engine.rotated import restarted_at, rotated
+from pyharness.engine.problem.rescaled import scaled
+from pyharness.engine.problem.rotated import restarted_at, rotated
 from pyharness.model.attitude import matrices
 from pyharness.model.records import scene_record
 from pyharness.model.scene import CHANGING, STATE_TORQUE, most_steps

@@ -20,7 +20,7 @@ from pyharness.checks.scenes.random_scenes import draw_moderate
 from pyharness.cli.output import check_tree
 from pyharness.edition.citation import PACKAGE_MARK
 from pyharness.edition.report import MARK
-from pyharness.engine.scene_reader import read_scene
+from pyharness.engine.torques.scene_reader import read_scene
 from pyharness.model.errors import InputError
 from pyharness.model.listing import Listing
 from pyharness.model.scene_file import case_scene, scene_text

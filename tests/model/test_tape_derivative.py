@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pyharness.checks.scenes.state_scenes import READY, STEADY, TURNING, draw, ready
-from pyharness.engine.recorded import system_of
+from pyharness.engine.system.recorded import system_of
 from pyharness.model.dual import with_derivatives
 from pyharness.model.elementary import WITH_DERIVATIVE
 from pyharness.model.state_torque import StateTorque, recorded, replayed, torque_of

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from pyharness import ChangingMoments, Scene, StateTorque, TorqueLaw, case_scene, opaque, read_scene
-from pyharness.engine.scene_reader import scene_of
+from pyharness.engine.torques.scene_reader import scene_of
 from pyharness.model.expressions import FUNCTIONS, INPUTS
 from pyharness.model.records import scene_record
 from pyharness.model.scene_file import scene_text

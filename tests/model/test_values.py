@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, TorqueLaw, case_scene, prepare, read_scene, solve, subset
-from pyharness.engine.registry import METHODS
-from pyharness.engine.report import trajectory_report
+from pyharness.engine.plan.registry import METHODS
+from pyharness.engine.plan.report import trajectory_report
 from pyharness.model.errors import InputError
 from pyharness.model.listing import Listing
 from pyharness.model.records import scene_record

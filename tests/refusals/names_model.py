@@ -7,7 +7,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from pyharness import ChangingMoments, Scene, StateTorque, TorqueLaw, read_scene
-from pyharness.engine.scene_reader import scene_of
+from pyharness.engine.torques.scene_reader import scene_of
 from pyharness.model.expressions import parsed
 from pyharness.model.scene_file import scene_text
 from pyharness.sweep.sweep_file import read_sweep

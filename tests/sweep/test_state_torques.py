@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pyharness import InputError, Scene, read_scene, solve, torques
-from pyharness.engine.leaf_cache import folder
+from pyharness.engine.system.leaf_cache import folder
 from pyharness.model.codes import Statuses
 from pyharness.sweep.batches import batches, solve_points
 from pyharness.sweep.executors import EXECUTORS

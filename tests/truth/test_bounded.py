@@ -16,8 +16,8 @@ from pyharness.bench import measure as bench
 from pyharness.checks import judge
 from pyharness.checks.compare import comparison
 from pyharness.checks.compare.findings import Comparison
-from pyharness.engine import registry
-from pyharness.engine.report import trajectory_bound
+from pyharness.engine.plan import registry
+from pyharness.engine.plan.report import trajectory_bound
 from pyharness.model.attitude import angle_between
 from pyharness.truth import bounded, enclosure
 from pyharness.truth import reference as reference_module

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, case_scene
-from pyharness.engine.rescaled import scaled
+from pyharness.engine.problem.rescaled import scaled
 from pyharness.truth.integer_series import integer_series
 from pyharness.truth.reference import reference
 

@@ -8,9 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.engine.many import solve_many
-from pyharness.engine.many_scenes import scene_of_row
-from pyharness.engine.registry import PREPARED, PREPARED_FOR_STATE, REGISTRY, requested_tolerance
+from pyharness.engine.many.many import solve_many
+from pyharness.engine.plan.registry import (
+    PREPARED,
+    PREPARED_FOR_STATE,
+    REGISTRY,
+    requested_tolerance,
+)
+from pyharness.engine.prepared.many_scenes import scene_of_row
 from pyharness.engine.solve import solve
 from pyharness.model.arrays import unit_quaternions
 from pyharness.model.attitude import IDENTITY, product

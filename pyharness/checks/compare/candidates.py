@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.engine.registry import FIXED_STEP, METHODS
+from pyharness.engine.plan.registry import FIXED_STEP, METHODS
+from pyharness.engine.prepared.solver import Solver, prepare
 from pyharness.engine.solve import solve
-from pyharness.engine.solver import Solver, prepare
 from pyharness.model.errors import InputError
 from pyharness.model.extension import COMPLETE, STOPPED, extension
 from pyharness.model.listing import Listing

@@ -16,15 +16,15 @@ from pyharness.checks.compare.candidates import method_candidate, program_candid
 from pyharness.checks.compare.findings import Comparison, MethodFinding, ProgramFinding
 from pyharness.checks.compare.orders import measured_order
 from pyharness.checks.compare.timing import seconds as timed
-from pyharness.engine.from_rows import attitude_from_rows
-from pyharness.engine.registry import (
+from pyharness.engine.methods.sensitivity import motion_growth
+from pyharness.engine.plan.registry import (
     METHODS,
     SCIPY_METHODS,
     check_attitude,
     check_torque,
     requested_tolerance,
 )
-from pyharness.engine.sensitivity import motion_growth
+from pyharness.engine.steps.from_rows import attitude_from_rows
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.effort import check_steps
 from pyharness.model.errors import InputError, kind_of, known, unknown
@@ -191,7 +191,7 @@ def compare_methods(
         The motion; methods are compared at the ends of its steps. A torque may depend on omega or
         attitude if its arithmetic can be recorded.
     methods : sequence of str
-        Names in `pyharness.engine.registry.METHODS`.
+        Names in `pyharness.engine.plan.registry.METHODS`.
     tolerance : float, optional
         The tolerance of each method, relative to the largest component of omega; the default is as
         in `solve`. Methods with a fixed step ignore it.

@@ -7,7 +7,7 @@ import numpy as np
 from pyharness.checks.compare.agreement import Accuracy
 from pyharness.checks.compare.orders import Order
 from pyharness.checks.theory.conditioning import LIVELY
-from pyharness.engine.sensitivity import is_sensitive
+from pyharness.engine.methods.sensitivity import is_sensitive
 from pyharness.model.listing import Listing
 from pyharness.model.report import short
 from pyharness.model.scene import Scene

@@ -6,7 +6,7 @@ import numpy as np
 
 from pyharness.checks.compare.agreement import Accuracy
 from pyharness.checks.compare.findings import Comparison, MethodFinding, ProgramFinding
-from pyharness.engine.report import mark_end
+from pyharness.engine.plan.report import mark_end
 from pyharness.model.report import Picture, Table, numbers
 from pyharness.model.scene_report import heading
 from pyharness.model.trajectory import WITH_ALL_ROWS, Trajectory

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 from unittest.mock import patch
 
 from pyharness import thesis
-from pyharness.engine.registry import METHODS
+from pyharness.engine.plan.registry import METHODS
 from pyharness.model.facts import facts
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene

@@ -27,8 +27,8 @@ from pyharness.checks.plants.faults import (
     twin,
 )
 from pyharness.checks.plants.outcome import Outcome, control
-from pyharness.engine.registry import FIXED_STEP, GAUSS
-from pyharness.engine.solver import CODES as _CODES
+from pyharness.engine.plan.registry import FIXED_STEP, GAUSS
+from pyharness.engine.prepared.solver import CODES as _CODES
 from pyharness.model import extension
 from pyharness.model.codes import Methods, Places
 from pyharness.model.listing import Listing, flagged
@@ -100,7 +100,7 @@ def _prepared(change: Callable[[Array, _Answer, float], _Answer]) -> Fault:
             return change(packed, entry(packed, *rest), size)
 
         kernel = SimpleNamespace(solve_packed=solve_packed)
-        return patch("pyharness.engine.solver.extension", lambda: kernel)
+        return patch("pyharness.engine.prepared.solver.extension", lambda: kernel)
 
     return planted
 
@@ -202,7 +202,7 @@ PLANTS = (
     Plant("sign-in-both", "a sign in the third equation, in both languages alike",
           twin("two-term", "sign"), 2.0, ("decks", "schemes")),
     Plant("sign-in-series", "a sign in what the Taylor kernel is given",
-          change_result("pyharness.engine.taylor.normalized",
+          change_result("pyharness.engine.methods.taylor.normalized",
              lambda found, size: (_third_off(found[0], size), *found[1:])),
           2.0, ("methods", "attitudes")),
     Plant("sign-in-reference", "a sign in the reference itself",

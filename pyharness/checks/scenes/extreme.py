@@ -6,7 +6,7 @@ from dataclasses import replace
 from itertools import product
 from typing import NamedTuple
 
-from pyharness.engine.rescaled import scaled
+from pyharness.engine.problem.rescaled import scaled
 from pyharness.model.attitude import Quaternion, unit_quaternion
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.scene_file import case_scene

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.engine.rescaled import scaled
-from pyharness.engine.rotated import rotated
+from pyharness.engine.problem.rescaled import scaled
+from pyharness.engine.problem.rotated import rotated
 from pyharness.model.listing import PROGRAMS, Listing, flagged, names_of, switches
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.engine.term_file import KINDS
+from pyharness.engine.torques.term_file import KINDS
 from pyharness.model.array_type import Array
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque

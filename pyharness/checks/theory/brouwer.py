@@ -11,7 +11,7 @@ from decimal import Decimal
 
 import numpy as np
 
-from pyharness.engine.linearised import jacobians
+from pyharness.engine.methods.linearised import jacobians
 from pyharness.model.basis import Basis
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array

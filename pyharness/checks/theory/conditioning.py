@@ -13,10 +13,10 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from pyharness.engine.linearised import growth, jacobians, propagators, transitions
-from pyharness.engine.problem import closed_form
-from pyharness.engine.recorded import inputs_of, outputs_at, system_of
+from pyharness.engine.methods.linearised import growth, jacobians, propagators, transitions
 from pyharness.engine.solve import solve
+from pyharness.engine.system.kernel_input import closed_form
+from pyharness.engine.system.recorded import inputs_of, outputs_at, system_of
 from pyharness.model.basis import Basis
 from pyharness.model.dual import with_derivatives
 from pyharness.model.elementary import WITH_DERIVATIVE

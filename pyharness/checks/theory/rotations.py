@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pyharness.engine.linearised import jacobians
+from pyharness.engine.methods.linearised import jacobians
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import ROUNDING, Array

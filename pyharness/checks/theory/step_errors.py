@@ -13,7 +13,7 @@ import numpy as np
 from pyharness.checks.theory.collocation_matrices import PARTS, singular_below, solver_roundings
 from pyharness.checks.theory.conditioning import ROUNDING, Conditioning, conditioning, sampled
 from pyharness.checks.theory.schemes import SCHEMES, TERMS, collocation_singular, local_error
-from pyharness.engine.linearised import jacobians, propagators
+from pyharness.engine.methods.linearised import jacobians, propagators
 from pyharness.model.basis import Basis
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array

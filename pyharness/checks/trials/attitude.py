@@ -33,8 +33,8 @@ from pyharness.checks.theory.conditioning import (
 )
 from pyharness.checks.tolerances import MIDDLING
 from pyharness.checks.trials.length import CLOSED_FORM, MOTIONS
-from pyharness.engine.registry import METHODS
-from pyharness.engine.rotated import rotated
+from pyharness.engine.plan.registry import METHODS
+from pyharness.engine.problem.rotated import rotated
 from pyharness.engine.solve import solve
 from pyharness.model.attitude import SEQUENCES, Quaternion, angle_between, angles, product
 from pyharness.model.basis import Basis

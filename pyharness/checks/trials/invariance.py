@@ -19,9 +19,9 @@ from pyharness.checks.scenes.random_scenes import random_scene
 from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.checks.theory.conditioning import FLOW, Conditioning, conditioning
 from pyharness.checks.tolerances import finest_and_middling
-from pyharness.engine.registry import FIXED_STEP, METHODS, SCIPY_METHODS
-from pyharness.engine.rescaled import scaled
-from pyharness.engine.rotated import restarted_at, rotated
+from pyharness.engine.plan.registry import FIXED_STEP, METHODS, SCIPY_METHODS
+from pyharness.engine.problem.rescaled import scaled
+from pyharness.engine.problem.rotated import restarted_at, rotated
 from pyharness.engine.solve import finest, solve
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing

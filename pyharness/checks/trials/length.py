@@ -18,9 +18,9 @@ from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.checks.theory import brouwer
 from pyharness.checks.theory.brouwer import LAWS, POWER, WALK, Noise, Orbit
 from pyharness.checks.tolerances import finest
-from pyharness.engine.problem import normalized
-from pyharness.engine.registry import METHODS
+from pyharness.engine.plan.registry import METHODS
 from pyharness.engine.solve import solve
+from pyharness.engine.system.kernel_input import normalized
 from pyharness.model.basis import Basis
 from pyharness.model.codes import Series
 from pyharness.model.errors import InputError

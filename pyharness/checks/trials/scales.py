@@ -15,8 +15,8 @@ from pyharness.checks.scenes.extreme import ORDINARY, ORDINARY_TIME, TWOS, in_st
 from pyharness.checks.stress import Trial, named
 from pyharness.checks.theory.conditioning import Conditioning, conditioning
 from pyharness.checks.tolerances import MIDDLING
-from pyharness.engine.registry import FIXED_STEP, SCIPY_METHODS
-from pyharness.engine.rescaled import scaled
+from pyharness.engine.plan.registry import FIXED_STEP, SCIPY_METHODS
+from pyharness.engine.problem.rescaled import scaled
 from pyharness.model.basis import Basis
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene

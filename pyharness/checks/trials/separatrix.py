@@ -11,7 +11,7 @@ from pyharness.checks.judge import unknown_flow
 from pyharness.checks.scenes.extreme import LONG, MIDDLE_AXIS, SYMMETRIC_START, in_steps
 from pyharness.checks.stress import Trial, named
 from pyharness.checks.tolerances import MIDDLING
-from pyharness.engine.registry import FIXED_STEP
+from pyharness.engine.plan.registry import FIXED_STEP
 from pyharness.model.basis import Basis
 from pyharness.model.scene import Scene
 

@@ -14,10 +14,10 @@ from pyharness.checks.check import BITS, Check, may_hold
 from pyharness.checks.compare.candidates import method_candidate, program_candidate
 from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.checks.tolerances import finest
-from pyharness.engine.registry import METHODS, PREPARED
+from pyharness.engine.plan.registry import METHODS, PREPARED
+from pyharness.engine.prepared.solver import Solver, prepare
 from pyharness.engine.solve import solve
-from pyharness.engine.solver import Solver, prepare
-from pyharness.engine.terms import damping
+from pyharness.engine.torques.terms import damping
 from pyharness.model.errors import InputError
 from pyharness.model.extension import extension
 from pyharness.model.listing import Listing

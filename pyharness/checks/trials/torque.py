@@ -30,7 +30,7 @@ from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.checks.theory import brouwer
 from pyharness.checks.theory.conditioning import ROUNDING, Conditioning, conditioning
 from pyharness.checks.tolerances import finest_and_middling
-from pyharness.engine.registry import FIXED_STEP
+from pyharness.engine.plan.registry import FIXED_STEP
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.truth.axial_top import axial_top

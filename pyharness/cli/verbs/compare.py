@@ -8,7 +8,7 @@ from pyharness.checks.compare.comparison import compare_methods, compare_program
 from pyharness.checks.compare.findings import Comparison
 from pyharness.checks.compare.report import comparison_report
 from pyharness.cli import options as shared
-from pyharness.engine.registry import METHODS, SCIPY_METHODS
+from pyharness.engine.plan.registry import METHODS, SCIPY_METHODS
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.listing import PROGRAMS, names_of
 from pyharness.model.scene import Scene

@@ -3,7 +3,7 @@
 import argparse
 
 from pyharness.cli import options as shared
-from pyharness.engine.leaf_cache import about_leaves
+from pyharness.engine.system.leaf_cache import about_leaves
 from pyharness.model.build import AS_WRITTEN, build, doctor_report, installation
 
 FORMATS = ("table", "json")

@@ -3,9 +3,9 @@
 import argparse
 
 from pyharness.cli import options as shared
-from pyharness.engine.plan import plan
-from pyharness.engine.registry import PREPARED
-from pyharness.engine.report import plan_report
+from pyharness.engine.plan.plan import plan
+from pyharness.engine.plan.registry import PREPARED
+from pyharness.engine.plan.report import plan_report
 from pyharness.engine.solve import ascending_times
 
 OPTIONS = {

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from pyharness.cli import options as shared
-from pyharness.engine.report import trajectory_report
+from pyharness.engine.plan.report import trajectory_report
 from pyharness.model.assumptions import mark
 from pyharness.model.attitude import FORMS
 from pyharness.model.errors import InputError
@@ -66,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
     kinds = ("any_axes", "any_torque", "any_state", "changing", "states")
     scene = shared.chosen_scene(options, **dict.fromkeys(kinds, by_method))
     if (options.program is None) == (options.method is None):
-        from pyharness.engine.registry import METHODS
+        from pyharness.engine.plan.registry import METHODS
 
         raise InputError(
             f"run: give either --program ({', '.join(PROGRAMS)}) or --method ({', '.join(METHODS)})"
@@ -84,7 +84,7 @@ def run(options: argparse.Namespace) -> int:
     else:
         name, title, trajectory = _method(options, scene)
         if name == "reference":
-            from pyharness.engine.report import trajectory_bound
+            from pyharness.engine.plan.report import trajectory_bound
 
             bound = trajectory_bound(scene, trajectory, shared.chosen_effort(options))
 
@@ -140,7 +140,7 @@ def _program(options: argparse.Namespace, scene: Scene) -> tuple[str, Listing, s
     effort = shared.chosen_effort(options)
     trajectory = run_program(scene, listing, implementation, **stops, effort=effort, word=word)
     if options.attitude is not None:
-        from pyharness.engine.from_rows import attitude_from_rows
+        from pyharness.engine.steps.from_rows import attitude_from_rows
 
         rows = attitude_from_rows(scene, trajectory.time, trajectory.omega)
         trajectory = replace(trajectory, attitude=rows)
@@ -151,7 +151,7 @@ def _program(options: argparse.Namespace, scene: Scene) -> tuple[str, Listing, s
 
 def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajectory]:
     # Imported here, because a program's run does not need these modules.
-    from pyharness.engine.registry import METHODS
+    from pyharness.engine.plan.registry import METHODS
     from pyharness.engine.solve import solve
 
     shared.refuse(options, "--method", ("implementation", "word", *shared.LISTING))

@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 
 from pyharness.cli import options as shared
-from pyharness.engine.scene_reader import read_scene
+from pyharness.engine.torques.scene_reader import read_scene
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.facts import facts_folder
 from pyharness.model.records import scene_record

@@ -59,7 +59,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _of_scene(options: argparse.Namespace) -> dict[str, Trial]:
     from pyharness.checks.scene_trials import scene_trials
-    from pyharness.engine.scene_reader import read_scene
+    from pyharness.engine.torques.scene_reader import read_scene
     from pyharness.model.scene import checked_scene
 
     shared.refuse(options, "--scene", ("plot", "save"))

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.checks.compare.batch import Batch
-from pyharness.engine.many import solve_many
-from pyharness.engine.rotated import restarted_at
+from pyharness.engine.many.many import solve_many
+from pyharness.engine.problem.rotated import restarted_at
 from pyharness.history.claims import rules
 from pyharness.history.claims.laboratory import Assumptions, Laboratory, integrate_models
 from pyharness.history.claims.ledger import claim, claims

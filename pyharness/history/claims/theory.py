@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from pyharness.checks.theory.rotations import steady_rotations
-from pyharness.engine.linearised import jacobians
+from pyharness.engine.methods.linearised import jacobians
 from pyharness.engine.solve import solve
 from pyharness.history.claims.laboratory import Laboratory, distance, largest
 from pyharness.history.claims.verdicts import FALSE, REPRODUCED, Judged, graded

@@ -11,7 +11,7 @@ from random import Random
 import numpy as np
 
 from pyharness.bench.random_loads import BODIES, LAWS, SPEEDS, WAVES, by_torque
-from pyharness.engine.rotated import rotated
+from pyharness.engine.problem.rotated import rotated
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw, Wave

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from pyharness import InputError, Scene, solve
-from pyharness.engine.linearised import jacobians, transitions
+from pyharness.engine.methods.linearised import jacobians, transitions
 from pyharness.model.attitude import matrices
 from pyharness.model.trajectory import Array, Trajectory
 from tests.campaigns import entries

@@ -9,7 +9,7 @@ from random import Random
 from pyharness.cli.main import VERBS
 from pyharness.cli.options import FORMATS
 from pyharness.cli.parser import Parser
-from pyharness.engine.registry import METHODS, PREPARED
+from pyharness.engine.plan.registry import METHODS, PREPARED
 from pyharness.history.ablation import entries
 from pyharness.model.listing import PROGRAMS, names_of
 from tests.campaigns.fuzz.strategies import mutated_word, number, scene_bytes, scene_text, tolerance

@@ -13,7 +13,7 @@ from typing import Any
 
 from pyharness import InputError, Scene, TorqueLaw
 from pyharness.checks.scenes.random_scenes import Draw, draw
-from pyharness.engine.registry import METHODS, PREPARED
+from pyharness.engine.plan.registry import METHODS, PREPARED
 from pyharness.model.listing import PROGRAMS, names_of
 from pyharness.model.scene import Triple
 from pyharness.model.torque_law import Wave

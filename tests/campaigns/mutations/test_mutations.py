@@ -121,7 +121,12 @@ def test_a_seed_gives_the_same_draw_and_another_seed_another() -> None:
 @pytest.mark.campaign
 def test_a_draw_can_be_restricted_to_parts_of_file_names(monkeypatch: pytest.MonkeyPatch) -> None:
     # Few and short files, because each file that is drawn is parsed.
-    short = ("engine/steps.py", "modern/tape.f90", "checks/kinds.py", "engine/sides.py")
+    short = (
+        "engine/steps/steps.py",
+        "modern/tape.f90",
+        "checks/kinds.py",
+        "engine/problem/sides.py",
+    )
     some = [each for each in files() if each.endswith(short)]
     assert len(some) == len(short)
     monkeypatch.setattr(sample, "files", lambda: some)
@@ -149,16 +154,16 @@ def test_every_language_has_its_share() -> None:
         lines[language_of(file)] += lines_of_code(file)
     assert set(lines) == {"Python", FORTRAN, C, JAVASCRIPT}
     assert lines["Python"] > lines[FORTRAN] > lines[C]
-    core = {"pyharness/engine/gauss.py", "pyharness/sweep/store.py", "web/port.js",
+    core = {"pyharness/engine/methods/gauss.py", "pyharness/sweep/store.py", "web/port.js",
             "pyharness/thesis/word.py", "fortran/modern/taylor.f90", "pyharness/model/tape.py",
-            "pyharness/engine/steps.py", "fortran/modern/tape_solve.f90"}  # fmt: skip
+            "pyharness/engine/steps/steps.py", "fortran/modern/tape_solve.f90"}  # fmt: skip
     assert core <= set(files())
     assert not any("report" in file or "picture" in file for file in files())
 
 
 @pytest.mark.campaign
 def test_names_are_unique_and_the_change_is_one() -> None:
-    for file in ("pyharness/engine/gauss.py", "fortran/modern/sphere.f90"):
+    for file in ("pyharness/engine/methods/gauss.py", "fortran/modern/sphere.f90"):
         found = mutations(file)
         assert len({each.id for each in found}) == len(found)
         for each in found[::50]:
@@ -216,9 +221,9 @@ def test_equivalent_ones_are_argued_and_still_there() -> None:
 def test_a_stale_entry_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "equivalent.toml"
     path.write_text(
-        '["pyharness/engine/gauss.py"]\n"sign 1: no = such" = "a reason of four words"\n'
+        '["pyharness/engine/methods/gauss.py"]\n"sign 1: no = such" = "a reason of four words"\n'
     )
-    assert stale(equivalent(path)) == ["pyharness/engine/gauss.py: sign 1: no = such"]
+    assert stale(equivalent(path)) == ["pyharness/engine/methods/gauss.py: sign 1: no = such"]
     path.write_text('["no/such.py"]\n"sign 1: x" = "a reason of four words"\n')
     assert stale(equivalent(path)) == ["no/such.py: sign 1: x"]
 

@@ -20,8 +20,8 @@ from pyharness.checks.compare.comparison import compare_programs, listings_for
 from pyharness.checks.compare.findings import Comparison
 from pyharness.checks.compare.picture import comparison_picture
 from pyharness.checks.compare.report import comparison_report, verdict
-from pyharness.engine.registry import SCIPY_METHODS
-from pyharness.engine.report import trajectory_report
+from pyharness.engine.plan.registry import SCIPY_METHODS
+from pyharness.engine.plan.report import trajectory_report
 from pyharness.model.attitude import product
 from pyharness.model.listing import Listing
 from pyharness.model.trajectory import Trajectory, turned_to_space

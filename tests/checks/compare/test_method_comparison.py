@@ -18,7 +18,7 @@ from pyharness.checks.compare.findings import Comparison
 from pyharness.checks.compare.picture import comparison_picture
 from pyharness.checks.compare.report import comparison_report, verdict
 from pyharness.cli.main import main
-from pyharness.engine.registry import SCIPY_METHODS
+from pyharness.engine.plan.registry import SCIPY_METHODS
 from pyharness.model.expressions import parsed
 from pyharness.truth.reference import reference
 from pyharness.views.pictures import saved

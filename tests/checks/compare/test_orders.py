@@ -13,7 +13,7 @@ from pyharness.checks.compare.comparison import compare_programs
 from pyharness.checks.compare.orders import Order, measured_order, order_of
 from pyharness.checks.compare.report import comparison_report
 from pyharness.checks.theory.conditioning import ROUNDING
-from pyharness.engine.rescaled import scaled
+from pyharness.engine.problem.rescaled import scaled
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, TorqueLaw, case_scene, prepare, solve
-from pyharness.engine.registry import FIXED_STEP, METHODS
-from pyharness.engine.rescaled import omega_by_torque, rescaling_factor, scaled
+from pyharness.engine.plan.registry import FIXED_STEP, METHODS
+from pyharness.engine.problem.rescaled import omega_by_torque, rescaling_factor, scaled
 
 _METHODS = ("auto", "taylor", "quick", "gauss-2", "gauss-8", *FIXED_STEP)
 _LAW = TorqueLaw(

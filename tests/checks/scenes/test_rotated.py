@@ -8,7 +8,7 @@ import pytest
 
 from pyharness import Scene, solve, torques
 from pyharness.checks.scenes.state_scenes import READY, STEADY, TURNING, draw, ready
-from pyharness.engine.rotated import axes_of, later, restarted_at, rotated
+from pyharness.engine.problem.rotated import axes_of, later, restarted_at, rotated
 from pyharness.model.scene import Triple
 from pyharness.model.state_torque import StateTorque
 

@@ -7,8 +7,8 @@ from functools import partial
 
 import numpy as np
 
-from pyharness.engine.rescaled import scaled
-from pyharness.engine.rotated import rotated
+from pyharness.engine.problem.rescaled import scaled
+from pyharness.engine.problem.rotated import rotated
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw, Wave
 from pyharness.model.trajectory import Array

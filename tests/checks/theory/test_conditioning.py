@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from pyharness.checks.theory.conditioning import ROUNDING, Conditioning, conditioning
-from pyharness.engine import linearised
+from pyharness.engine.methods import linearised
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.torque_law import TorqueLaw

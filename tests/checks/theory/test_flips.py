@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from pyharness import Scene
 from pyharness.checks.theory.flips import flip_times
-from pyharness.engine.many import solve_many
+from pyharness.engine.many.many import solve_many
 from pyharness.model.trajectory import Array
 from pyharness.truth.free_attitude import period_of
 

@@ -13,7 +13,7 @@ import pytest
 from pyharness import Scene, TorqueLaw, case_scene, solve
 from pyharness.checks.theory.rotations import SteadyRotation, rates, steady_rotations
 from pyharness.checks.theory.rotations_report import growth_of_bodies, polhodes
-from pyharness.engine.linearised import jacobians
+from pyharness.engine.methods.linearised import jacobians
 from pyharness.model.scene import Triple
 from pyharness.model.trajectory import Array
 from tests.conftest import Printed, ResultOf

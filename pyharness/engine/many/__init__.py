@@ -1,0 +1,1 @@
+"""Solutions of many scenes at once."""

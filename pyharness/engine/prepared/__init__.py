@@ -1,0 +1,1 @@
+"""Scenes prepared for many calls."""

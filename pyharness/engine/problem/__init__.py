@@ -1,0 +1,1 @@
+"""Scenes about other axes and in other units, and the way back."""

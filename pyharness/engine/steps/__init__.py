@@ -1,0 +1,1 @@
+"""Steps of integrations, and what is read from them."""

@@ -1,0 +1,1 @@
+"""Equations of motion as recorded operations, interpreted or compiled."""

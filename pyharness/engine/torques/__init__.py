@@ -1,0 +1,1 @@
+"""Ready torques, and the files of scenes and trajectories."""

@@ -38,8 +38,8 @@ def growth(
         raise InputError(
             "growth: the scene has no closed form to compare with; give a scene without torque"
         )
-    series = prepare(scene, "taylor", tolerance)
-    exact = prepare(scene, "closed-form")
+    series = prepare(scene, "taylor", tolerance, attitude=False)
+    exact = prepare(scene, "closed-form", attitude=False)
     rate = scene.right_hand_side()
     # Several initial states, because a single one might have a favourable phase.
     omega = np.array(scene.omega)

@@ -88,7 +88,7 @@ def test_prepared_takes_the_same_steps_in_any_thread(
     wanted = solve(scene, [time], method, 1.0)
 
     def end(_: int) -> Array:
-        solver = prepare(scene, method, 1.0)
+        solver = prepare(scene, method, 1.0, attitude=False)
         omega = solver(np.array(scene.omega), time)
         assert (solver.status, solver.steps) == ("complete", wanted.steps)
         return omega

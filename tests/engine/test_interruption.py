@@ -150,9 +150,9 @@ def keyboard() -> Iterator[_Keyboard]:
 @pytest.mark.sampled
 @pytest.mark.parametrize("name", LONG)
 def test_kernel_ends_at_once(name: str, keyboard: _Keyboard, monkeypatch: Patch) -> None:
-    rooms = "taylor closed_form gauss many_laws many_scenes many_tape many_prepared"
-    engine = [f"engine.{each}" for each in rooms.split()]
-    for each in (*engine, "thesis.compiled", "thesis.many", "model.extension"):
+    methods = [f"engine.methods.{each}" for each in ("taylor", "closed_form", "gauss")]
+    rooms = [f"engine.prepared.many_{each}" for each in ("laws", "scenes", "tape", "prepared")]
+    for each in (*methods, *rooms, "thesis.compiled", "thesis.many", "model.extension"):
         monkeypatch.setattr(f"pyharness.{each}.extension", keyboard.door)
     if name in DOORLESS:
         keyboard.press()

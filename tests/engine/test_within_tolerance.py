@@ -102,7 +102,7 @@ def by_call(method: str, motion: Motion, tolerance: float, attitude: bool, what:
         many, turns, _ = turning.many(starts, end, np.tile(turned, (9, 1)))
         check_error(motion, many[8], turns[8], tolerance, f"{what}, many")
         return
-    solver = prepare(scene, method, tolerance)
+    solver = prepare(scene, method, tolerance, attitude=False)
     omega = solver(start, end)
     assert solver.status in _ENDED, what
     steps = abs(solver.steps)

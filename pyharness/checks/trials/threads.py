@@ -124,7 +124,7 @@ def _prepared(scene: Scene, name: str) -> bytes:
 
 @cache
 def _shared(scene: Scene, name: str) -> Solver:
-    return prepare(scene, name, 1e-7)
+    return prepare(scene, name, 1e-7, attitude=False)
 
 
 def _program(scene: Scene, listing: Listing, implementation: str) -> bytes:

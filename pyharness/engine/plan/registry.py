@@ -224,20 +224,22 @@ def requested_tolerance(method: str, tolerance: Number | None) -> float:
     return chosen.default if tolerance is None else tolerance_of(tolerance, chosen.finest)
 
 
-def computes_attitude(scene: Scene, method: str, requested: bool | None) -> bool:
+def computes_attitude(
+    scene: Scene, method: str, requested: bool | None, able: Iterable[str] = WITH_ATTITUDE
+) -> bool:
     """Return whether to compute the attitude; by default if given or needed, and computable."""
     if requested is None:
-        able = REGISTRY[method].attitude
+        is_able = method in able
         if method == "closed-form":
-            able = scene.coefficients is None and scene.torque.is_zero
-        return scene.has_attitude and able
+            is_able = scene.coefficients is None and scene.torque.is_zero
+        return scene.has_attitude and is_able
     if boolean("attitude", requested):
-        check_attitude(method)
+        check_attitude(method, able)
     return bool(requested)
 
 
 def check_attitude(method: str, able: Iterable[str] = WITH_ATTITUDE) -> None:
-    if not REGISTRY[method].attitude:
+    if method not in able:
         allowed = ", ".join(able)
         raise InputError(f"method {method} does not compute attitudes; allowed: {allowed}")
 

@@ -50,7 +50,7 @@ def get_include() -> str:
     >>> sorted(path.name for path in Path(get_include()).glob("*.h"))
     ['pyharness.h']
     """
-    return str(Path(__file__).parent.parent / "include")
+    return str(Path(__file__).parents[2] / "include")
 
 
 def check_call(

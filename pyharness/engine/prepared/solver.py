@@ -13,9 +13,9 @@ from pyharness.engine.plan.registry import (
     PREPARED,
     PREPARED_WITH_ATTITUDE,
     REGISTRY,
-    check_attitude,
     check_prepared,
     check_torque,
+    computes_attitude,
     requested_tolerance,
 )
 from pyharness.engine.prepared.compiled_call import CompiledCall, check_call, compiled_call
@@ -60,7 +60,7 @@ class Solver(BoundKernel[Result]):
     final time (s), of any sign. It returns omega (rad/s) at `t_end` as a new array of shape (3,),
     or in `out`, a contiguous array of three floats, which may be the array `omega`.
 
-    Prepared with ``attitude=True``, ``solver(omega, t_end, attitude=None)`` takes the initial
+    Prepared with the attitude, ``solver(omega, t_end, attitude=None)`` takes the initial
     quaternion from body to space, scalar first; the default is the scene's, or (1, 0, 0, 0). It
     returns omega and the quaternion at `t_end`, shape (4,), as new arrays.
 
@@ -253,7 +253,17 @@ def prepare(
     tolerance: Number | None = ...,
     *,
     effort: float = ...,
-    attitude: Literal[False] = ...,
+    attitude: None = ...,
+    compiled: bool = ...,
+) -> Solver[Any]: ...
+@overload
+def prepare(
+    scene: Scene,
+    method: str = ...,
+    tolerance: Number | None = ...,
+    *,
+    effort: float = ...,
+    attitude: Literal[False],
     compiled: bool = ...,
 ) -> Solver[Array]: ...
 @overload
@@ -273,7 +283,7 @@ def prepare(
     tolerance: Number | None = None,
     *,
     effort: float = 1.0,
-    attitude: bool = False,
+    attitude: bool | None = None,
     compiled: bool = False,
 ) -> Solver[Any]:
     """Prepare a solver for many calls with the same scene.
@@ -290,8 +300,8 @@ def prepare(
         ignore it.
     effort : float
         Factor on the work limit of a call (about ten seconds); beyond it the status is `gave up`.
-    attitude : bool
-        Whether calls return the attitude too, as in `solve`.
+    attitude : bool, optional
+        Whether calls return the attitude too; the default is as in `solve`.
     compiled : bool
         Whether a C compiler translates a recorded torque, mostly within a second; the result is
         cached. Without a compiler the torque is interpreted (see `Solver.leaves`).
@@ -322,13 +332,12 @@ def prepare(
     array([-0.958924,  0.283662, 10.      ])
     """
     checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True)
-    attitude, compiled = boolean("attitude", attitude), boolean("compiled", compiled)
+    compiled = boolean("compiled", compiled)
     method = known("method", method, PREPARED)
+    attitude = computes_attitude(scene, method, attitude, PREPARED_WITH_ATTITUDE)
     tolerance = requested_tolerance(method, tolerance)
     effort = checked_effort(effort)
     check_prepared(scene, method)
     check_torque(scene, method, attitude)
-    if attitude:
-        check_attitude(method, PREPARED_WITH_ATTITUDE)
     chosen = plan(problem_of(scene, attitude).turned, method, tolerance, rows=attitude)
     return Solver(scene, chosen, tolerance, method, effort, attitude, compiled)

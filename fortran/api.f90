@@ -134,7 +134,7 @@ subroutine torque_free_attitude_solution(moments, moments_low, omega0, attitude0
                                  n_rows, status)
 end subroutine torque_free_attitude_solution
 
-subroutine torque_free_growth(coefficients, omega0, t_end, growth)
+subroutine torque_free_growth(coefficients, omega0, t_end, growth, enough)
   ! Compute the error amplification of a torque-free motion: the largest norm of the
   ! state-transition matrix of omega to t_end, from the closed form.
   !f2py threadsafe
@@ -144,8 +144,14 @@ subroutine torque_free_growth(coefficients, omega0, t_end, growth)
   real(8), intent(in) :: omega0(3)        ! rad/s at time 0
   real(8), intent(in) :: t_end            ! s
   real(8), intent(out) :: growth          ! at least 1; negative if there is no closed form
+  real(8), intent(in) :: enough           ! if positive, only whether growth is larger matters
+  !f2py real(8), optional, intent(in) :: enough = 0.0
 
-  growth = torque_free_growth_of(coefficients, omega0, t_end)
+  if (enough > 0.0_8) then
+    growth = torque_free_growth_of(coefficients, omega0, t_end, enough)
+  else
+    growth = torque_free_growth_of(coefficients, omega0, t_end)
+  end if
 end subroutine torque_free_growth
 
 subroutine sphere_solution(m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega0, &

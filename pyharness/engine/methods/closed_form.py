@@ -6,9 +6,9 @@ from functools import partial
 import numpy as np
 
 from pyharness.engine.methods.sensitivity import (
-    calm_until,
     closed_form_estimate,
     growth_of_rounding,
+    is_calm,
     is_sensitive,
     torque_noise,
 )
@@ -94,7 +94,7 @@ def known_solution(
     if status != COMPLETE:
         return trajectory_of(times, rows, n_rows, status, len(times), 0, attitudes=attitudes)
     noise = torque_noise(scene, scene.omega, times[-1])
-    if scene.torque.is_zero and abs(times[-1]) < calm_until(scene, tolerance):
+    if is_calm(scene, scene.omega, times[-1], tolerance):
         found = trajectory_of(times, rows, n_rows, COMPLETE, len(times), 0, attitudes=attitudes)
         return found.estimate_later(partial(_largest_estimate, scene, times, noise))
     error, growth = _largest_estimate(scene, times, noise)

@@ -64,18 +64,24 @@ def growth_of_rounding(scene: Scene, growth: float | None) -> float | None:
     return 1.0
 
 
-def calm_until(scene: Scene, tolerance: float) -> float:
+def calm_until(scene: Scene) -> float:
     """Return a time (s) until which a closed form without torque is certainly not sensitive."""
-    moments, coefficients = scene.moments, scene.euler_coefficients
-    most = _NEGLIGIBLE_TO
-    if isinstance(scene, PrincipalScene):
-        most = _SHARE * tolerance / ROUNDING
-    if moments is None or most <= 1.0:
+    if scene.moments is None or isinstance(scene, PrincipalScene):
         return 0.0
     # The energy bounds |omega|, and so the Jacobian, whose norm is the rate of perturbations.
-    largest = math.hypot(*scene.omega) * math.sqrt(max(moments) / min(moments))
-    rate = math.sqrt(2.0) * max(map(abs, coefficients)) * largest
-    return math.log(most) / rate if rate > 0.0 else math.inf
+    largest = math.hypot(*scene.omega) * math.sqrt(max(scene.moments) / min(scene.moments))
+    rate = math.sqrt(2.0) * max(map(abs, scene.euler_coefficients)) * largest
+    return math.log(_NEGLIGIBLE_TO) / rate if rate > 0.0 else math.inf
+
+
+def is_calm(scene: Scene, omega0: Triple, t_end: float, tolerance: float) -> bool:
+    """Return whether a closed form without torque is not sensitive at `t_end` (s)."""
+    if not scene.torque.is_zero or not any(scene.euler_coefficients):
+        return scene.torque.is_zero
+    is_principal = isinstance(scene, PrincipalScene)
+    most = _SHARE * tolerance / ROUNDING if is_principal else _NEGLIGIBLE_TO
+    growth = extension().torque_free_growth(scene.euler_coefficients, omega0, t_end, most)
+    return 0.0 <= float(growth) <= most
 
 
 def closed_form_estimate(

@@ -8,7 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.engine.methods.sensitivity import calm_until, closed_form_estimate, judge_ending
+from pyharness.engine.methods.sensitivity import (
+    calm_until,
+    closed_form_estimate,
+    is_calm,
+    judge_ending,
+)
 from pyharness.engine.plan.plan import plan
 from pyharness.engine.prepared.solver import Solver
 from pyharness.engine.problem.problem import Problem, kept_of
@@ -29,8 +34,8 @@ def _end(problem: Problem, method: str, tolerance: float, effort: float) -> End:
     scene, omega = problem.scene, np.array(problem.scene.omega)
     chosen = plan(scene, method, tolerance, rows=True)
     solver: Any = Solver(scene, chosen, tolerance, method, effort, problem.with_attitude)
+    calm = calm_until(scene) if scene.torque.is_zero else 0.0
     kind = "closed" if chosen.closed_form else ""
-    calm = calm_until(scene, tolerance) if scene.torque.is_zero else 0.0
     known = {"moments": problem.moments, "tolerance": tolerance, "scene": problem.given}
 
     def solve_until(time: float) -> Trajectory | None:
@@ -40,7 +45,9 @@ def _end(problem: Problem, method: str, tolerance: float, effort: float) -> End:
         attitude = error = growth = None
         if problem.with_attitude:
             state, attitude = state[0], state[1][None]
-        is_later = kind and not steps and number == COMPLETE and abs(time) < calm
+        is_later = kind and not steps and number == COMPLETE
+        if is_later and abs(time) >= calm:
+            is_later = is_calm(scene, scene.omega, time, tolerance)
         if not is_later:
             status, error, growth = judge_ending(scene, kind, tolerance, solver._ending)
             if status != "complete":

@@ -26,18 +26,20 @@ _NOT_FINITE = (
 def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
     """Return A, B, C, and the torque divided by moments, all finite."""
     law, moments = scene.body_torque, np.array(scene.moments or (1.0, 1.0, 1.0))
+    vectors = np.array([scene.euler_coefficients, law.constant, law.rate])
     # A wave of amplitude 0 would only take time.
     sines, cosines = (
         columns(tuple(wave for wave in waves if any(wave[0]))) for waves in (law.sines, law.cosines)
     )
     with np.errstate(over="ignore"):
-        sines[:3] /= moments[:, None]
-        cosines[:3] /= moments[:, None]
-        constant, rate = np.array(law.constant) / moments, np.array(law.rate) / moments
-    found = np.array(scene.euler_coefficients), constant, rate, sines, cosines
-    if not all(np.isfinite(each).all() for each in found):
+        vectors[1:] /= moments
+        for waves in (sines, cosines):
+            if waves.size:
+                waves[:3] /= moments[:, None]
+    if not all(np.isfinite(each).all() for each in (vectors, sines, cosines) if each.size):
         raise InputError(_NOT_FINITE)
-    return found
+    coefficients, constant, rate = vectors
+    return coefficients, constant, rate, sines, cosines
 
 
 def remainders(scene: Scene) -> Triple:

@@ -34,7 +34,7 @@ from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.errors import InputError, known
 from pyharness.model.keywords import with_hints
-from pyharness.model.scene import Scene, checked_scene, most_steps
+from pyharness.model.scene import Scene, any_scene, most_steps
 from pyharness.model.state_torque import is_opaque
 from pyharness.model.trajectory import Trajectory
 from pyharness.model.values import (
@@ -133,7 +133,7 @@ def solve(
     key = method, tolerance, effort, attitude
     if plain and (known_end := kept_end(scene, times, key)) is not None:
         return known_end
-    checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True, states=True)
+    any_scene(scene)
     dense_output = boolean("dense_output", dense_output)
     method = known("method", method, METHODS)
     asked = method

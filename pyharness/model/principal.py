@@ -10,7 +10,7 @@ import numpy as np
 from pyharness.model.attitude import IDENTITY, Quaternion, product, quaternion_of_axes
 from pyharness.model.fields import ROWS
 from pyharness.model.inertia import Exact, PrincipalFrame, nearest_float, principal_frame
-from pyharness.model.scene import Scene, Triple, checked_scene
+from pyharness.model.scene import Scene, Triple, any_scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.model.values import triple
@@ -81,7 +81,7 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
            [-0.707,  0.707,  0.   ],
            [ 0.   ,  0.   ,  1.   ]])
     """
-    checked_scene(scene, True, True, True, True, True)
+    any_scene(scene)
     if scene.inertia is None:
         return scene, np.eye(3)
     frame = principal_frame(scene.inertia)

@@ -420,8 +420,15 @@ def _size(steps: int, limit: int) -> str:
     return f"{steps}{size if steps > limit else ''}"
 
 
+def any_scene(scene: object) -> Scene:
+    return checked_scene(
+        scene, any_axes=True, any_torque=True, any_state=True, changing=True, states=True
+    )
+
+
 def checked_scene(
     scene: object,
+    *,
     any_axes: bool = False,
     any_torque: bool = False,
     any_state: bool = False,

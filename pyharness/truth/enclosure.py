@@ -42,7 +42,7 @@ def enclose(
 
     Raise InputError if no proof is found.
     """
-    checked_scene(scene, True, True, True, True)
+    checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True)
     if not 1 <= integer("digits", digits) <= MOST_DIGITS:
         raise InputError(f"digits: {digits}; allowed: 1 to {MOST_DIGITS}")
     times = [float(t) for t in times]

@@ -89,7 +89,7 @@ def checked_names(
         found
         and is_smooth
         and not attitude
-        and varied_equations(scene, tuple(found), False).tape.needs_attitude
+        and varied_equations(scene, tuple(found), attitude=False).tape.needs_attitude
     ):
         raise InputError(f"{place}: the torque depends on the attitude; give attitude=True")
     return tuple(found)
@@ -199,7 +199,12 @@ def _by_periods(
     # Every period repeats the error of the first.
     tolerance = min(tolerance, _OF_PERIOD)
     columns, rows, starts = _by_series(
-        scene, (OMEGA, *(x for x in names if x != OMEGA)), False, inner, tolerance, effort
+        scene,
+        (OMEGA, *(x for x in names if x != OMEGA)),
+        attitude=False,
+        times=inner,
+        tolerance=tolerance,
+        effort=effort,
     )
     transition, last = rows[:, :, columns[OMEGA]], rows[place[-1]]
     slope = _slope(scene)

@@ -60,7 +60,10 @@ def solve_state(
         is_checked = beside is not None
         if beside is not None:
             largest = max(found.largest, _largest_of(beside.rows))
-            first, second = found._replace(largest=largest), StateRows(beside.rows, True, largest)
+            first, second = (
+                found._replace(largest=largest),
+                StateRows(beside.rows, is_complete=True, largest=largest),
+            )
             is_short = len(found.state) < len(beside.rows)
             if is_short or not _difference(first, second) <= _AGREEMENT * tolerance:
                 run.spans = beside.spans
@@ -91,7 +94,7 @@ def _refined(run: StateRun, times: Sequence[float], tolerance: float) -> StateRo
     scale = run.expected_omega()
     if scale == 0.0:
         # The body rests, because no torque acts.
-        return StateRows(np.tile(run.start, (len(times), 1)), True, 0.0)
+        return StateRows(np.tile(run.start, (len(times), 1)), is_complete=True, largest=0.0)
     local = max(tolerance / _FIRST[run.name], _RATIO * FINEST_STEP)
     before, ratio = run.rows(times, local, scale), _RATIO
     while True:

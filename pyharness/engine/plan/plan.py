@@ -113,26 +113,26 @@ def _decisions(chosen: Plan) -> Iterator[Decision]:
     scene, torque = chosen.scene, chosen.scene.torque
     closed = chosen.method == "closed-form"
     if closed:
-        yield Decision("integration", False, f"closed form: {chosen.closed_form}")
+        yield Decision("integration", kept=False, why=f"closed form: {chosen.closed_form}")
     else:
         why = "requested" if closed_form(scene) else _why_no_form(scene)
-        yield Decision("integration", True, why)
+        yield Decision("integration", kept=True, why=why)
     names = ("A w2 w3", "B w1 w3", "C w1 w2")
     equal = ("I2 = I3", "I3 = I1", "I1 = I2")
     values = (1.0, 1.0, 1.0) if scene.changing is not None else scene.euler_coefficients
     for name, value, product in zip(names, values, equal, strict=True):
         if scene.changing is not None:
-            yield Decision(name, True, "its inertia changes with time")
+            yield Decision(name, kept=True, why="its inertia changes with time")
         elif value != 0.0:
-            yield Decision(name, True, f"coefficient {value:g}")
+            yield Decision(name, kept=True, why=f"coefficient {value:g}")
         elif closed:
-            yield Decision(name, False, product)
+            yield Decision(name, kept=False, why=product)
         else:
             # The kernels sum three products side by side in one register.
-            yield Decision(name, True, f"{product}: zero; costs no time beside the others")
+            yield Decision(name, kept=True, why=f"{product}: zero; costs no time beside the others")
     if isinstance(torque, StateTorque):
         count = "opaque" if torque.tape is None else f"{len(torque.tape.operations)} operations"
-        yield Decision("torque", True, f"depends on the state: {count}")
+        yield Decision("torque", kept=True, why=f"depends on the state: {count}")
     else:
         yield Decision("torque", not torque.is_zero, "zero" if torque.is_zero else "acts")
         for name, terms in (("sines", torque.sines), ("cosines", torque.cosines)):
@@ -143,15 +143,15 @@ def _decisions(chosen: Plan) -> Iterator[Decision]:
     for part, wanted in (("velocity", chosen.velocity), ("attitude", scene.attitude is not None)):
         if part == "attitude" and torque.needs_attitude:
             why = "the torque is fixed in space" if torque.in_space else "the torque depends on it"
-            yield Decision(part, True, why)
+            yield Decision(part, kept=True, why=why)
         else:
             yield Decision(part, wanted, "requested" if wanted else "not requested")
     why = "intermediate output requested" if chosen.rows else "only the end"
     is_kept = chosen.rows and not closed
     yield Decision("dense output", is_kept, "closed form" if chosen.rows and closed else why)
     # No prepared solver uses the reference solution or SciPy.
-    yield Decision("reference", False, "not requested")
-    yield Decision("SciPy", False, "our own kernels solve it")
+    yield Decision("reference", kept=False, why="not requested")
+    yield Decision("SciPy", kept=False, why="our own kernels solve it")
 
 
 def _why_no_form(scene: Scene) -> str:

@@ -15,7 +15,7 @@ from pyharness.model.changing import rates_of_changing
 from pyharness.model.constant_body import rates_about_body_axes
 from pyharness.model.errors import InputError
 from pyharness.model.keywords import with_hints
-from pyharness.model.scene import Scene, checked_scene
+from pyharness.model.scene import Scene, any_scene
 from pyharness.model.state_torque import StateTorque, of_law, torque_of
 from pyharness.model.symbols import MOST_OPERATIONS, Recorder
 from pyharness.model.tape import Tape, float_outputs
@@ -94,7 +94,7 @@ class Stepper:
     def __init__(
         self, scene: Scene, tolerance: float = _DEFAULT, *, attitude: bool | None = None
     ) -> None:
-        wants = checked_scene(scene, *[True] * 5).has_attitude
+        wants = any_scene(scene).has_attitude
         attitude = wants if attitude is None else boolean("attitude", attitude)
         self._time, self._begin, self._steps = 0.0, 0.0, 0
         self._tolerance = tolerance_of(tolerance, FINEST)
@@ -129,7 +129,7 @@ class Stepper:
 
     @scene.setter
     def scene(self, scene: Scene) -> None:
-        checked_scene(scene, *[True] * 5)
+        any_scene(scene)
         torque = scene.torque if isinstance(scene.torque, StateTorque) else of_law(scene.torque)
         if torque.tape is None:
             raise InputError(

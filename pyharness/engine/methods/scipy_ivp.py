@@ -111,7 +111,7 @@ def scipy_method(name: str) -> Integrator:
                     f"{ahead.growth:.3g} times; allowed for this motion: {finest * 1.06:.2g} to 1, "
                     "or a shorter time"
                 )
-            if len(times) > 1:
+            if len(times) > 1 or with_steps:
                 total *= _ROWS
             step = max(FINEST_STEP, tolerance / total)
             noise = torque_noise(scene, scene.omega, times[-1], scale=ahead.largest)
@@ -126,7 +126,7 @@ def scipy_method(name: str) -> Integrator:
             fastest = max(waves_that_count, default=0.0)
             longest = _WAVE_STEP / fastest if fastest > 0.0 else math.inf
             sizes = [allowed] * 3 + [step] * (len(run.start) - 3)
-            result = run.solved(name, step, sizes, times, longest)
+            result = run.solved(name, step, sizes, times, longest, with_steps=with_steps)
             low, high = min(scene.euler_coefficients), max(scene.euler_coefficients)
             if result.status == 1 and low <= 0.0 <= high:
                 # Omega is bounded, but its phase has no digit beyond this time.
@@ -143,6 +143,9 @@ def scipy_method(name: str) -> Integrator:
             ended = "sensitive"
         # SciPy does not report the number of steps.
         found = rows_of(times[:count], rows[:count], run.evaluations, len(times), ended)
+        if with_steps and ended != "overflow":
+            run.solutions.append(result.sol)
+            found = found.with_values(sol=run.steps(scene))
         if ended != "sensitive":
             return found
         reason = (

@@ -5,6 +5,7 @@ series limits its steps.
 """
 
 import contextlib
+import itertools
 import math
 import threading
 import warnings
@@ -14,9 +15,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pyharness.engine.steps.step_nodes import MOST_STEPS, STEP_NODES, steps_output
 from pyharness.engine.steps.stepped import steps_to
 from pyharness.engine.system.kernel_input import rows_trajectory
 from pyharness.engine.system.recorded import outputs_at
+from pyharness.model.dense_output import DenseOutput, Pieces
 from pyharness.model.effort import advice
 from pyharness.model.errors import InputError, TimedError
 from pyharness.model.scene import Scene
@@ -74,6 +77,7 @@ class Run:
         self.end, self.effort, self.most = end, effort, most
         self.label = name.lower()
         self.evaluations = 0
+        self.solutions: list[Any] = []  # SciPy's dense outputs of the last integration
         # Unit of time (s): a power of 2 near the span if that is tiny, else 1.
         self.unit = 1.0 if abs(end) >= _SHORTEST_SPAN else math.ldexp(1.0, math.frexp(end)[1])
 
@@ -127,6 +131,21 @@ class Run:
                     f"{self.label} failed: {error}; use a shorter time, slower motion or "
                     "smaller torques"
                 ) from None
+
+    def steps(self, scene: Scene) -> DenseOutput | None:
+        """Return the last integration's steps as dense output; None for no steps or over 20 000."""
+        edges, values = [0.0], []
+        for sol in self.solutions:
+            for (first, last), step in zip(
+                itertools.pairwise(sol.ts.tolist()), sol.interpolants, strict=True
+            ):
+                values.append(step(first + (last - first) * STEP_NODES).T)
+                edges.append(last * self.unit)
+        if not 0 < len(values) <= MOST_STEPS:
+            return None
+        order = 1 if self.end > 0.0 else -1
+        nodes = np.array(values)[::order, ::order]
+        return steps_output(scene, Pieces(np.array(edges)[::order], nodes))
 
     def phase_error(self, time: float) -> TimedError:
         """Return the exception for a phase above the limit at `time` (in `self.unit`)."""

@@ -1,6 +1,5 @@
 """Integration by SciPy under a torque that depends on the state."""
 
-import itertools
 import math
 import warnings
 from collections.abc import Sequence
@@ -9,9 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pyharness.engine.methods.scipy_run import NoNumberError, RightHandSide, Run, Span, bounds_of
-from pyharness.engine.steps.step_nodes import MOST_STEPS, STEP_NODES, steps_output
 from pyharness.engine.system.recorded import slopes_of
-from pyharness.model.dense_output import DenseOutput, Pieces
 from pyharness.model.errors import InputError, TimedError, printable
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
@@ -73,7 +70,6 @@ class StateRun(Run):
         self._reached, self._largest, self._stuck = 0.0, 0.0, 0
         self.with_steps = False
         self._last = 0.0, np.array(start)
-        self._solutions: list[Any] = []  # SciPy's dense outputs of the last integration
         self.spans = [Span(time, math.inf) for time in bounds_of(scene, end)]
 
     # Confine tables to the current span, and report failures of opaque functions.
@@ -191,7 +187,7 @@ class StateRun(Run):
         longest = abs(self.end) / (_FEWEST_STEPS + _MORE_STEPS * self._integrations)
         rows = np.empty((0, len(self.start)))
         state, begin, self._largest = self.start, 0.0, 0.0
-        self._solutions.clear()
+        self.solutions.clear()
         # Each integration ends where a table changes, because SciPy may step over the change.
         for end, most in self.spans:
             own = [time for time in times[len(rows) :] if abs(time) <= abs(end)]
@@ -205,7 +201,7 @@ class StateRun(Run):
             state, begin = found[-1].tolist(), end
         finite = np.isfinite(rows).all(axis=1)
         rows = with_unit_attitude(rows if finite.all() else rows[: int(np.argmin(finite))])
-        return StateRows(rows, len(rows) == len(times), self._largest, tuple(self._solutions))
+        return StateRows(rows, len(rows) == len(times), self._largest, tuple(self.solutions))
 
     def _from(
         self, begin: float, state: Sequence[float], wanted: list[float], local: float,
@@ -223,25 +219,10 @@ class StateRun(Run):
                 continue
             if result.status == 1 and self._largest < _UNBOUNDED * scale:
                 raise self.phase_error(float(result.t_events[0][0]))
-            self._solutions += [result.sol] if self.with_steps else []
+            self.solutions += [result.sol] if self.with_steps else []
             # SciPy returns an empty list if it reached no time.
             return np.reshape(np.asarray(result.y).T, (-1, len(self.start)))
         return np.empty((0, len(self.start)))
-
-    def steps(self, scene: Scene) -> DenseOutput | None:
-        """Return the last integration's steps as dense output; None for no steps or over 20 000."""
-        edges, values = [0.0], []
-        for sol in self._solutions:
-            for (first, last), step in zip(
-                itertools.pairwise(sol.ts.tolist()), sol.interpolants, strict=True
-            ):
-                values.append(step(first + (last - first) * STEP_NODES).T)
-                edges.append(last * self.unit)
-        if not 0 < len(values) <= MOST_STEPS:
-            return None
-        order = 1 if self.end > 0.0 else -1
-        nodes = np.array(values)[::order, ::order]
-        return steps_output(scene, Pieces(np.array(edges)[::order], nodes))
 
 
 def with_unit_attitude(rows: Array) -> Array:

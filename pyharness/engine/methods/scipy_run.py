@@ -78,6 +78,7 @@ class Run:
         self.label = name.lower()
         self.evaluations = 0
         self.solutions: list[Any] = []  # SciPy's dense outputs of the last integration
+        self.has_steps = True  # whether SciPy can return them
         # Unit of time (s): a power of 2 near the span if that is tiny, else 1.
         self.unit = 1.0 if abs(end) >= _SHORTEST_SPAN else math.ldexp(1.0, math.frexp(end)[1])
 
@@ -127,21 +128,25 @@ class Run:
             except (ValueError, ArithmeticError) as error:
                 if "infs or NaNs" in str(error):
                     raise NoNumberError from None
+                if with_steps and "strictly" in str(error):
+                    # SciPy has no dense output if two steps end at one time.
+                    self.has_steps = False
+                    return self.solved(name, relative, absolute, times, longest, begin, state)
                 raise InputError(
                     f"{self.label} failed: {error}; use a shorter time, slower motion or "
                     "smaller torques"
                 ) from None
 
     def steps(self, scene: Scene) -> DenseOutput | None:
-        """Return the last integration's steps as dense output; None for no steps or over 20 000."""
+        """Return the last integration's steps as dense output; None for none or over 20 000."""
         edges, values = [0.0], []
-        for sol in self.solutions:
+        for sol in filter(None, self.solutions):
             for (first, last), step in zip(
                 itertools.pairwise(sol.ts.tolist()), sol.interpolants, strict=True
             ):
                 values.append(step(first + (last - first) * STEP_NODES).T)
                 edges.append(last * self.unit)
-        if not 0 < len(values) <= MOST_STEPS:
+        if not (self.has_steps and 0 < len(values) <= MOST_STEPS):
             return None
         order = 1 if self.end > 0.0 else -1
         nodes = np.array(values)[::order, ::order]

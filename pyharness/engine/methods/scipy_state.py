@@ -46,33 +46,30 @@ def solve_state(
     `most` is the work limit in torque-free right-hand sides.
     """
     run = StateRun(scene, times[-1], name, effort, most)
-    run.with_steps = with_steps and not run.is_smooth
+    run.with_steps = with_steps
     nothing = np.empty((0, len(run.start)))
     if run.is_singular():
         run.check_undefined()
         return rows_of([], nothing, 1, len(times), "overflow")
     if times[-1] == 0.0:
         return rows_of(times, np.array([run.start]), 1, 0, "complete")
+    beside = series_beside(scene, times, tolerance) if run.is_smooth else None
+    run.is_checked = beside is not None
     found = _refined(run, times, tolerance)
-    is_checked = True
-    if run.is_smooth:
-        beside = series_beside(scene, times, tolerance)
-        is_checked = beside is not None
-        if beside is not None:
-            largest = max(found.largest, _largest_of(beside.rows))
-            first, second = (
-                found._replace(largest=largest),
-                StateRows(beside.rows, is_complete=True, largest=largest),
-            )
-            is_short = len(found.state) < len(beside.rows)
-            if is_short or not _difference(first, second) <= _AGREEMENT * tolerance:
-                run.spans = beside.spans
-                found = _refined(run, times, tolerance)
+    if beside is not None:
+        largest = max(found.largest, _largest_of(beside.rows))
+        first = found._replace(largest=largest)
+        second = StateRows(beside.rows, is_complete=True, largest=largest)
+        is_short = len(found.state) < len(beside.rows)
+        if is_short or not _difference(first, second) <= _AGREEMENT * tolerance:
+            run.spans = beside.spans
+            found = _refined(run, times, tolerance)
     if not found.is_complete:
         run.check_undefined()
     count = len(found.state)
     # A recorded torque is unchecked if its Taylor series ends early.
-    ended = "overflow" if not found.is_complete else "complete" if is_checked else "unchecked"
+    is_judged = run.is_checked or not run.is_smooth
+    ended = "overflow" if not found.is_complete else "complete" if is_judged else "unchecked"
     result = rows_of(times[:count], found.state, run.evaluations, len(times), ended)
     return replace(result, sol=run.steps(scene)) if ended == "complete" else result
 

@@ -15,8 +15,8 @@ from pyharness.model.state_torque import StateTorque
 from pyharness.model.symbols import HAS_MEMORY
 from pyharness.model.trajectory import Array
 
-# The longest step is the time span divided by a number that grows with each integration, so that no
-# two integrations pass a short pulse or sample a wave alike.
+# Without a series, the longest step is the time span divided by a number that grows with each
+# integration, so that no two integrations pass a short pulse or sample a wave alike.
 _FEWEST_STEPS, _MORE_STEPS = 32, 7
 _COARSE = 1e-3
 # As in scipy_ivp.py.
@@ -60,6 +60,7 @@ class StateRun(Run):
         limit = int(most * _WORK / (_WORK + work))
         start = (*scene.omega, *(scene.attitude or ()))
         self.is_smooth = torque.tape is not None
+        self.is_checked = False  # whether a series shows what SciPy steps over
         super().__init__(start, self._guarded(slopes), rate, end, name, effort, limit)
         if not self.is_smooth:
             self._check_memory()
@@ -184,7 +185,8 @@ class StateRun(Run):
         """Return states at `times` (s); the tolerance is `local`, for omega times `scale`."""
         self._integrations += 1
         sizes = [local * scale] * 3 + [local] * (len(self.start) - 3)
-        longest = abs(self.end) / (_FEWEST_STEPS + _MORE_STEPS * self._integrations)
+        parts = _FEWEST_STEPS + _MORE_STEPS * self._integrations
+        longest = math.inf if self.is_checked else abs(self.end) / parts
         rows = np.empty((0, len(self.start)))
         state, begin, self._largest = self.start, 0.0, 0.0
         self.solutions.clear()
@@ -201,7 +203,8 @@ class StateRun(Run):
             state, begin = found[-1].tolist(), end
         finite = np.isfinite(rows).all(axis=1)
         rows = with_unit_attitude(rows if finite.all() else rows[: int(np.argmin(finite))])
-        return StateRows(rows, len(rows) == len(times), self._largest, tuple(self.solutions))
+        solutions = tuple(self.solutions) if self.has_steps else ()
+        return StateRows(rows, len(rows) == len(times), self._largest, solutions)
 
     def _from(
         self, begin: float, state: Sequence[float], wanted: list[float], local: float,
@@ -219,7 +222,7 @@ class StateRun(Run):
                 continue
             if result.status == 1 and self._largest < _UNBOUNDED * scale:
                 raise self.phase_error(float(result.t_events[0][0]))
-            self.solutions += [result.sol] if self.with_steps else []
+            self.solutions += [result.sol] if self.with_steps and result.sol else []
             # SciPy returns an empty list if it reached no time.
             return np.reshape(np.asarray(result.y).T, (-1, len(self.start)))
         return np.empty((0, len(self.start)))

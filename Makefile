@@ -78,15 +78,14 @@ format: .venv/ready-to-test
 clean:
 	rm -rf .venv build dist
 
-# The environment is made anew when its ingredients change, or other tools are requested. uv takes a
-# fifth of pip's time, where it is available.
+# The environment is made anew when its ingredients change, or other tools are requested.
 .venv/ready: pyproject.toml meson.build .ci/setup .venv/tools
 	@.ci/setup "$(PYTHON)" "$(FC)"
 	@echo "$(PYTHON) $(FC)" > .venv/tools
 	@touch $@
 
 .venv/ready-to-test: .venv/ready
-	@$(PIP) uv && $(BIN)/uv pip install --quiet --python $(BIN)/python --group test || \
+	@$(BIN)/uv pip install --quiet --python $(BIN)/python --group test || \
 	  { $(PIP) "pip>=25.1" && $(PIP) --group test; }
 	@touch $@
 

@@ -65,6 +65,7 @@ MODULES = (
     "lanes_runge_kutta",
     "many_programs",
 )
+NAMED = re.compile(rf"\b(module|use) ({'|'.join(MODULES)})\b")
 LEAST_ORDER, MOST_ORDER = layout.ORDERS.LEAST_ORDER, layout.ORDERS.MOST_ORDER
 ORDERS = range(LEAST_ORDER, MOST_ORDER + 1, 2)
 ORDER_CARRIED = 7
@@ -167,8 +168,7 @@ def recurrence(order: int) -> Iterator[str]:
 
 def fortran_source(text: str, level: str, file: str) -> str:
     """Return a module for one instruction set; its name ends in the name of the file."""
-    for module in MODULES:
-        text = re.sub(rf"\b(module|use) {module}\b", rf"\1 {module}_{file}", text)
+    text = NAMED.sub(rf"\1 \2_{file}", text)
     text = re.sub(r'(bind\(c, name="\w+_)level"', rf'\1{level}"', text)
     written: dict[str, Iterator[str]] = {
         "expand": fortran_door("expand", "taylor_terms", level),

@@ -73,7 +73,7 @@ static inline int recurrence_of(const int *operation)
 struct leaves {
   /* As expand_tape of tape_terms.c; the last array is `unknowns` of its working storage. */
   void (*expand)(double *terms, const double *, const double *, double *unknowns, double h, int order);
-  /* As set_columns of tape_perturbations.c, for all columns. `parts` is of four numbers. */
+  /* As set_columns of tape_perturbations.c, for all columns. `parts` is of four numbers, `nodes` 2 or 4. */
   void (*set_jacobian)(const double *terms, const double *, const double *, const double *parts,
                        int nodes, double h, double *jacobian);
   /* Term 0 of all slots, and the rates; or NULL, and the operations are interpreted. */

@@ -85,7 +85,6 @@ def installation() -> dict[str, Any]:
 
 
 def _installer() -> str:
-    import json
     from importlib.metadata import PackageNotFoundError, distribution
 
     try:
@@ -93,8 +92,8 @@ def _installer() -> str:
     except PackageNotFoundError:
         return "not installed"
     name = (found.read_text("INSTALLER") or "unknown").strip()
-    origin = json.loads(found.read_text("direct_url.json") or "{}")
-    return f"{name}, editable" if origin.get("dir_info", {}).get("editable") else name
+    is_editable = any(file.name.endswith("_editable_loader.py") for file in found.files or ())
+    return f"{name}, editable" if is_editable else name
 
 
 def _ask_kernels() -> dict[str, str | None]:

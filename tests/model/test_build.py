@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib.metadata import PathDistribution
 from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
@@ -21,7 +22,7 @@ from pyharness import (
 )
 from pyharness.model import arithmetic, extension
 from pyharness.model.arithmetic import check_compiler, check_options
-from pyharness.model.build import build
+from pyharness.model.build import build, installation
 from tests.as_written import COMPILER
 from tests.conftest import Patch, ResultOf
 from tests.instruction_sets import LEVELS, level_of_processor
@@ -167,6 +168,27 @@ def test_flags_that_change_the_arithmetic_are_refused(
 @pytest.mark.parametrize("flags", HARMLESS)
 def test_flags_that_keep_the_arithmetic_are_accepted(language: str, flags: str) -> None:
     assert _check(language, flags) is None
+
+
+@pytest.mark.parametrize(
+    ("installer", "files", "expected"),
+    [("pip", ["_x_editable_loader.py", "x.pth"], "pip, editable"),
+     ("uv", ["x.py", "_y_editable_loader.py"], "uv, editable"), ("uv", ["x.py"], "uv"),
+     (None, [], "unknown")],
+)  # fmt: skip
+def test_an_editable_installation_is_one_that_loads_from_the_build(
+    installer: str | None, files: list[str], expected: str, tmp_path: Path, monkeypatch: Patch
+) -> None:
+    """Whatever installed it, and whether from the checkout or from what was built there."""
+    facts = tmp_path / "x.dist-info"
+    facts.mkdir()
+    for each in files:
+        (tmp_path / each).touch()
+    (facts / "RECORD").write_text("".join(f"{each},,\n" for each in files))
+    if installer:
+        (facts / "INSTALLER").write_text(f"{installer}\n")
+    monkeypatch.setattr("importlib.metadata.distribution", lambda _: PathDistribution(facts))
+    assert installation()["installer"] == expected
 
 
 @pytest.mark.parametrize(

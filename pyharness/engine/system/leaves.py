@@ -27,7 +27,7 @@ from pyharness.engine.system.leaf_text import (
 from pyharness.model.codes import Operations, Storage
 from pyharness.model.recurrences import OPERATIONS, WAVE, Operation
 
-_ABREAST = 4  # products side by side, and nodes of the Jacobian
+_ABREAST = 4  # products side by side, and at most nodes of the Jacobian, else 2
 _CHUNK = 8  # groups of products that are summed together; the registers suffice for 8
 _BLOCK = 8  # columns of the Jacobian in a row of its storage
 _TERMS_AMID = 16  # terms of a series at a node
@@ -35,7 +35,7 @@ _SIZE = -(-Storage.MOST_UNKNOWNS // _BLOCK) * Storage.MOST_UNKNOWNS * _BLOCK  # 
 
 HEADER = (
     f"""
-enum {{ PARTS = {_ABREAST}, SIZE = {_SIZE} }};
+enum {{ SIZE = {_SIZE} }};
 #define A(slot, k) a[(slot - 1) * {Storage.SERIES_LENGTH} + k]"""
     + """
 typedef double abreast __attribute__((vector_size(32)));
@@ -49,10 +49,20 @@ static abreast slope_of_root(abreast root)
   const bits is_other = root != 0.0;
   return (abreast)((bits)(0.5 / root) & is_other);
 }
+#ifdef __clang__
+#define MIXED __builtin_shufflevector
+#else
+#define MIXED(x, y, i, j, k, l) __builtin_shuffle(x, y, (bits){i, j, k, l})
+#endif
 static void put(double *to, int nodes, double h, abreast a, abreast b, abreast c, abreast d)
 {
-  for (int node = 0; node < PARTS && node < nodes; node++)
-    *(abreast *)(to + node * SIZE) = h * (abreast){a[node], b[node], c[node], d[node]};
+  const abreast p = MIXED(a, b, 0, 4, 2, 6), q = MIXED(a, b, 1, 5, 3, 7);
+  const abreast r = MIXED(c, d, 0, 4, 2, 6), s = MIXED(c, d, 1, 5, 3, 7);
+  *(abreast *)to = h * MIXED(p, r, 0, 1, 4, 5);
+  *(abreast *)(to + SIZE) = h * MIXED(q, s, 0, 1, 4, 5);
+  if (nodes == 2) return;
+  *(abreast *)(to + 2 * SIZE) = h * MIXED(p, r, 2, 3, 6, 7);
+  *(abreast *)(to + 3 * SIZE) = h * MIXED(q, s, 2, 3, 6, 7);
 }
 """
 )

@@ -131,10 +131,11 @@ end subroutine solve_ensemble
 
 subroutine solve_many_rows(code, tolerance, by_moments, n_body, body, n_constant, constant, &
                            n_rate, rate, n_sines, n_sine_sets, sines, n_cosines, &
-                           n_cosine_sets, cosines, n, omega0, n_rows, times, given_up, omega, &
-                           status, n_estimates, estimates, raised)
-  ! Solve many bodies under torque laws for several times; see solve_ensemble. The status is 0, or
-  ! -1 of a body that this leaves.
+                           n_cosine_sets, cosines, n, omega0, n_rows, times, places, &
+                           n_attitudes, attitude0, given_up, n_places, omega, n_results, &
+                           attitude, status, n_estimates, estimates, raised)
+  ! Solve many bodies under torque laws, or none, for several times; see solve_ensemble. The status
+  ! is 0, or -1 of a body that this leaves.
   !f2py threadsafe
   use, intrinsic :: iso_c_binding, only: c_loc, c_null_ptr
   use bodies, only: bodies_t
@@ -158,11 +159,17 @@ subroutine solve_many_rows(code, tolerance, by_moments, n_body, body, n_constant
   real(8), intent(in), target :: omega0(3, n)
   integer(4), intent(in) :: n_rows
   real(8), intent(in), target :: times(n_rows) ! s, of one sign, ordered away from 0
+  integer(4), intent(in), target :: places(n_rows) ! of these times in the results
+  integer(4), intent(in) :: n_attitudes
+  real(8), intent(in), target :: attitude0(4, n_attitudes)
   integer(4), intent(inout), target :: given_up(1)
-  real(8), intent(inout), target :: omega(3, n_rows, n)
+  integer(4), intent(in) :: n_places
+  real(8), intent(inout), target :: omega(3, n_places, n)
+  integer(4), intent(in) :: n_results          ! n with attitude, else 0
+  real(8), intent(inout), target :: attitude(4, n_places, n_results)
   integer(1), intent(inout) :: status(n)
   integer(4), intent(in) :: n_estimates        ! n if the estimates are requested, else 0
-  real(8), intent(inout), target :: estimates(2, n_rows, n_estimates)
+  real(8), intent(inout), target :: estimates(2, n_places, n_estimates)
   integer(4), intent(out) :: raised
   type(bodies_t) :: bodies
   real(8), target :: no_attitude(4, 0), no_estimates(2, 0)
@@ -180,9 +187,11 @@ subroutine solve_many_rows(code, tolerance, by_moments, n_body, body, n_constant
   bodies%omega0 => omega0
   bodies%times => times(n_rows:)
   bodies%row_times => times
+  bodies%places => places
   bodies%omega_rows => omega
+  bodies%attitude_rows => attitude
   bodies%estimate_rows => estimates
-  bodies%attitude0 => no_attitude
+  bodies%attitude0 => attitude0
   bodies%attitude => no_attitude
   bodies%estimates => no_estimates
   call watch(c_loc(given_up))

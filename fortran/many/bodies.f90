@@ -40,14 +40,16 @@ module bodies
     real(dp), pointer, contiguous :: estimates(:, :)
     !! (n_rows), s: of one sign, ordered away from 0; the last is the time of all bodies; or null
     real(dp), pointer, contiguous :: row_times(:) => null()
-    real(dp), pointer, contiguous :: omega_rows(:, :, :) => null()    !! (3, n_rows, n), results
-    !! (2, n_rows, 0 or n), results: as `estimates`
+    integer, pointer, contiguous :: places(:) => null() !! (n_rows), of each row in the results
+    real(dp), pointer, contiguous :: omega_rows(:, :, :) => null()    !! (3, places, n), results
+    real(dp), pointer, contiguous :: attitude_rows(:, :, :) => null() !! (4, places, 0 or n)
+    !! (2, places, 0 or n), results: as `estimates`
     real(dp), pointer, contiguous :: estimate_rows(:, :, :) => null()
     integer(i1) :: mark         !! status of the bodies that a kernel must solve
     integer :: n_waves          !! largest number of waves that act on one of them
   end type bodies_t
 
-  public :: acts, coefficients_of, has_torque, of_body, put_estimates, with_attitude
+  public :: acts, coefficients_of, has_torque, of_body, put_attitude, put_estimates, with_attitude
 
 contains
 
@@ -65,15 +67,35 @@ contains
     with_attitude = size(bodies%attitude0, 2) > 0
   end function with_attitude
 
-  subroutine put_estimates(bodies, i, error, growth)
+  subroutine put_estimates(bodies, i, row, error, growth)
     !! Store the estimates of body i if they are requested.
     type(bodies_t), intent(in) :: bodies
     integer, intent(in) :: i
+    integer, intent(in) :: row     !! of the results, if there are several of a body
     real(dp), intent(in) :: error  !! of the result, relative; negative: unknown
     real(dp), intent(in) :: growth !! error amplification; negative: unknown
 
-    if (size(bodies%estimates, 2) > 0) bodies%estimates(:, i) = [error, growth]
+    if (associated(bodies%row_times)) then
+      if (size(bodies%estimate_rows, 3) > 0) then
+        bodies%estimate_rows(:, bodies%places(row), i) = [error, growth]
+      end if
+    else if (size(bodies%estimates, 2) > 0) then
+      bodies%estimates(:, i) = [error, growth]
+    end if
   end subroutine put_estimates
+
+  subroutine put_attitude(bodies, i, row, attitude)
+    !! Store an attitude of body i.
+    type(bodies_t), intent(in) :: bodies
+    integer, intent(in) :: i, row        !! as in put_estimates
+    real(dp), intent(in) :: attitude(4)
+
+    if (associated(bodies%row_times)) then
+      bodies%attitude_rows(:, bodies%places(row), i) = attitude
+    else
+      bodies%attitude(:, i) = attitude
+    end if
+  end subroutine put_attitude
 
   pure function coefficients_of(bodies, i) result(a)
     !! Compute A, B, C of equations 13-15.

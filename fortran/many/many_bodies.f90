@@ -123,8 +123,8 @@ contains
   end subroutine solve_bodies
 
   subroutine solve_rows(bodies, code, status, raised)
-    !! Compute omega at the times of all bodies, side by side, by the series. Bodies with another
-    !! mark get the status NEEDS_FALLBACK.
+    !! Compute omega, and the attitude if attitude0 is specified, at the times of all bodies, side
+    !! by side. Bodies that need another kernel get the status NEEDS_FALLBACK.
     type(bodies_t), intent(in), target :: bodies
     integer, intent(in) :: code                    !! code of the module methods
     integer(i1), intent(inout) :: status(bodies%n) !! of the module statuses
@@ -137,8 +137,11 @@ contains
     allocate (omega(3, bodies%n), stat=failed)
     if (failed /= 0 .or. bodies%n == 0) return
     call mark_bodies(bodies, code, status, n_waves)
-    call solve_marked(bodies, RAMPED, 0, code, omega, status, raised)
-    if (raised == 0) call solve_marked(bodies, WAVED, n_waves, code, omega, status, raised)
+    call solve_marked(bodies, FREE, 0, code, omega, status, raised)
+    if (.not. with_attitude(bodies)) then
+      call solve_marked(bodies, RAMPED, 0, code, omega, status, raised)
+      if (raised == 0) call solve_marked(bodies, WAVED, n_waves, code, omega, status, raised)
+    end if
     where (status < NEEDS_FALLBACK) status = NEEDS_FALLBACK
   end subroutine solve_rows
 

@@ -17,8 +17,8 @@ module many_columns
 
   integer, parameter, public :: IN_ORDER(3) = [1, 2, 3]
 
-  public :: any_above_zero, columns_of, equations_of, next_block, odd_axes, put_back, times_of, &
-            turn_axes, turn_back, turned_order
+  public :: any_above_zero, columns_of, equations_of, next_block, odd_axes, put_back, &
+            put_rows_back, times_of, turn_axes, turn_back, turned_order
 
 contains
 
@@ -156,6 +156,23 @@ contains
       end do
     end if
   end subroutine put_back
+
+  subroutine put_rows_back(bodies, block, row, columns, order)
+    !! Copy three numbers of each body from its lane to a row of its results.
+    type(bodies_t), intent(in) :: bodies
+    type(block_t), intent(in) :: block
+    integer, intent(in) :: row
+    real(dp), intent(in) :: columns(LANES, 3)
+    integer, intent(in) :: order(3) !! column of each number
+    integer :: i, j, place
+
+    place = bodies%places(row)
+    do i = 1, block%there
+      do j = 1, 3
+        bodies%omega_rows(j, place, block%at(i)) = columns(i, order(j))
+      end do
+    end do
+  end subroutine put_rows_back
 
   pure subroutine join(n, first, second, third, results)
     !! Undo `separate`.

@@ -4,14 +4,16 @@ module many_free
   !! the limits of the range, are left to the single-body kernel.
   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
-  use bodies, only: A_GROUP, bodies_t, i1, LANES, NEEDS_FALLBACK, put_estimates, with_attitude
+  use bodies, only: A_GROUP, bodies_t, i1, LANES, NEEDS_FALLBACK, of_body, put_attitude, &
+                    put_estimates, with_attitude
   use kinds, only: dp
   use many_circular, only: sine_cosine_lanes
   use many_columns, only: any_above_zero, block_t, columns_of, equations_of, IN_ORDER, next_block, &
-                          odd_axes, put_back, times_of, turn_axes, turn_back, turned_order
+                          odd_axes, put_back, put_rows_back, times_of, turn_axes, turn_back, &
+                          turned_order
   use many_growth, only: ask_again, bound_phase, ROUNDING, UNSURE
   use many_orbits, only: LEVELS, orbits_t
-  use many_turns, only: put_attitudes, turns_t, turn_bodies
+  use many_turns, only: begin_turns, put_attitudes, turns_t, turn_bodies
   use statuses, only: COMPLETE
   implicit none(type, external)
   private
@@ -23,6 +25,7 @@ module many_free
   real(dp), parameter :: FAR = 1e100_dp ! products of numbers from 1/FAR to FAR are finite
   real(dp), parameter :: UNLIKE = 100.0_dp ! largest ratio of coefficients for the exponential bound
   real(dp), parameter :: NEVER = huge(1.0_dp) ! error that leaves the body to the single-body kernel
+  real(dp), parameter :: AT_START = 17.0_dp*ROUNDING ! error at time 0, as in many_left.f90
 
 contains
 
@@ -37,11 +40,11 @@ contains
     type(orbits_t) :: o
     type(turns_t) :: turns
     real(dp), dimension(LANES, 3) :: a, w, moments
-    real(dp) :: t(LANES)
+    real(dp) :: t(LANES), is_left(LANES)
     type(block_t) :: block
-    logical :: is_first, is_turned, is_estimated, each_own
+    logical :: is_first, is_turned, is_estimated, has_rows, each_own
     integer :: order(3) ! column of each component; with one body's moments, axes need no turn
-    integer :: i, m
+    integer :: i, m, row, n_rows
 
     call c_f_pointer(bodies_at, bodies)
     block%last = 0
@@ -49,7 +52,13 @@ contains
     each_own = size(bodies%body, 2) > 1
     order = IN_ORDER
     is_turned = with_attitude(bodies)
+    has_rows = associated(bodies%row_times)
+    n_rows = 1
     is_estimated = size(bodies%estimates, 2) > 0
+    if (has_rows) then
+      n_rows = size(bodies%row_times)
+      is_estimated = size(bodies%estimate_rows, 3) > 0
+    end if
     do
       call next_block(n, status, bodies%mark, block)
       if (block%there == 0) exit
@@ -66,41 +75,78 @@ contains
       if (is_first .or. size(bodies%times, 1) > 1) call times_of(bodies%times, block, m, t)
       is_first = .false.
       call begin(m, bodies%tolerance, a, w, o)
-      call turn(m, t, o)
-      if (any_above_zero(m, o%unsure)) call bound_phase(m, bodies%tolerance, a, t, o)
-      if (is_turned) then
-        turns%sine(:m) = o%sine(:m)
-        turns%cosine(:m) = o%cosine(:m)
-      end if
-      call descend(m, o)
-      call finish(m, o, w)
-      if (is_estimated .or. any_above_zero(m, o%unsure)) then
-        call ask_again(m, bodies%tolerance, a, w, t, o)
-      end if
-      if (is_turned) then
-        call turn_bodies(m, moments, a, w, t, o, turns)
-        call turn_back(m, o%odd, turns%vector)
-        call put_attitudes(m, bodies, block, turns, o%error)
-      end if
-      if (each_own) call turn_back(m, o%odd, w)
-      call put_back(block, w, omega, order)
-      do i = 1, block%there
-        if (.not. o%error(i) <= bodies%tolerance) o%unsure(i) = 1.0_dp
+      call find_means(m, o)
+      if (is_turned) call begin_turns(m, moments, a, o, turns)
+      is_left(:m) = 0.0_dp
+      do row = 1, n_rows
+        if (has_rows) t(:m) = bodies%row_times(row)
+        if (has_rows .and. .not. abs(t(1)) > 0.0_dp) then
+          call put_start(bodies, block, row, o)
+        else
+          call turn(m, t, o)
+          if (any_above_zero(m, o%unsure)) call bound_phase(m, bodies%tolerance, a, t, o)
+          if (is_turned) then
+            turns%sine(:m) = o%sine(:m)
+            turns%cosine(:m) = o%cosine(:m)
+          end if
+          call descend(m, o)
+          call finish(m, o, w)
+          if (is_estimated .or. any_above_zero(m, o%unsure)) then
+            call ask_again(m, bodies%tolerance, a, w, t, o)
+          end if
+          if (is_turned) then
+            call turn_bodies(m, w, t, o, turns)
+            call turn_back(m, o%odd, turns%vector)
+            call put_attitudes(m, bodies, block, row, turns, o%error)
+          end if
+          if (each_own) call turn_back(m, o%odd, w)
+          if (has_rows) then
+            call put_rows_back(bodies, block, row, w, order)
+          else
+            call put_back(block, w, omega, order)
+          end if
+          do i = 1, merge(block%there, 0, is_estimated)
+            call put_estimates(bodies, block%at(i), row, o%error(i) + ROUNDING*o%growth(i), &
+                               o%growth(i))
+          end do
+        end if
+        do i = 1, m
+          if (.not. o%error(i) <= bodies%tolerance) o%unsure(i) = 1.0_dp
+          is_left(i) = max(is_left(i), o%unsure(i))
+        end do
       end do
-      if (block%in_row .and. .not. any_above_zero(block%there, o%unsure)) then
+      if (block%in_row .and. .not. any_above_zero(block%there, is_left)) then
         status(block%at(1):block%at(block%there)) = COMPLETE
       else
         do i = 1, block%there
-          status(block%at(i)) = merge(NEEDS_FALLBACK, int(COMPLETE, i1), o%unsure(i) > 0.0_dp)
-        end do
-      end if
-      if (is_estimated) then
-        do i = 1, block%there
-          call put_estimates(bodies, block%at(i), o%error(i) + ROUNDING*o%growth(i), o%growth(i))
+          status(block%at(i)) = merge(NEEDS_FALLBACK, int(COMPLETE, i1), is_left(i) > 0.0_dp)
         end do
       end if
     end do
   end subroutine many_free_solve
+
+  subroutine put_start(bodies, block, row, o)
+    !! Store the states at time 0 of the bodies of a block, as the single-body kernel returns them.
+    type(bodies_t), intent(in) :: bodies
+    type(block_t), intent(in) :: block
+    integer, intent(in) :: row
+    type(orbits_t), intent(inout) :: o
+    real(dp) :: q(4), square
+    integer :: i, body
+
+    do i = 1, block%there
+      body = block%at(i)
+      bodies%omega_rows(:, bodies%places(row), body) = bodies%omega0(:, body)
+      call put_estimates(bodies, body, row, AT_START, 1.0_dp)
+      o%unsure(i) = 0.0_dp
+      o%error(i) = o%own_error(i)
+      if (.not. with_attitude(bodies)) cycle
+      q = bodies%attitude0(:, of_body(size(bodies%attitude0, 2), body))
+      square = sum(q**2)
+      if (.not. (square <= FAR .and. square >= 1.0_dp/FAR)) o%unsure(i) = 1.0_dp
+      call put_attitude(bodies, body, row, q/sqrt(square))
+    end do
+  end subroutine put_start
 
   pure subroutine begin(m, tolerance, a, w, o)
     !! Compute everything that does not depend on the time. Axis 2 of an orbit has the coefficient
@@ -155,26 +201,24 @@ contains
       gap = abs(gap)
       o%a(i, 0) = sqrt(o%modulus(i))
       o%b(i, 0) = sqrt(s2*gap)
-      o%error(i) = ERROR*(left + right)
-      if (.not. o%odd(i) > 0.0_dp) o%error(i) = NEVER
+      o%own_error(i) = ERROR*(left + right)
+      if (.not. o%odd(i) > 0.0_dp) o%own_error(i) = NEVER
       ! In units of the square roots of the coefficients, the symmetric part of the Jacobian matrix
       ! has the norm (s1 s3)**(1/2) omega2. The amplification is at most the exponential of its
       ! integral: the first bound, for short times.
       o%rate(i) = NEVER
       if (max(s1, s2, s3) <= most_unlike*min(s1, s2, s3)) o%rate(i) = s3*(s2*y1 + s1*y2)/early
-      if (.not. s2 > 0.0_dp) o%error(i) = NEVER
-      if (.not. o%modulus(i) <= FAR) o%error(i) = NEVER
-      if (.not. o%modulus(i) >= 1.0_dp/FAR) o%error(i) = NEVER
-      if (.not. gap <= FAR) o%error(i) = NEVER
+      if (.not. s2 > 0.0_dp) o%own_error(i) = NEVER
+      if (.not. o%modulus(i) <= FAR) o%own_error(i) = NEVER
+      if (.not. o%modulus(i) >= 1.0_dp/FAR) o%own_error(i) = NEVER
+      if (.not. gap <= FAR) o%own_error(i) = NEVER
     end do
   end subroutine begin
 
-  pure subroutine turn(m, t, o)
-    !! Compute the arithmetic-geometric mean, with the same number of levels for all lanes, and sine
-    !! and cosine of the phase, with the effect of the modulus that remains: sn : cn is
-    !! tan (1 + k**2/4), dn is 1 - k**2/2 sin**2.
+  pure subroutine find_means(m, o)
+    !! Compute the arithmetic-geometric mean, with the same number of levels for all lanes, and the
+    !! effect of the modulus that remains: sn : cn is tan (1 + k**2/4), dn is 1 - k**2/2 sin**2.
     integer, intent(in) :: m
-    real(dp), intent(in) :: t(LANES) !! s
     type(orbits_t), intent(inout) :: o
     real(dp) :: gap, mean, inverse, q, part, last, square, error
     integer :: i, n
@@ -192,8 +236,8 @@ contains
       inverse = 1.0_dp/(gap*mean)
       ! Where cancellation makes the gap small, the frequency has the relative rounding error of the
       ! gap.
-      error = o%error(i)*(inverse*mean)
-      if (.not. o%error(i) < NEVER) error = NEVER
+      error = o%own_error(i)*(inverse*mean)
+      if (.not. o%own_error(i) < NEVER) error = NEVER
       inverse = inverse*gap
       q = 0.5_dp*(o%a(i, LEVELS - 2) - o%b(i, LEVELS - 2))*inverse
       q = q*q
@@ -204,10 +248,24 @@ contains
       o%a(i, LEVELS) = last
       square = (part*mean*inverse)*(part*mean*inverse)
       if (.not. part*mean <= NEARLY_CIRCULAR*last) error = NEVER
-      o%numerator(i) = 0.5_dp*square
-      o%denominator(i) = inverse*(1.0_dp + 0.25_dp*square)
+      o%own_error(i) = error
+      o%half_square(i) = 0.5_dp*square
+      o%ratio(i) = inverse*(1.0_dp + 0.25_dp*square)
       ! One more level of the mean would subtract this term.
       o%mean(i) = last - 0.25_dp*square*last
+    end do
+  end subroutine find_means
+
+  pure subroutine turn(m, t, o)
+    !! Compute sine and cosine of the phase.
+    integer, intent(in) :: m
+    real(dp), intent(in) :: t(LANES) !! s
+    type(orbits_t), intent(inout) :: o
+    real(dp) :: error
+    integer :: i
+
+    do i = 1, m
+      error = o%own_error(i)
       o%phase(i) = o%mean(i)*t(i)
       o%unsure(i) = 1.0_dp
       if (o%rate(i)*(t(i)*t(i)) <= 1.0_dp) o%unsure(i) = 0.0_dp
@@ -226,9 +284,9 @@ contains
     integer :: i, n
 
     do i = 1, m
-      sine = o%sine(i)*o%denominator(i)
+      sine = o%sine(i)*o%ratio(i)
       cosine = o%cosine(i)
-      numerator = 1.0_dp - o%numerator(i)*(o%sine(i)*o%sine(i))
+      numerator = 1.0_dp - o%half_square(i)*(o%sine(i)*o%sine(i))
       denominator = 1.0_dp
       !GCC$ unroll 5
       do n = LEVELS, 1, -1

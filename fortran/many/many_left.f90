@@ -65,14 +65,14 @@ contains
         if (.not. is_body(bodies, i, own(:n_own - 1))) then
           status(i) = int(REFUSED, i1)
           omega(:, i) = transfer(huge(0_int64), 1.0_dp)
-          call put_estimates(bodies, i, -1.0_dp, -1.0_dp)
+          call put_estimates(bodies, i, 1, -1.0_dp, -1.0_dp)
           cycle
         end if
         call solve_prepared(own, n_own, bodies%omega0(:, i), time, omega(:, i), ended, steps, found)
         call tell_sensitive(own, n_own, bodies%omega0(:, i), time, steps, ended)
         if (is_estimated) then
           call estimate(own, n_own, bodies%omega0(:, i), time, steps, ended, found)
-          call put_estimates(bodies, i, found(1), found(2))
+          call put_estimates(bodies, i, 1, found(1), found(2))
         end if
       end if
       status(i) = int(ended, i1)
@@ -106,7 +106,7 @@ contains
         status(i) = int(REFUSED, i1)
         omega(:, i) = transfer(huge(0_int64), 1.0_dp)
         bodies%attitude(:, i) = omega(1, i)
-        call put_estimates(bodies, i, -1.0_dp, -1.0_dp)
+        call put_estimates(bodies, i, 1, -1.0_dp, -1.0_dp)
         cycle
       end if
       time = bodies%times(of_body(size(bodies%times, 1), i))
@@ -118,7 +118,7 @@ contains
       call tell_sensitive(own, n_own, start, time, steps, ended)
       if (is_estimated) then
         call estimate(own, n_own, start, time, steps, ended, found)
-        call put_estimates(bodies, i, found(1), found(2))
+        call put_estimates(bodies, i, 1, found(1), found(2))
       end if
       omega(:, i) = state(:3)
       bodies%attitude(:, i) = state(4:)

@@ -14,12 +14,15 @@ module many_orbits
     real(dp), dimension(LANES) :: modulus, amplitude2, amplitude3, half_gap
     real(dp), dimension(LANES) :: odd       !! body's axis that is axis 2 here; 0: none
     real(dp), dimension(LANES) :: gap       !! negative: axes 1 and 3 are exchanged
+    real(dp), dimension(LANES) :: own_error !! relative error of the frequency
     real(dp), dimension(LANES) :: error     !! estimate of the relative error
     real(dp), dimension(LANES) :: rate      !! square of exponent over largest exponent, 1/s2
     real(dp), dimension(LANES) :: unsure    !! 1 if no bound of the amplification suffices so far
     real(dp), dimension(LANES) :: growth    !! last bound of the amplification, if it was computed
     real(dp), dimension(LANES, 0:LEVELS) :: a, b !! the two means, level by level
     real(dp), dimension(LANES) :: mean      !! the mean in the limit
+    real(dp), dimension(LANES) :: half_square !! of the modulus left by the means
+    real(dp), dimension(LANES) :: ratio     !! of tangents at the last level
     real(dp), dimension(LANES) :: phase     !! at the end, rad
     real(dp), dimension(LANES) :: sine, cosine !! in the ratio of sn and cn
     real(dp), dimension(LANES) :: numerator, denominator !! dn is their quotient

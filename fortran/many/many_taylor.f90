@@ -61,7 +61,7 @@ contains
     real(dp) :: error, error_of_attitude
     type(rows_t) :: rows
     logical :: has_rows
-    integer :: n_waves, order, active, n_slots, i, j, unseen
+    integer :: n_waves, order, active, n_rows, n_slots, i, j, unseen
 
     call c_f_pointer(bodies_at, bodies)
     interrupted = 0
@@ -70,6 +70,8 @@ contains
     call fill(s)
     is_turned = with_attitude(bodies)
     has_rows = associated(bodies%row_times)
+    n_rows = 1
+    if (has_rows) n_rows = size(bodies%row_times)
     if (is_turned) call plan_attitudes(bodies%tolerance, s, attitudes)
     body = 0
     waves = 0.0_dp
@@ -91,12 +93,8 @@ contains
                                  status(body(i)), error_of_attitude)
               error = error + WRONG_ANGLE*error_of_attitude
             end if
-            if (has_rows) then
-              call put_row(bodies, body(i), size(bodies%row_times), omega(:, body(i)), error, &
-                           s%growth(i))
-            else
-              call put_estimates(bodies, body(i), error, s%growth(i))
-            end if
+            if (has_rows) bodies%omega_rows(:, bodies%places(n_rows), body(i)) = omega(:, body(i))
+            call put_estimates(bodies, body(i), n_rows, error, s%growth(i))
             active = active - 1
           end if
           body(i) = 0
@@ -177,25 +175,15 @@ contains
           y = part*(y + terms(2, k))
           z = part*(z + terms(3, k))
         end do
-        call put_row(bodies, body(i), row, &
-                     rows%w(i, :) + ([x, y, z] + (rows%low(i, :) - rows%error(i, :) &
-                                                  - share*(s%error(i, :) - rows%error(i, :)))), &
-                     error, s%growth(i))
+        bodies%omega_rows(:, bodies%places(row), body(i)) = &
+          rows%w(i, :) + ([x, y, z] + (rows%low(i, :) - rows%error(i, :) &
+                                       - share*(s%error(i, :) - rows%error(i, :))))
+        call put_estimates(bodies, body(i), row, error, s%growth(i))
         row = row + 1
       end do
       rows%next(i) = row
     end do
   end subroutine put_rows
-
-  subroutine put_row(bodies, i, row, omega, error, growth)
-    !! Store a row of body i, and its estimates if they are requested.
-    type(bodies_t), intent(in) :: bodies
-    integer, intent(in) :: i, row
-    real(dp), intent(in) :: omega(3), error, growth
-
-    bodies%omega_rows(:, row, i) = omega
-    if (size(bodies%estimate_rows, 3) > 0) bodies%estimate_rows(:, row, i) = [error, growth]
-  end subroutine put_row
 
   pure integer function order_for(tolerance)
     !! Return one of the orders of unroll_many.py. It is the same for all bodies, so that the result

@@ -3,7 +3,7 @@ module many_turns
   !! in torque_free_attitude.f90, an attitude is q0 D(0)* D(t) with D = (rotation about axis 3)
   !! (shortest rotation of the angular momentum to axis 3). A theta function gives the angle from
   !! phase 0 on, and its addition theorem the angle from the phase at time 0 on.
-  use bodies, only: bodies_t, LANES
+  use bodies, only: bodies_t, LANES, put_attitude
   use kinds, only: dp
   use many_circular, only: sine_cosine_lanes
   use many_columns, only: block_t
@@ -40,22 +40,30 @@ module many_turns
     real(dp), dimension(LANES) :: turned_sine, turned_cosine !! of this angle
   end type turns_t
 
-  public :: put_attitudes, turn_bodies
+  public :: begin_turns, put_attitudes, turn_bodies
 
 contains
 
-  pure subroutine turn_bodies(m, moments, a, w, t, o, r)
-    !! Compute the rotation from time 0 to the end, and add its error to that of the orbit.
+  pure subroutine begin_turns(m, moments, a, o, r)
+    !! Compute everything that does not depend on the time.
     integer, intent(in) :: m
     real(dp), intent(in) :: moments(LANES, 3)
     real(dp), intent(in) :: a(LANES, 3) !! A, B, C
-    real(dp), intent(in) :: w(LANES, 3) !! rad/s, at the end
-    real(dp), intent(in) :: t(LANES) !! s
     type(orbits_t), intent(inout) :: o
     type(turns_t), intent(inout) :: r
 
     call take_orbit(m, moments, a, o, r)
     call find_pole(m, o, r)
+  end subroutine begin_turns
+
+  pure subroutine turn_bodies(m, w, t, o, r)
+    !! Compute the rotation from time 0 to the end, and add its error to that of the orbit.
+    integer, intent(in) :: m
+    real(dp), intent(in) :: w(LANES, 3) !! rad/s, at the end
+    real(dp), intent(in) :: t(LANES) !! s
+    type(orbits_t), intent(inout) :: o
+    type(turns_t), intent(inout) :: r
+
     call sum_series(m, t, o, r)
     call sine_cosine_lanes(m, r%angle, r%turned_sine, r%turned_cosine)
     call add_phases(m, w, o, r)
@@ -93,7 +101,7 @@ contains
       y = moments(i, 2)*o%omega2(i)
       z = third*o%omega3(i)
       x = (x*x + y*y) + z*z
-      if (.not. (x <= FAR .and. x >= 1.0_dp/FAR)) o%error(i) = NEVER
+      if (.not. (x <= FAR .and. x >= 1.0_dp/FAR)) o%own_error(i) = NEVER
       r%momentum(i) = sqrt(x)
       x = o%omega1(i)*o%omega1(i)
       y = o%omega2(i)*o%omega2(i)
@@ -299,11 +307,12 @@ contains
     end do
   end subroutine rotate
 
-  subroutine put_attitudes(m, bodies, block, r, error)
+  subroutine put_attitudes(m, bodies, block, row, r, error)
     !! Apply the rotation of each body of a block to its attitude at time 0.
     integer, intent(in) :: m                !! number of lanes
     type(bodies_t), intent(in) :: bodies
     type(block_t), intent(in) :: block
+    integer, intent(in) :: row              !! of the results, if there are several of a body
     type(turns_t), intent(in) :: r
     real(dp), intent(inout) :: error(LANES) !! NEVER if an attitude is far from unit norm
     real(dp) :: p(4, LANES), q(4, LANES), x
@@ -335,7 +344,7 @@ contains
                    + (p(2, i)*r%vector(i, 2) - p(3, i)*r%vector(i, 1)))
     end do
     do i = 1, block%there
-      bodies%attitude(:, block%at(i)) = q(:, i)
+      call put_attitude(bodies, block%at(i), row, q(:, i))
     end do
   end subroutine put_attitudes
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pyharness import Ensemble, Scene, TorqueLaw, solve, solve_many
-from pyharness.engine.prepared import many_prepared
+from pyharness.engine.prepared import many_laws, many_prepared
 from pyharness.engine.prepared.many_tape import sides_of
 from tests.campaigns import driver
 from tests.campaigns.combination_campaign import (
@@ -83,6 +83,32 @@ def test_rows_are_at_their_times_in_any_order(law: Any, times: list[float]) -> N
     for i, start in enumerate(STARTS):
         one = solve(replace(scene, omega=start), times, tolerance=1e-12)
         assert found.omega[i] == pytest.approx(one.omega, abs=1e-10 * np.abs(start).max())
+
+
+@pytest.mark.parametrize("attitude", [False, True])
+@pytest.mark.parametrize("body", ["moments", "arrays of moments"])
+@pytest.mark.parametrize("law", [TorqueLaw()], ids=str)
+def test_a_body_is_solved_once_for_all_times(
+    law: TorqueLaw, body: str, attitude: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Rows of a body cost less than as many bodies."""
+
+    def refused(*_: Any, **more: Any) -> None:
+        raise AssertionError("bodies are copied")
+
+    monkeypatch.setattr(many_laws, "solve_bodies", refused)
+    scene = Scene("", (1.0, 1.0, 1.0), moments=MOMENTS, torque=law)
+    given = {"omega": STARTS, **({"attitude": TURNS} if attitude else {}), **arrays_of(body)}
+    times = [2.5, 1.0, 0.0, -0.1, -2.0]
+    found = solve_many(scene, times=times, tolerance=1e-9, estimates=True, **given)
+    assert found.error is not None
+    assert (found.error <= 1e-9).all()
+    monkeypatch.undo()
+    for k, time in enumerate(times):
+        one = solve_many(scene, time, tolerance=1e-13, **given)
+        assert found.omega[:, k] == pytest.approx(one.omega, abs=1e-9 * np.abs(STARTS).max())
+        if found.attitude is not None:
+            assert found.attitude[:, k] == pytest.approx(one.attitude, abs=1e-9)
 
 
 def test_times_are_divided_into_the_two_sides_of_zero() -> None:

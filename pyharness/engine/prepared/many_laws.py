@@ -19,13 +19,18 @@ from pyharness.model.trajectory import Array
 from pyharness.model.waves import with_merged_rows
 
 _NOTHING = np.empty((4, 0), order="F")  # in place of attitudes
+# Methods whose kernels evaluate a body at several times.
+_WITH_ROWS = (Methods.CLOSED_FORM, Methods.CLOSED_FORM_OR_TAYLOR, Methods.TAYLOR)
 _UNKNOWN = -1.0  # in place of an estimate that the kernel does not compute
 
 
 def _arrays(
-    ready: dict[str, Any], own: dict[str, Any]
+    ready: dict[str, Any], own: dict[str, Any], code: int
 ) -> tuple[int, bool, tuple[Array, ...], Mapping[str, Array]]:
-    """Return the number of bodies, whether they have moments, their arrays, and all rows."""
+    """Return the number of bodies, whether they have moments, their arrays, and all rows.
+
+    Bodies that the method can't solve are refused.
+    """
     given = checked_rows(own)
     n = count_bodies(given)
     rows = {**ready, **given}
@@ -35,6 +40,17 @@ def _arrays(
         law = with_merged_rows(*(rows[name] for name in MERGED))
     constant, sines, cosines = law
     body, omega = rows["moments" if by_moments else "coefficients"], spread(rows["omega"], n)
+    if code == Methods.CLOSED_FORM:
+        parts = constant, rows["torque_rate"], sines[..., :3], cosines[..., :3]
+        if any(each.any() for each in parts):
+            raise InputError(
+                "closed-form can't solve bodies with a torque in one call; allowed: auto, taylor"
+            )
+        if "attitude" in rows and not by_moments:
+            raise InputError(
+                "closed-form can't compute the attitude of bodies given by coefficients; "
+                "allowed: moments, or methods auto and taylor"
+            )
     return n, by_moments, (body, constant, rows["torque_rate"], sines, cosines, omega), rows
 
 
@@ -48,20 +64,11 @@ def solve_bodies(
     Arrays in `own` replace arrays in `ready`.
     """
     code, tolerance, step, effort = settings
-    n, by_moments, (body, constant, rate, sines, cosines, omega), rows = _arrays(ready, own)
+    n, by_moments, arrays, rows = _arrays(ready, own, code)
+    body, constant, rate, sines, cosines, omega = arrays
     times, attitude = rows["t_end"], rows.get("attitude")
     if not step > 0.0:
         raise InputError(f"step is {step:g}; allowed: above 0")
-    if code == Methods.CLOSED_FORM:
-        if any(each.any() for each in (constant, rate, sines[..., :3], cosines[..., :3])):
-            raise InputError(
-                "closed-form can't solve bodies with a torque in one call; allowed: auto, taylor"
-            )
-        if attitude is not None and not by_moments:
-            raise InputError(
-                "closed-form can't compute the attitude of bodies given by coefficients; "
-                "allowed: moments, or methods auto and taylor"
-            )
     if attitude is not None:
         check_attitude(method, PREPARED_WITH_ATTITUDE)
     threads = threads_of(threads)
@@ -103,7 +110,7 @@ def solve_at(
     # Normalised twice, a quaternion may have another last bit.
     rows: Any = checked_copies({"omega": None, "attitude": None, **own}, as_given=True)
     found, left = None, np.arange(0)
-    if _has_series(settings[0], {**ready, **rows}):
+    if settings[0] in _WITH_ROWS:
         found, left = _solve_rows(ready, rows, times, settings[:2], threads, with_estimates)
         if not left.size:
             return found
@@ -119,54 +126,47 @@ def solve_at(
     ).with_times(times)
     if found is None:
         return part
-    found.omega[left], found.status[left] = part.omega, part.status
-    if found.estimates is not None:
-        found.estimates[left] = part.estimates
+    for name in ("omega", "status", "attitude", "estimates"):
+        array = getattr(found, name)
+        if array is not None:
+            array[left] = getattr(part, name)
     return found
-
-
-def _has_series(code: int, rows: Mapping[str, Any]) -> bool:
-    """Return whether a kernel has a series for the bodies that it evaluates at several times."""
-    names = ("torque_constant", "torque_rate")
-    return (
-        code in (Methods.CLOSED_FORM_OR_TAYLOR, Methods.TAYLOR)
-        and rows.get("attitude") is None
-        and (
-            any(rows[name].any() for name in names)
-            or any(rows[name][..., :3].any() for name in ("sines", "cosines"))
-        )
-    )
 
 
 def _solve_rows(
     ready: dict[str, Any], own: dict[str, Any], times: Array, settings: tuple[int, float],
     threads: int, with_estimates: bool,
 ) -> tuple[Ensemble, NDArray[np.int64]]:  # fmt: skip
-    """Return omega of bodies under a torque at `times` (s), and the bodies without a result.
+    """Return states of bodies at `times` (s), and the bodies without a result.
 
-    One integration of a body has all its times on one side of 0.
+    A body is solved once for all its times on one side of 0.
     """
-    n, by_moments, arrays, _ = _arrays(ready, own)
+    n, by_moments, arrays, rows = _arrays(ready, own, settings[0])
+    attitude = None if "attitude" not in rows else spread(rows["attitude"], n)
     shape = n, len(times)
     found = Ensemble(
         np.empty((*shape, 3)), np.empty(shape, np.int8),
-        estimates=np.empty((*shape, 2)) if with_estimates else None, times=times,
+        None if attitude is None else np.empty((*shape, 4)),
+        np.empty((*shape, 2)) if with_estimates else None, times=times,
     )  # fmt: skip
+    places = np.arange(1, len(times) + 1, dtype=np.int32)
+    sides = [(times[side], places[side], side) for side in sides_of(times)]
 
     def enter(piece: slice, given_up: NDArray[np.int32]) -> None:
         count = piece.stop - piece.start
         parts = [(each if len(each) in (1, count) else each[piece]).T for each in arrays]
-        for rows in sides_of(times):
-            m = len(times[rows])
-            omega, status = np.empty((count, m, 3)), np.empty(count, np.int8)
-            estimates = np.empty((count if with_estimates else 0, m, 2))
+        turns = _NOTHING if attitude is None else attitude[piece].T
+        status = np.empty(count, np.int8)
+        results = [
+            np.empty((width, len(times), 0), order="F") if each is None else each[piece].T
+            for each, width in ((found.attitude, 4), (found.estimates, 2))
+        ]
+        for ends, of_ends, side in sides:
             extension().solve_many_rows(
-                *settings, int(by_moments), *parts, times[rows], given_up, omega.T, status,
-                estimates.T,
+                *settings, int(by_moments), *parts, ends, of_ends, turns, given_up,
+                found.omega[piece].T, results[0], status, results[1],
             )  # fmt: skip
-            found.omega[piece, rows], found.status[piece, rows] = omega, status[:, None]
-            if found.estimates is not None:
-                found.estimates[piece, rows] = estimates
+            found.status[piece, side] = status[:, None]
 
     for_each_piece(enter, n, threads_of(threads))
     return found, np.flatnonzero((found.status != Statuses.COMPLETE).any(axis=1))

@@ -60,11 +60,11 @@ subroutine run_programs(program, flags, by_moments, n, body, omega, masses, forc
   call watch(c_null_ptr)
 end subroutine run_programs
 
-subroutine solve_ensemble(code, tolerance, step, effort, by_moments, n_body, body, n_constant, &
-                          constant, n_rate, rate, n_sines, n_sine_sets, sines, n_cosines, &
-                          n_cosine_sets, cosines, n, omega0, n_times, times, n_attitudes, &
-                          attitude0, given_up, omega, n_results, attitude, status, n_estimates, &
-                          estimates, raised)
+subroutine solve_ensemble(code, tolerance, step, effort, by_moments, n_body, body, n_moments, &
+                          moments, n_constant, constant, n_rate, rate, n_sines, n_sine_sets, &
+                          sines, n_cosines, n_cosine_sets, cosines, n, omega0, n_times, times, &
+                          n_attitudes, attitude0, given_up, omega, n_results, attitude, status, &
+                          n_estimates, estimates, raised)
   ! Solve many bodies in one call: omega of each body at its time, and its attitude if attitude0 is
   ! specified. An array with one column applies to all bodies.
   !f2py threadsafe
@@ -81,6 +81,8 @@ subroutine solve_ensemble(code, tolerance, step, effort, by_moments, n_body, bod
   ! was rounded after a rotation to principal axes
   integer(4), intent(in) :: n_body
   real(8), intent(in), target :: body(3, n_body)
+  integer(4), intent(in) :: n_moments
+  real(8), intent(in), target :: moments(3, n_moments)   ! of bodies by A, B, C, over any number
   integer(4), intent(in) :: n_constant
   real(8), intent(in), target :: constant(3, n_constant) ! N m, or rad/s2
   integer(4), intent(in) :: n_rate
@@ -115,6 +117,7 @@ subroutine solve_ensemble(code, tolerance, step, effort, by_moments, n_body, bod
   bodies%effort = effort
   bodies%n = n
   bodies%body => body
+  bodies%moments => moments
   bodies%constant => constant
   bodies%rate => rate
   bodies%sines => sines
@@ -129,9 +132,9 @@ subroutine solve_ensemble(code, tolerance, step, effort, by_moments, n_body, bod
   call watch(c_null_ptr)
 end subroutine solve_ensemble
 
-subroutine solve_many_rows(code, tolerance, by_moments, n_body, body, n_constant, constant, &
-                           n_rate, rate, n_sines, n_sine_sets, sines, n_cosines, &
-                           n_cosine_sets, cosines, n, omega0, n_rows, times, places, &
+subroutine solve_many_rows(code, tolerance, by_moments, n_body, body, n_moments, moments, &
+                           n_constant, constant, n_rate, rate, n_sines, n_sine_sets, sines, &
+                           n_cosines, n_cosine_sets, cosines, n, omega0, n_rows, times, places, &
                            n_attitudes, attitude0, given_up, n_places, omega, n_results, &
                            attitude, status, n_estimates, estimates, raised)
   ! Solve many bodies under torque laws, or none, for several times; see solve_ensemble. The status
@@ -147,6 +150,8 @@ subroutine solve_many_rows(code, tolerance, by_moments, n_body, body, n_constant
   integer(4), intent(in) :: by_moments
   integer(4), intent(in) :: n_body
   real(8), intent(in), target :: body(3, n_body)
+  integer(4), intent(in) :: n_moments
+  real(8), intent(in), target :: moments(3, n_moments)   ! of bodies by A, B, C, over any number
   integer(4), intent(in) :: n_constant
   real(8), intent(in), target :: constant(3, n_constant)
   integer(4), intent(in) :: n_rate
@@ -180,6 +185,7 @@ subroutine solve_many_rows(code, tolerance, by_moments, n_body, body, n_constant
   bodies%effort = 1.0d0
   bodies%n = n
   bodies%body => body
+  bodies%moments => moments
   bodies%constant => constant
   bodies%rate => rate
   bodies%sines => sines
@@ -224,8 +230,8 @@ subroutine solve_packed_many(packed, n_packed, n, omega0, n_times, times, given_
   call watch(c_null_ptr)
 end subroutine solve_packed_many
 
-subroutine inertia_frames(n, matrices, m, vectors, coefficients, axes, components, status)
-  ! Compute A, B, C of n bodies, their principal axes, and torques over moments about these.
+subroutine inertia_frames(n, matrices, m, vectors, numbers, axes, components, status)
+  ! Compute the principal axes of n bodies, and torques over moments about these.
   !f2py threadsafe
   use levels, only: find_frames
   implicit none
@@ -233,10 +239,10 @@ subroutine inertia_frames(n, matrices, m, vectors, coefficients, axes, component
   real(8), intent(in) :: matrices(3, 3, n)      ! symmetric, finite, kg m2
   integer(4), intent(in) :: m                   ! vectors of a body
   real(8), intent(in) :: vectors(3, m, n)       ! about the axes of the matrix
-  real(8), intent(out) :: coefficients(3, n)
+  real(8), intent(out) :: numbers(10, n)        ! A, B, C; moments over a power of two; quaternion
   real(8), intent(out) :: axes(3, 3, n)         ! in columns
   real(8), intent(out) :: components(3, m, n)
   integer(4), intent(out) :: status(n)          ! 0 complete, 3 not positive definite, 4 too thin
 
-  call find_frames(n, matrices, m, vectors, coefficients, axes, components, status)
+  call find_frames(n, matrices, m, vectors, numbers, axes, components, status)
 end subroutine inertia_frames

@@ -25,7 +25,7 @@ _TAYLOR = (
 _MANY = ("two_words", "problem", "torque_noise", "torque_terms", "taylor_plan")
 _BODIES = (
     "bodies", "many_circular", "many_columns", "many_orbits", "many_growth", "many_turns",
-    "many_free", "many_fixed", "many_slots", "many_attitudes", "many_taylor",
+    "many_free", "many_fixed", "many_slots", "many_attitudes", "many_rows", "many_taylor",
 )  # fmt: skip
 
 

@@ -27,6 +27,8 @@ module bodies
     real(dp) :: effort          !! factor on the work limit of each body
     integer :: n                !! number of bodies
     real(dp), pointer, contiguous :: body(:, :)         !! (3, 1 or n)
+    !! (3, 0, 1 or n): moments, over any number, of bodies by coefficients; 0: unknown
+    real(dp), pointer, contiguous :: moments(:, :)
     real(dp), pointer, contiguous :: constant(:, :)     !! (3, 1 or n)
     real(dp), pointer, contiguous :: rate(:, :)         !! (3, 1 or n)
     real(dp), pointer, contiguous :: sines(:, :, :)     !! (4, waves, 1 or n), as in problem_t
@@ -49,7 +51,8 @@ module bodies
     integer :: n_waves          !! largest number of waves that act on one of them
   end type bodies_t
 
-  public :: acts, coefficients_of, has_torque, of_body, put_attitude, put_estimates, with_attitude
+  public :: acts, coefficients_of, has_torque, last_row, of_body, put_attitude, put_estimates, &
+            with_attitude
 
 contains
 
@@ -66,6 +69,14 @@ contains
 
     with_attitude = size(bodies%attitude0, 2) > 0
   end function with_attitude
+
+  pure integer function last_row(bodies)
+    !! Return the number of results of a body.
+    type(bodies_t), intent(in) :: bodies
+
+    last_row = 1
+    if (associated(bodies%row_times)) last_row = size(bodies%row_times)
+  end function last_row
 
   subroutine put_estimates(bodies, i, row, error, growth)
     !! Store the estimates of body i if they are requested.

@@ -3,7 +3,7 @@ module many_attitudes
   !! each step from both ends: by the series about the beginning of the step up to a point within
   !! it, and from there by the series about the beginning of the next step. At such a distance the
   !! series of the attitude needs fewer terms than that of omega.
-  use bodies, only: bodies_t, i1, NEEDS_FALLBACK, of_body
+  use bodies, only: bodies_t, i1, last_row, NEEDS_FALLBACK, of_body, put_attitude
   use kinds, only: dp
   use many_slots, only: BLURRED, ratio, SLOTS, slots_t
   implicit none(type, external)
@@ -35,6 +35,7 @@ module many_attitudes
     real(dp), dimension(SLOTS, 3) :: w, w_error !! omega where the step begins, and its error, rad/s
     real(dp), dimension(SLOTS) :: h      !! previous step, s
     real(dp), dimension(SLOTS) :: stretch !! previous step over the one before
+    real(dp), dimension(SLOTS) :: divided !! part of it by the series from its beginning
     real(dp), dimension(SLOTS, 2) :: reach !! distance at which the last term is as planned, s
     real(dp) :: u(SLOTS, 4, MOST_TERMS, 2) !! terms of the attitude from the identity
   end type attitudes_t
@@ -46,7 +47,8 @@ module many_attitudes
     real(dp), dimension(SLOTS) :: old, new    !! power of the distance in either last term
   end type sums_t
 
-  public :: begin_attitude, plan_attitudes, remember, take_attitude, turn
+  public :: begin_attitude, less_rotated, plan_attitudes, product_of, remember, rotated, &
+            take_attitude, turn
 
 contains
 
@@ -134,6 +136,7 @@ contains
                  + (abs(now%u(i, 3, order, latest)) + abs(now%u(i, 4, order, latest)))
       now%reach(i, latest) = abs(now%h(i))*ratio(order, PLANNED*s%local_tolerance(i), last_new)
       part = now%reach(i, previous)/(now%reach(i, previous) + now%reach(i, latest))
+      now%divided(i) = part
       r%ahead(i) = part*now%stretch(i)
       r%back(i) = part - 1.0_dp
     end do
@@ -268,7 +271,7 @@ contains
     type(attitudes_t), intent(in) :: now
     integer(i1), intent(inout) :: status
     real(dp), intent(out) :: error  !! estimate of what is subtracted and of what is left, rad
-    real(dp) :: p(4), u(4), q(4), e(3), cross(3), left, way
+    real(dp) :: u(4), q(4), e(3), left, way
     integer :: k
 
     u = 0.0_dp
@@ -277,29 +280,52 @@ contains
     end do
     left = now%left(i) + sum(abs(now%u(i, :, now%order, now%latest)))*abs(now%stretch(i))**now%order
     u(1) = 1.0_dp + u(1)
-    p = now%q(i, :)
-    q(1) = p(1)*u(1) - p(2)*u(2) - (p(3)*u(3) + p(4)*u(4))
-    q(2) = p(1)*u(2) + p(2)*u(1) + (p(3)*u(4) - p(4)*u(3))
-    q(3) = p(1)*u(3) + p(3)*u(1) + (p(4)*u(2) - p(2)*u(4))
-    q(4) = p(1)*u(4) + p(4)*u(1) + (p(2)*u(3) - p(3)*u(2))
-    e = (0.5_dp*s%h(i))*s%error(i, :)
-    cross = 2.0_dp*[q(3)*e(3) - q(4)*e(2), q(4)*e(1) - q(2)*e(3), q(2)*e(2) - q(3)*e(1)]
-    e = e + q(1)*cross + [q(3)*cross(3) - q(4)*cross(2), q(4)*cross(1) - q(2)*cross(3), &
-                          q(2)*cross(2) - q(3)*cross(1)]
-    e = now%error(i, :) + e
+    q = product_of(now%q(i, :), u)
+    e = now%error(i, :) + rotated(q, (0.5_dp*s%h(i))*s%error(i, :))
     way = 1.0_dp + 0.5_dp*s%scale(i)*abs(s%t(i))
     error = max(now%worst(i), sum(abs(e))) + 0.0_dp*sum(e)
     if (.not. (error <= trusted*bodies%tolerance &
                .and. left <= TRUSTED_TERMS*bodies%tolerance &
                .and. s%growth(i)*way <= BLURRED*bodies%tolerance/ROUNDING)) status = NEEDS_FALLBACK
-    ! Less half of the rotation (0, e) times q.
-    e = 0.5_dp*e
+    call put_attitude(bodies, body, last_row(bodies), less_rotated(q, e))
+    error = error + (left + ROUNDING*s%growth(i)*way)
+  end subroutine take_attitude
+
+  pure function product_of(p, u) result(q)
+    !! Return a product of quaternions.
+    real(dp), intent(in) :: p(4), u(4)
+    real(dp) :: q(4)
+
+    q(1) = p(1)*u(1) - p(2)*u(2) - (p(3)*u(3) + p(4)*u(4))
+    q(2) = p(1)*u(2) + p(2)*u(1) + (p(3)*u(4) - p(4)*u(3))
+    q(3) = p(1)*u(3) + p(3)*u(1) + (p(4)*u(2) - p(2)*u(4))
+    q(4) = p(1)*u(4) + p(4)*u(1) + (p(2)*u(3) - p(3)*u(2))
+  end function product_of
+
+  pure function rotated(q, vector) result(e)
+    !! Return a vector about axes of space.
+    real(dp), intent(in) :: q(4), vector(3)
+    real(dp) :: e(3), cross(3)
+
+    e = vector
+    cross = 2.0_dp*[q(3)*e(3) - q(4)*e(2), q(4)*e(1) - q(2)*e(3), q(2)*e(2) - q(3)*e(1)]
+    e = e + q(1)*cross + [q(3)*cross(3) - q(4)*cross(2), q(4)*cross(1) - q(2)*cross(3), &
+                          q(2)*cross(2) - q(3)*cross(1)]
+  end function rotated
+
+  pure function less_rotated(q, rotation) result(p)
+    !! Return an attitude without a small rotation about axes of space: less half of the product of
+    !! the quaternions (0, rotation) and q.
+    real(dp), intent(in) :: q(4)
+    real(dp), intent(in) :: rotation(3) !! rad
+    real(dp) :: p(4), e(3)
+
+    e = 0.5_dp*rotation
     p(1) = q(1) + (e(1)*q(2) + e(2)*q(3) + e(3)*q(4))
     p(2) = q(2) - (e(1)*q(1) + (e(2)*q(4) - e(3)*q(3)))
     p(3) = q(3) - (e(2)*q(1) + (e(3)*q(2) - e(1)*q(4)))
     p(4) = q(4) - (e(3)*q(1) + (e(1)*q(3) - e(2)*q(2)))
-    bodies%attitude(:, body) = p/sqrt(sum(p*p))
-    error = error + (left + ROUNDING*s%growth(i)*way)
-  end subroutine take_attitude
+    p = p/sqrt(sum(p*p))
+  end function less_rotated
 
 end module many_attitudes

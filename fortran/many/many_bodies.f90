@@ -28,7 +28,7 @@ contains
     integer(i1), intent(inout), target :: status(n)
     integer, intent(out) :: raised
     type(bodies_t) :: bodies
-    real(dp), target :: no_attitude(4, 0), no_estimates(2, 0)
+    real(dp), target :: no_attitude(4, 0), no_estimates(2, 0), no_moments(3, 0)
     real(dp) :: own(0:n_packed - 1)
     integer :: code, middle
 
@@ -48,6 +48,7 @@ contains
     bodies%effort = packed(EFFORT)
     bodies%n = n
     bodies%body(1:3, 1:1) => packed(COEFFICIENTS:COEFFICIENTS + 2)
+    bodies%moments => no_moments
     bodies%constant(1:3, 1:1) => packed(CONSTANT:CONSTANT + 2)
     bodies%rate(1:3, 1:1) => packed(RATE:RATE + 2)
     middle = WAVES + 4*int(packed(N_SINES))
@@ -138,10 +139,8 @@ contains
     if (failed /= 0 .or. bodies%n == 0) return
     call mark_bodies(bodies, code, status, n_waves)
     call solve_marked(bodies, FREE, 0, code, omega, status, raised)
-    if (.not. with_attitude(bodies)) then
-      call solve_marked(bodies, RAMPED, 0, code, omega, status, raised)
-      if (raised == 0) call solve_marked(bodies, WAVED, n_waves, code, omega, status, raised)
-    end if
+    call solve_marked(bodies, RAMPED, 0, code, omega, status, raised)
+    if (raised == 0) call solve_marked(bodies, WAVED, n_waves, code, omega, status, raised)
     where (status < NEEDS_FALLBACK) status = NEEDS_FALLBACK
   end subroutine solve_rows
 

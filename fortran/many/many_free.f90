@@ -4,8 +4,8 @@ module many_free
   !! the limits of the range, are left to the single-body kernel.
   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
-  use bodies, only: A_GROUP, bodies_t, i1, LANES, NEEDS_FALLBACK, of_body, put_attitude, &
-                    put_estimates, with_attitude
+  use bodies, only: A_GROUP, bodies_t, i1, LANES, last_row, NEEDS_FALLBACK, of_body, put_attitude, &
+                    put_estimates, RAMPED, with_attitude
   use kinds, only: dp
   use many_circular, only: sine_cosine_lanes
   use many_columns, only: any_above_zero, block_t, columns_of, equations_of, IN_ORDER, next_block, &
@@ -31,7 +31,8 @@ contains
 
   subroutine many_free_solve(bodies_at, n, omega, status) bind(c, name="solve_many_free_level")
     !! Compute omega of each marked body at its time, and its attitude if it is specified at time 0.
-    !! Its status becomes COMPLETE, or NEEDS_FALLBACK if it is left to the single-body kernel.
+    !! Its status becomes COMPLETE, or NEEDS_FALLBACK if it is left to the single-body kernel, or
+    !! RAMPED if only the series has its attitude there.
     type(c_ptr), intent(in), value :: bodies_at           !! address of a bodies_t, passed through C
     integer(c_int), intent(in), value :: n                !! number of bodies
     real(c_double), intent(inout) :: omega(3, n)          !! rad/s
@@ -42,9 +43,10 @@ contains
     real(dp), dimension(LANES, 3) :: a, w, moments
     real(dp) :: t(LANES), is_left(LANES)
     type(block_t) :: block
-    logical :: is_first, is_turned, is_estimated, has_rows, each_own
+    logical :: is_first, is_turned, is_estimated, has_moments, has_rows, each_own
+    integer(i1) :: otherwise ! status of a body without a result
     integer :: order(3) ! column of each component; with one body's moments, axes need no turn
-    integer :: i, m, row, n_rows
+    integer :: i, m, row
 
     call c_f_pointer(bodies_at, bodies)
     block%last = 0
@@ -52,19 +54,18 @@ contains
     each_own = size(bodies%body, 2) > 1
     order = IN_ORDER
     is_turned = with_attitude(bodies)
+    has_moments = size(bodies%moments, 2) > 0
+    otherwise = merge(RAMPED, NEEDS_FALLBACK, has_moments .and. is_turned)
     has_rows = associated(bodies%row_times)
-    n_rows = 1
     is_estimated = size(bodies%estimates, 2) > 0
-    if (has_rows) then
-      n_rows = size(bodies%row_times)
-      is_estimated = size(bodies%estimate_rows, 3) > 0
-    end if
+    if (has_rows) is_estimated = size(bodies%estimate_rows, 3) > 0
     do
       call next_block(n, status, bodies%mark, block)
       if (block%there == 0) exit
       m = A_GROUP*((block%there + A_GROUP - 1)/A_GROUP)
       if (is_first .or. each_own) then
         call equations_of(bodies, block, m, a, moments)
+        if (has_moments) call columns_of(bodies%moments, block, m, moments, IN_ORDER)
         call odd_axes(m, a, o%odd)
         if (.not. each_own) order = turned_order(o%odd(1))
         call turn_axes(m, o%odd, a)
@@ -78,7 +79,7 @@ contains
       call find_means(m, o)
       if (is_turned) call begin_turns(m, moments, a, o, turns)
       is_left(:m) = 0.0_dp
-      do row = 1, n_rows
+      do row = 1, last_row(bodies)
         if (has_rows) t(:m) = bodies%row_times(row)
         if (has_rows .and. .not. abs(t(1)) > 0.0_dp) then
           call put_start(bodies, block, row, o)
@@ -119,7 +120,7 @@ contains
         status(block%at(1):block%at(block%there)) = COMPLETE
       else
         do i = 1, block%there
-          status(block%at(i)) = merge(NEEDS_FALLBACK, int(COMPLETE, i1), is_left(i) > 0.0_dp)
+          status(block%at(i)) = merge(otherwise, int(COMPLETE, i1), is_left(i) > 0.0_dp)
         end do
       end if
     end do
@@ -131,13 +132,15 @@ contains
     type(block_t), intent(in) :: block
     integer, intent(in) :: row
     type(orbits_t), intent(inout) :: o
-    real(dp) :: q(4), square
+    real(dp) :: q(4), square, error
     integer :: i, body
 
+    error = AT_START
+    if (with_attitude(bodies) .and. size(bodies%moments, 2) > 0) error = ROUNDING ! of the series
     do i = 1, block%there
       body = block%at(i)
       bodies%omega_rows(:, bodies%places(row), body) = bodies%omega0(:, body)
-      call put_estimates(bodies, body, row, AT_START, 1.0_dp)
+      call put_estimates(bodies, body, row, error, 1.0_dp)
       o%unsure(i) = 0.0_dp
       o%error(i) = o%own_error(i)
       if (.not. with_attitude(bodies)) cycle

@@ -80,7 +80,9 @@ contains
     if (code == CLOSED_FORM_OR_TAYLOR) then
       mark_of = FREE
       if (.not. feels_torque(bodies, i)) then
-        if (single_code(bodies, i, code) == TAYLOR) mark_of = RAMPED
+        if (single_code(bodies, i, code) == TAYLOR .and. size(bodies%moments, 2) == 0) then
+          mark_of = RAMPED
+        end if
         return
       end if
       mark_of = NEEDS_FALLBACK

@@ -4,13 +4,15 @@ module many_taylor
   !! estimated, propagated to the end and subtracted there. If this error or its amplification is
   !! too large to rely on the estimate, the body is left to the single-body kernel.
   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_ptr
-  use bodies, only: A_GROUP, bodies_t, i1, LANES, NEEDS_FALLBACK, MOST_WAVES, put_estimates, &
-                    with_attitude
+  use bodies, only: A_GROUP, bodies_t, i1, LANES, last_row, NEEDS_FALLBACK, MOST_WAVES, &
+                    put_estimates, with_attitude
   use interruption, only: interrupt_raised
   use kinds, only: dp
   use many_attitudes, only: attitudes_t, begin_attitude, plan_attitudes, remember, take_attitude, &
                             turn
   use many_circular, only: sine_cosine_lanes
+  use many_rows, only: begin_rows, error_of, put_last_rows, put_rows, put_turned_rows, &
+                       remember_rows, ROUNDING, rows_t, WRONG_ANGLE
   use many_slots, only: BLURRED, FAR, fill, KIND_OF, LEAST, make_ready, MOST_GROWTH, put_in, &
                         ratio, ready_t, SHORTEST, SLOTS, slots_t
   use series, only: MOST_ORDER
@@ -22,20 +24,8 @@ module many_taylor
   ! Largest error that is subtracted, in tolerances; less if unknown errors are amplified.
   real(dp), parameter :: TRUSTED = 0.4_dp
   real(dp), parameter :: DOUBTED = 64.0_dp   ! amplification at which it is half of that
-  real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
-  ! Factors that make the stated error larger than the true one in all but a few of 10,000 bodies:
-  ! on the subtracted errors of omega and attitude, and on the last terms.
-  real(dp), parameter :: WRONG = 2.0_dp, WRONG_ANGLE = 4.0_dp, UNSEEN = 0.1_dp
-  real(dp), parameter :: ROUNDINGS = 4.0_dp  ! of omega that add up before they are amplified
   real(dp), parameter :: A_STEP = 3.0_dp     ! largest norm of an exponent that is taken at once
   real(dp), parameter :: RIDGE = 1.001_dp
-
-  type :: rows_t
-    !! The beginnings of steps, and the number of the next row of each slot.
-    real(dp), dimension(SLOTS, 3) :: w, low, error
-    real(dp), dimension(SLOTS) :: t, h
-    integer :: next(SLOTS)
-  end type rows_t
 
   public :: many_taylor_solve
 
@@ -61,7 +51,7 @@ contains
     real(dp) :: error, error_of_attitude
     type(rows_t) :: rows
     logical :: has_rows
-    integer :: n_waves, order, active, n_rows, n_slots, i, j, unseen
+    integer :: n_waves, order, active, n_slots, i, j, unseen
 
     call c_f_pointer(bodies_at, bodies)
     interrupted = 0
@@ -70,8 +60,6 @@ contains
     call fill(s)
     is_turned = with_attitude(bodies)
     has_rows = associated(bodies%row_times)
-    n_rows = 1
-    if (has_rows) n_rows = size(bodies%row_times)
     if (is_turned) call plan_attitudes(bodies%tolerance, s, attitudes)
     body = 0
     waves = 0.0_dp
@@ -93,8 +81,11 @@ contains
                                  status(body(i)), error_of_attitude)
               error = error + WRONG_ANGLE*error_of_attitude
             end if
-            if (has_rows) bodies%omega_rows(:, bodies%places(n_rows), body(i)) = omega(:, body(i))
-            call put_estimates(bodies, body(i), n_rows, error, s%growth(i))
+            if (has_rows) then
+              bodies%omega_rows(:, bodies%places(last_row(bodies)), body(i)) = omega(:, body(i))
+              if (is_turned) call put_last_rows(bodies, body(i), i, s, attitudes, rows)
+            end if
+            call put_estimates(bodies, body(i), last_row(bodies), error, s%growth(i))
             active = active - 1
           end if
           body(i) = 0
@@ -112,7 +103,7 @@ contains
             call put_in(ready, j, s, i)
             if (n_waves > 0) waves(:, :n_waves, i) = ready_waves(:, :n_waves, j)
             body(i) = ready%block%at(j)
-            rows%next(i) = 1
+            if (has_rows) call begin_rows(i, rows)
             if (is_turned) call begin_attitude(bodies, body(i), i, A_STEP, s, attitudes)
             active = active + 1
             exit
@@ -127,16 +118,13 @@ contains
       end if
       if ((is_turned .or. has_rows) .and. n_waves == 0) s%torque(:, :, :order) = 0.0_dp
       if (is_turned) call remember(s, attitudes)
-      if (has_rows) then
-        rows%w = s%w
-        rows%low = s%low
-        rows%error = s%error
-        rows%t = s%t
-        rows%h = s%h
-      end if
+      if (has_rows) call remember_rows(s, attitudes, is_turned, rows)
       call step(order, n_waves > 0 .or. is_turned .or. has_rows, n_slots, s)
       if (has_rows) call put_rows(bodies, order, n_slots, body, s, rows)
       if (is_turned) call turn(n_slots, A_STEP, s, attitudes)
+      if (is_turned .and. has_rows) then
+        call put_turned_rows(bodies, n_slots, body, s, attitudes, rows)
+      end if
       unseen = unseen + 1
       if (unseen >= BETWEEN_LOOKS) then
         unseen = 0
@@ -145,45 +133,6 @@ contains
       end if
     end do
   end subroutine many_taylor_solve
-
-  subroutine put_rows(bodies, order, n_slots, body, s, rows)
-    !! Compute omega of each slot's body at the requested times within its step, by the series.
-    type(bodies_t), intent(in) :: bodies
-    integer, intent(in) :: order, n_slots, body(SLOTS)
-    type(slots_t), intent(in) :: s
-    type(rows_t), intent(inout) :: rows
-    real(dp) :: terms(3, MOST_ORDER), passed, part, share, x, y, z, error
-    integer :: i, k, row, last
-
-    last = size(bodies%row_times)
-    do i = 1, n_slots
-      row = rows%next(i)
-      if (body(i) == 0 .or. row >= last) cycle
-      if (.not. abs(bodies%row_times(row)) <= abs(s%t(i))) cycle
-      terms(:, :order) = s%torque(i, :, :order)
-      error = error_of(s, i)
-      do while (row < last)
-        if (.not. abs(bodies%row_times(row)) <= abs(s%t(i))) exit
-        passed = bodies%row_times(row) - rows%t(i)
-        share = passed/(s%t(i) - rows%t(i))
-        part = passed/rows%h(i)
-        x = 0.0_dp
-        y = 0.0_dp
-        z = 0.0_dp
-        do k = order, 1, -1
-          x = part*(x + terms(1, k))
-          y = part*(y + terms(2, k))
-          z = part*(z + terms(3, k))
-        end do
-        bodies%omega_rows(:, bodies%places(row), body(i)) = &
-          rows%w(i, :) + ([x, y, z] + (rows%low(i, :) - rows%error(i, :) &
-                                       - share*(s%error(i, :) - rows%error(i, :))))
-        call put_estimates(bodies, body(i), row, error, s%growth(i))
-        row = row + 1
-      end do
-      rows%next(i) = row
-    end do
-  end subroutine put_rows
 
   pure integer function order_for(tolerance)
     !! Return one of the orders of unroll_many.py. It is the same for all bodies, so that the result
@@ -228,16 +177,6 @@ contains
       status = COMPLETE
     end if
   end subroutine take_out
-
-  pure real(dp) function error_of(s, i)
-    !! Return an estimate of the relative error of a slot's body, from the truncation error that was
-    !! subtracted, from the last terms of a step, and from the rounding errors.
-    type(slots_t), intent(in) :: s
-    integer, intent(in) :: i
-
-    error_of = WRONG*s%worst(i)/max(s%scale(i), LEAST) &
-               + s%growth(i)*(UNSEEN*s%local_tolerance(i) + ROUNDINGS*ROUNDING)
-  end function error_of
 
   pure real(dp) function trusted_at(growth)
     !! Return the largest error that is subtracted, in tolerances.

@@ -14,7 +14,7 @@ typedef void series_solver(const void *bodies, int n, double *omega, int8_t *sta
 typedef void fixed_solver(const void *bodies, int method, int n, double *omega, int8_t *status,
                           int *interrupted);
 typedef void frame_finder(int n, const double *matrices, int m, const double *vectors,
-                          double *coefficients, double *axes, double *components, int *status);
+                          double *numbers, double *axes, double *components, int *status);
 typedef void runner(void *ensemble);
 typedef void reader(int pieces, const double *edges, const double *points, int m, const double *values,
                     int n, const double *times, double *states);
@@ -124,10 +124,10 @@ void quick_solve(const void *problem, const void *request, int contest, void *so
   chosen.quick(problem, request, contest, solution);
 }
 
-void find_frames(int n, const double *matrices, int m, const double *vectors, double *coefficients,
+void find_frames(int n, const double *matrices, int m, const double *vectors, double *numbers,
                  double *axes, double *components, int *status)
 {
-  chosen.frames(n, matrices, m, vectors, coefficients, axes, components, status);
+  chosen.frames(n, matrices, m, vectors, numbers, axes, components, status);
 }
 
 void many_free(const void *bodies, int n, double *omega, int8_t *status)

@@ -71,13 +71,13 @@ module levels
       type(*), intent(inout) :: solution
     end subroutine quick_solve
 
-    subroutine find_frames(n, matrices, m, vectors, coefficients, axes, components, status) &
+    subroutine find_frames(n, matrices, m, vectors, numbers, axes, components, status) &
       bind(c, name="find_frames")
       import :: c_double, c_int
       implicit none(type, external)
       integer(c_int), intent(in), value :: n, m
       real(c_double), intent(in) :: matrices(3, 3, n), vectors(3, m, n)
-      real(c_double), intent(out) :: coefficients(3, n), axes(3, 3, n), components(3, m, n)
+      real(c_double), intent(out) :: numbers(10, n), axes(3, 3, n), components(3, m, n)
       integer(c_int), intent(out) :: status(n)
     end subroutine find_frames
 

@@ -20,33 +20,34 @@ module principal_frames
 
 contains
 
-  subroutine find_frames(n, matrices, m, vectors, coefficients, axes, components, status) &
+  subroutine find_frames(n, matrices, m, vectors, numbers, axes, components, status) &
     bind(c, name="find_frames_level")
     !! Compute the frames of n bodies, each with m vectors.
     integer(c_int), intent(in), value :: n, m
     real(dp), intent(in) :: matrices(3, 3, n)
     real(dp), intent(in) :: vectors(3, m, n)
-    real(dp), intent(out) :: coefficients(3, n)
+    real(dp), intent(out) :: numbers(10, n)
     real(dp), intent(out) :: axes(3, 3, n)
     real(dp), intent(out) :: components(3, m, n)
     integer(c_int), intent(out) :: status(n)
     integer :: i
 
     do i = 1, n
-      call find_frame(m, matrices(:, :, i), vectors(:, :, i), coefficients(:, i), axes(:, :, i), &
+      call find_frame(m, matrices(:, :, i), vectors(:, :, i), numbers(:, i), axes(:, :, i), &
                       components(:, :, i), status(i))
     end do
   end subroutine find_frames
 
-  pure subroutine find_frame(m, matrix, vectors, coefficients, axes, components, status)
-    !! Compute A, B, C, the axes as columns, and the components of vectors about them, over the
-    !! moments; each is rounded once. Each axis is near the body's own axis of the same number, and
+  pure subroutine find_frame(m, matrix, vectors, numbers, axes, components, status)
+    !! Compute A, B, C, the moments over a power of two, the quaternion from the frame to the body,
+    !! the axes as columns, and the components of vectors about them, over the moments; each but the
+    !! quaternion is rounded once. Each axis is near the body's own axis of the same number, and
     !! the frame is right-handed. The status is COMPLETE, REFUSED if the matrix is not positive
     !! definite, or GAVE_UP if the body is too thin; the numbers are then 0.
     integer, intent(in) :: m
     real(dp), intent(in) :: matrix(3, 3)        !! symmetric, finite
     real(dp), intent(in) :: vectors(3, m)       !! torques
-    real(dp), intent(out) :: coefficients(3)
+    real(dp), intent(out) :: numbers(10)
     real(dp), intent(out) :: axes(3, 3)
     real(dp), intent(out) :: components(3, m)
     integer, intent(out) :: status
@@ -55,7 +56,7 @@ contains
     integer :: order(3)
     integer :: i, j, k, scaling
 
-    coefficients = 0.0_dp
+    numbers = 0.0_dp
     axes = 0.0_dp
     components = 0.0_dp
     ! The elements are at most 1, so that no product overflows.
@@ -83,11 +84,13 @@ contains
       call reverse(v(:, i))
     end if
     axes = v%high + v%low
+    numbers(7:) = quaternion_of(axes)
     do i = 1, 3
       j = 1 + mod(i, 3)
       k = 1 + mod(j, 3)
       part = (moments(j) - moments(k))/moments(i)
-      coefficients(i) = part%high + part%low
+      numbers(i) = part%high + part%low
+      numbers(3 + i) = moments(i)%high
       do j = 1, m
         part = (v(1, i)*vectors(1, j) + v(2, i)*vectors(2, j) + v(3, i)*vectors(3, j))/moments(i)
         components(i, j) = scale(part%high + part%low, -scaling)
@@ -223,6 +226,27 @@ contains
       is_left(order(i)) = .false.
     end do
   end function nearest_axes
+
+  pure function quaternion_of(v) result(q)
+    !! Return the quaternion of a right-handed frame, by the largest of its numbers.
+    real(dp), intent(in) :: v(3, 3)
+    real(dp) :: q(4)
+    integer :: i, j, k
+
+    i = maxloc([v(1, 1) + v(2, 2) + v(3, 3), v(1, 1), v(2, 2), v(3, 3)], 1) - 1
+    if (i == 0) then
+      q = [1.0_dp + v(1, 1) + v(2, 2) + v(3, 3), v(3, 2) - v(2, 3), v(1, 3) - v(3, 1), &
+           v(2, 1) - v(1, 2)]
+    else
+      j = 1 + mod(i, 3)
+      k = 1 + mod(j, 3)
+      q(1) = v(k, j) - v(j, k)
+      q(1 + i) = 1.0_dp + v(i, i) - v(j, j) - v(k, k)
+      q(1 + j) = v(j, i) + v(i, j)
+      q(1 + k) = v(k, i) + v(i, k)
+    end if
+    q = q/sqrt(q(1)*q(1) + q(2)*q(2) + q(3)*q(3) + q(4)*q(4))
+  end function quaternion_of
 
   pure subroutine reverse(axis)
     type(pair_t), intent(inout) :: axis(3)

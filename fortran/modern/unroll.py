@@ -58,6 +58,7 @@ MODULES = (
     "many_fixed",
     "many_slots",
     "many_attitudes",
+    "many_rows",
     "many_taylor",
     "lanes",
     "lanes_two_term",

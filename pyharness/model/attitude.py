@@ -143,17 +143,11 @@ def angle_between(attitude: Array, other: Array) -> Array:
 
 def quaternion_of_axes(axes: Array) -> Quaternion:
     """Return the attitude of a right-handed frame, the columns of `axes`, (3, 3)."""
-    w, x, y, z = quaternions_of_axes(axes[None])[0].tolist()
-    return w, x, y, z
-
-
-def quaternions_of_axes(axes: Array) -> Array:
-    """Return the attitudes, (n, 4), of n right-handed frames, columns of `axes`, (n, 3, 3)."""
     from scipy.spatial.transform import Rotation
 
     # Older versions of SciPy refuse read-only arrays.
-    found: Array = Rotation.from_matrix(np.array(axes)).as_quat()[:, [3, 0, 1, 2]]
-    return found
+    x, y, z, w = Rotation.from_matrix(np.array(axes)).as_quat().tolist()
+    return w, x, y, z
 
 
 def rotated(vectors: Array, matrix: Array) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pyharness import Ensemble, Scene, TorqueLaw, solve, solve_many
-from pyharness.engine.prepared import many_laws, many_prepared
+from pyharness.engine.prepared import many_laws, many_prepared, many_scenes
 from pyharness.engine.prepared.many_tape import sides_of
 from tests.campaigns import driver
 from tests.campaigns.combination_campaign import (
@@ -39,6 +39,10 @@ def test_random_combinations_are_within_their_tolerance(torque: str, seed: int) 
     assert any(name.startswith("error, tolerances") for name in tally.ratios)
 
 
+def own_body(body: str) -> dict[str, Any]:
+    return {"inertia": MATRIX.tolist()} if body == "matrix" else {"moments": MOMENTS}
+
+
 def arrays_of(body: str) -> dict[str, Any]:
     if body == "arrays of moments":
         return {"moments": np.add(MOMENTS, RNG.uniform(0.0, 0.5, (N, 3)))}
@@ -53,10 +57,7 @@ def test_no_body_of_a_recorded_torque_is_prepared_alone(
     torque: Any, body: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """One kernel call solves all bodies, those with switches too."""
-    scene = Scene(
-        "", (1.0, 1.0, 1.0), torque=torque,
-        **{"inertia": MATRIX.tolist()} if body == "matrix" else {"moments": MOMENTS},
-    )  # fmt: skip
+    scene = Scene("", (1.0, 1.0, 1.0), torque=torque, **own_body(body))
     arrays = {**arrays_of(body), "parameters": {"c": RNG.uniform(0.05, 0.15, N)}}
 
     def refused(*_: Any, **more: Any) -> None:
@@ -87,7 +88,11 @@ def test_rows_are_at_their_times_in_any_order(law: Any, times: list[float]) -> N
 
 @pytest.mark.parametrize("attitude", [False, True])
 @pytest.mark.parametrize("body", ["moments", "arrays of moments"])
-@pytest.mark.parametrize("law", [TorqueLaw()], ids=str)
+@pytest.mark.parametrize(
+    "law",
+    [TorqueLaw(), TorqueLaw((0.1, 0.2, -0.1)), TORQUES["law"]],
+    ids=["none", "constant", "waves"],
+)
 def test_a_body_is_solved_once_for_all_times(
     law: TorqueLaw, body: str, attitude: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -97,7 +102,7 @@ def test_a_body_is_solved_once_for_all_times(
         raise AssertionError("bodies are copied")
 
     monkeypatch.setattr(many_laws, "solve_bodies", refused)
-    scene = Scene("", (1.0, 1.0, 1.0), moments=MOMENTS, torque=law)
+    scene = Scene("", (1.0, 1.0, 1.0), torque=law, **own_body(body))
     given = {"omega": STARTS, **({"attitude": TURNS} if attitude else {}), **arrays_of(body)}
     times = [2.5, 1.0, 0.0, -0.1, -2.0]
     found = solve_many(scene, times=times, tolerance=1e-9, estimates=True, **given)
@@ -109,6 +114,28 @@ def test_a_body_is_solved_once_for_all_times(
         assert found.omega[:, k] == pytest.approx(one.omega, abs=1e-9 * np.abs(STARTS).max())
         if found.attitude is not None:
             assert found.attitude[:, k] == pytest.approx(one.attitude, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "torque", [{}, {"torque_constant": STARTS}, {"sines": [[[1, 2, 3, 4]]] * N}]
+)
+def test_one_matrix_has_its_axes_found_once(
+    torque: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    find, counts = many_scenes._frames, []
+
+    def counted(matrices: Any, vectors: Any) -> Any:
+        counts.append(len(matrices))
+        return find(matrices, vectors)
+
+    scene = Scene("", (1.0, 1.0, 1.0), inertia=MATRIX.tolist())
+    given: Any = {"omega": STARTS, "attitude": TURNS, "tolerance": 1e-12, **torque}
+    wanted = solve_many(scene, 2.0, inertia=[MATRIX] * N, **given)
+    monkeypatch.setattr(many_scenes, "_frames", counted)
+    found = solve_many(scene, 2.0, **given)
+    assert counts == [1]
+    assert found.omega == pytest.approx(wanted.omega, rel=1e-12)
+    assert found.attitude == pytest.approx(wanted.attitude, rel=1e-12)
 
 
 def test_times_are_divided_into_the_two_sides_of_zero() -> None:

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.engine.plan.registry import PREPARED_WITH_ATTITUDE, check_attitude
-from pyharness.engine.prepared.many_scenes import MERGED, checked_copies, checked_rows
+from pyharness.engine.prepared.many_scenes import MERGED, PRINCIPAL, checked_copies, checked_rows
 from pyharness.engine.prepared.many_tape import sides_of
+from pyharness.engine.plan.registry import PREPARED_WITH_ATTITUDE, check_attitude
 from pyharness.model.arrays import count_bodies, spread, threads_of
 from pyharness.model.codes import Methods, Statuses
 from pyharness.model.ensemble import Ensemble, place_for
@@ -18,6 +18,7 @@ from pyharness.model.progress import for_each_piece
 from pyharness.model.trajectory import Array
 from pyharness.model.waves import with_merged_rows
 
+_NO_MOMENTS = np.empty((0, 3))
 _NOTHING = np.empty((4, 0), order="F")  # in place of attitudes
 # Methods whose kernels evaluate a body at several times.
 _WITH_ROWS = (Methods.CLOSED_FORM, Methods.CLOSED_FORM_OR_TAYLOR, Methods.TAYLOR)
@@ -51,7 +52,13 @@ def _arrays(
                 "closed-form can't compute the attitude of bodies given by coefficients; "
                 "allowed: moments, or methods auto and taylor"
             )
-    return n, by_moments, (body, constant, rows["torque_rate"], sines, cosines, omega), rows
+    moments = rows.get(PRINCIPAL, _NO_MOMENTS)
+    return (
+        n,
+        by_moments,
+        (body, moments, constant, rows["torque_rate"], sines, cosines, omega),
+        rows,
+    )
 
 
 def solve_bodies(
@@ -65,7 +72,7 @@ def solve_bodies(
     """
     code, tolerance, step, effort = settings
     n, by_moments, arrays, rows = _arrays(ready, own, code)
-    body, constant, rate, sines, cosines, omega = arrays
+    *laws, omega = arrays
     times, attitude = rows["t_end"], rows.get("attitude")
     if not step > 0.0:
         raise InputError(f"step is {step:g}; allowed: above 0")
@@ -88,9 +95,9 @@ def solve_bodies(
             return (array if len(array) in (0, 1, piece.stop - piece.start) else array[piece]).T
 
         extension().solve_ensemble(
-            code, tolerance, step, effort, by_moments + 2 * is_rounded, part(body), part(constant),
-            part(rate), part(sines), part(cosines), part(omega), part(times), part(attitude),
-            given_up, found.omega[piece].T,
+            code, tolerance, step, effort, by_moments + 2 * is_rounded,
+            *[part(each) for each in laws], part(omega), part(times), part(attitude), given_up,
+            found.omega[piece].T,
             _NOTHING if found.attitude is None else found.attitude[piece].T, found.status[piece],
             found.estimates_of(piece),
         )  # fmt: skip
@@ -154,7 +161,7 @@ def _solve_rows(
 
     def enter(piece: slice, given_up: NDArray[np.int32]) -> None:
         count = piece.stop - piece.start
-        parts = [(each if len(each) in (1, count) else each[piece]).T for each in arrays]
+        parts = [(each if len(each) in (0, 1, count) else each[piece]).T for each in arrays]
         turns = _NOTHING if attitude is None else attitude[piece].T
         status = np.empty(count, np.int8)
         results = [

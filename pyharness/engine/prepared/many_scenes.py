@@ -17,7 +17,7 @@ from pyharness.model.arrays import (
     spread,
     unit_quaternions,
 )
-from pyharness.model.attitude import quaternions_of_axes, rotated, turned_back
+from pyharness.model.attitude import quaternion_of_axes, rotated, turned_back
 from pyharness.model.codes import Statuses
 from pyharness.model.errors import InputError
 from pyharness.model.extension import extension
@@ -33,13 +33,14 @@ _MOST_KEPT = 8  # scenes whose arrays are kept
 BODIES = ("moments", "inertia", "coefficients")
 ONES: Triple = (1.0, 1.0, 1.0)
 PARAMETER = "parameters: "  # before the names of parameters of a torque
+PRINCIPAL = "principal"  # moments about principal axes over any number, beside coefficients
 TORQUES = ("torque_constant", "torque_rate", "sines", "cosines")
 _WAVES = ("sines", "cosines")
 # The shapes of rows, in the order in which `solve_many` checks its arrays.
 _SHAPES: dict[str, tuple[int, ...]] = {
     "omega": (3,), "moments": (3,), "coefficients": (3,), "inertia": (3, 3),
     "torque_constant": (3,), "torque_rate": (3,), "sines": (4,), "cosines": (4,), "t_end": (),
-    "attitude": (4,),
+    "attitude": (4,), PRINCIPAL: (3,),
 }  # fmt: skip
 
 
@@ -49,47 +50,52 @@ def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Array, Ar
     An invalid inertia has coefficients NaN.
     """
     rows = checked_rows({name: given[name] for name in given if name not in BODIES})
-    own = {"inertia": rows_of("inertia", given["inertia"], 3, 3)}
-    own |= {name: rows.pop(name) for name in TORQUES}
-    n = count_bodies(own)
-    matrices, constant, rate, sines, cosines = (spread(each, n) for each in own.values())
-    constant, sines, cosines = with_merged_rows(constant, sines, cosines)
-    vectors = np.concatenate(
-        [constant[:, None], rate[:, None], sines[..., :3], cosines[..., :3]], axis=1
-    )
-    parts = np.zeros_like(vectors)
-    coefficients, axes, components = _frames(
-        matrices, vectors[:, : vectors.any() * vectors.shape[1]]
-    )
-    parts[:, : components.shape[1]] = components
-    last = 2 + sines.shape[1]
-    found: dict[str, Any] = {
-        **rows,
-        "coefficients": coefficients,
-        "torque_constant": parts[:, 0],
-        "torque_rate": parts[:, 1],
-        "sines": np.concatenate([parts[:, 2:last], sines[..., 3:]], axis=2),
-        "cosines": np.concatenate([parts[:, last:], cosines[..., 3:]], axis=2),
-    }
-    found = {name: np.ascontiguousarray(each) for name, each in found.items()}
-    axes, turns = np.ascontiguousarray(axes), None
+    matrices = rows_of("inertia", given["inertia"], 3, 3)
+    law = {name: rows.pop(name) for name in TORQUES}
+    n = count_bodies({"inertia": matrices, **law})
     for name in ("omega", "attitude"):
         if name in rows and n != 1:
             check_rows(name, rows[name], n)
+    constant, sines, cosines = with_merged_rows(*(law[name] for name in MERGED))
+    parts = constant[:, None], law["torque_rate"][:, None], sines[..., :3], cosines[..., :3]
+    # One matrix may have the torques of many bodies.
+    m = max(map(len, parts))
+    is_free = not any(each.any() for each in parts)
+    if len(matrices) > 1 and not is_free:
+        m = n
+    vectors = np.concatenate([spread(each, m) for each in parts], axis=1)
+    given_vectors = vectors[:, : 0 if is_free else None]
+    if len(matrices) == 1:
+        given_vectors = given_vectors.reshape(1, -1, 3)
+    numbers, axes, components = _frames(matrices, given_vectors)
+    if not is_free:
+        vectors = components.reshape(vectors.shape)
+    last = 2 + sines.shape[1]
+    found: dict[str, Any] = {
+        **rows,
+        "coefficients": numbers[:, :3],
+        PRINCIPAL: numbers[:, 3:6],
+        "torque_constant": vectors[:, 0],
+        "torque_rate": vectors[:, 1],
+        "sines": np.concatenate([vectors[:, 2:last], spread(sines[..., 3:], m)], axis=2),
+        "cosines": np.concatenate([vectors[:, last:], spread(cosines[..., 3:], m)], axis=2),
+    }
+    found = {name: np.ascontiguousarray(each) for name, each in found.items()}
+    turns = None
     if "omega" in rows:
         found["omega"] = rotated(found["omega"], axes.transpose(0, 2, 1))
     if "attitude" in rows:
-        turns = quaternions_of_axes(axes)
+        turns = numbers[:, 6:]
         conjugate = turns * np.array([1.0, -1.0, -1.0, -1.0])
         found["attitude"] = turned_back(unit_quaternions(found["attitude"]), conjugate)
     return found, axes, turns
 
 
 def _frames(matrices: Array, vectors: Array) -> tuple[Array, Array, Array]:
-    """Return A, B, C of n bodies, their principal axes (columns), and (n, k, 3) of `vectors`.
+    """Return numbers of n bodies, their principal axes (columns), and components of `vectors`.
 
-    The last are components about these axes, over the moments. An invalid inertia has coefficients
-    NaN.
+    The numbers, (n, 10), are A, B, C (NaN if the inertia is invalid), the moments over a power of
+    two, and the quaternion of the axes. The components, (n, k, 3), are over the moments.
     """
     with np.errstate(all="ignore"):
         opposite = matrices.transpose(0, 2, 1)
@@ -99,7 +105,7 @@ def _frames(matrices: Array, vectors: Array) -> tuple[Array, Array, Array]:
         )
         matrices = np.where(is_right[:, None, None], 0.5 * matrices + 0.5 * opposite, np.eye(3))
     # The coefficients A, B, C are more accurate than rounded moments.
-    coefficients, axes, components, status = (
+    numbers, axes, components, status = (
         np.ascontiguousarray(each.T)
         for each in extension().inertia_frames(matrices.transpose(1, 2, 0), vectors.T)
     )
@@ -109,21 +115,23 @@ def _frames(matrices: Array, vectors: Array) -> tuple[Array, Array, Array]:
         frame = principal_frame(((a, b, c), (d, e, f), (g, h, k)))
         i1, i2, i3 = exact = frame.exact_moments
         exact_coefficients = (i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3
-        coefficients[i] = [nearest_float(each) for each in exact_coefficients]
+        numbers[i, :3] = [nearest_float(each) for each in exact_coefficients]
+        numbers[i, 3:6] = [nearest_float(each / max(exact)) for each in exact]
+        numbers[i, 6:] = quaternion_of_axes(np.array(frame.axes))
         axes[i] = frame.axes
         for row, (x, y, z) in enumerate(vectors[i].tolist()):
             turned = frame.into((Fraction(x), Fraction(y), Fraction(z)))
             parts = zip(turned, exact, strict=True)
             components[i, row] = [nearest_float(part / moment) for part, moment in parts]
-    coefficients[~is_right | (status == Statuses.REFUSED)] = np.nan
-    return coefficients, axes, components
+    numbers[~is_right | (status == Statuses.REFUSED), :3] = np.nan
+    return numbers, axes, components
 
 
 def axes_of_inertia(matrices: Array) -> tuple[Array, Array, Array]:
     """Return A, B, C (NaN if invalid) of n bodies, their principal axes, and inverse inertias."""
     n = len(matrices)
-    coefficients, axes, components = _frames(matrices, np.broadcast_to(np.eye(3), (n, 3, 3)))
-    return coefficients, axes, np.einsum("nik,njk->nij", axes, components)
+    numbers, axes, components = _frames(matrices, np.broadcast_to(np.eye(3), (n, 3, 3)))
+    return numbers[:, :3], axes, np.einsum("nik,njk->nij", axes, components)
 
 
 def from_scene(scene: Scene) -> dict[str, Any]:

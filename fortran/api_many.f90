@@ -230,19 +230,37 @@ subroutine solve_packed_many(packed, n_packed, n, omega0, n_times, times, given_
   call watch(c_null_ptr)
 end subroutine solve_packed_many
 
-subroutine inertia_frames(n, matrices, m, vectors, numbers, axes, components, status)
+subroutine inertia_frames(n, matrices, symmetric, m, vectors, numbers, axes, components, status)
   ! Compute the principal axes of n bodies, and torques over moments about these.
   !f2py threadsafe
   use levels, only: find_frames
   implicit none
   integer(4), intent(in) :: n
-  real(8), intent(in) :: matrices(3, 3, n)      ! symmetric, finite, kg m2
+  real(8), intent(in) :: matrices(3, 3, n)      ! kg m2
+  real(8), intent(in) :: symmetric              ! largest deviation from symmetry, relative
   integer(4), intent(in) :: m                   ! vectors of a body
   real(8), intent(in) :: vectors(3, m, n)       ! about the axes of the matrix
   real(8), intent(out) :: numbers(10, n)        ! A, B, C; moments over a power of two; quaternion
   real(8), intent(out) :: axes(3, 3, n)         ! in columns
   real(8), intent(out) :: components(3, m, n)
-  integer(4), intent(out) :: status(n)          ! 0 complete, 3 not positive definite, 4 too thin
+  ! 0 complete, 3 not symmetric, finite and positive definite, 4 too thin
+  integer(4), intent(out) :: status(n)
+  integer(4), parameter :: at_once = 64
+  real(8) :: means(3, 3, at_once), opposite(3, 3), largest
+  integer(4) :: first, i, there
 
-  call find_frames(n, matrices, m, vectors, numbers, axes, components, status)
+  do first = 1, n, at_once
+    there = min(at_once, n - first + 1)
+    do i = 1, there
+      opposite = transpose(matrices(:, :, first + i - 1))
+      largest = maxval(abs(opposite))
+      means(:, :, i) = 0.0d0
+      if (largest <= huge(largest) .and. maxval(abs(matrices(:, :, first + i - 1) - opposite)) &
+          <= symmetric*largest) then
+        means(:, :, i) = 0.5d0*matrices(:, :, first + i - 1) + 0.5d0*opposite
+      end if
+    end do
+    call find_frames(there, means, m, vectors(:, :, first:), numbers(:, first:), &
+                     axes(:, :, first:), components(:, :, first:), status(first:))
+  end do
 end subroutine inertia_frames

@@ -3,6 +3,7 @@ module principal_frames
   !! precision the differences of nearly equal moments, and a small moment, would have few digits.
   use, intrinsic :: iso_c_binding, only: c_int
   use kinds, only: dp
+  use principal_lanes, only: find_lanes, lanes_t, scale_matrix, SIDE_BY_SIDE
   use statuses, only: COMPLETE, GAVE_UP, REFUSED
   use word_pairs, only: operator(*), operator(+), operator(-), operator(/), pair_t, product_of, root
   implicit none(type, external)
@@ -14,6 +15,8 @@ module principal_frames
   real(dp), parameter :: ROUGH = 2.0_dp**(-56), SMALL = 2.0_dp**(-28)
   ! Least over largest moment that double-double resolves.
   real(dp), parameter :: THIN = 2.0_dp**(-40)
+  ! Largest rotation of first order, rad, whose square is negligible.
+  real(dp), parameter :: MOST_TURNED = 2.0_dp**(-36)
   type(pair_t), parameter :: ZERO = pair_t(0.0_dp, 0.0_dp), ONE = pair_t(1.0_dp, 0.0_dp)
 
   public :: find_frames
@@ -30,52 +33,78 @@ contains
     real(dp), intent(out) :: axes(3, 3, n)
     real(dp), intent(out) :: components(3, m, n)
     integer(c_int), intent(out) :: status(n)
-    integer :: i
+    type(lanes_t) :: lanes
+    type(pair_t) :: moments(3), v(3, 3)
+    real(dp) :: matrix(3, 3)
+    integer :: first, i, j, scaling
 
-    do i = 1, n
-      call find_frame(m, matrices(:, :, i), vectors(:, :, i), numbers(:, i), axes(:, :, i), &
-                      components(:, :, i), status(i))
+    do first = 1, n, SIDE_BY_SIDE
+      call find_lanes(matrices(:, :, first:min(n, first + SIDE_BY_SIDE - 1)), lanes)
+      do j = first, min(n, first + SIDE_BY_SIDE - 1)
+        i = 1 + j - first
+        if (lanes%turned(i) <= MOST_TURNED) then
+          moments%high = lanes%d(i, :)
+          moments%low = lanes%d_low(i, :)
+          v%high = lanes%v(i, :, :)
+          v%low = lanes%v_low(i, :, :)
+        else
+          call scale_matrix(matrices(:, :, j), matrix, scaling)
+          call find_one(matrix, moments, v)
+        end if
+        call finish_frame(moments, v, lanes%scaling(i), vectors(:, :, j), numbers(:, j), &
+                          axes(:, :, j), components(:, :, j), status(j))
+      end do
     end do
   end subroutine find_frames
 
-  pure subroutine find_frame(m, matrix, vectors, numbers, axes, components, status)
+  pure subroutine find_one(matrix, moments, v)
+    !! Find principal moments and axes of a body, also if moments are nearly equal.
+    real(dp), intent(in) :: matrix(3, 3) !! symmetric, elements at most 1
+    type(pair_t), intent(out) :: moments(3), v(3, 3)
+    type(pair_t) :: a(3, 3)
+    integer :: i
+
+    call begin(matrix, a, v)
+    call diagonalise(a, v)
+    do i = 1, 3
+      moments(i) = a(i, i)
+    end do
+  end subroutine find_one
+
+  pure subroutine finish_frame(found, found_axes, scaling, vectors, numbers, axes, components, &
+                               status)
     !! Compute A, B, C, the moments over a power of two, the quaternion from the frame to the body,
     !! the axes as columns, and the components of vectors about them, over the moments; each but the
     !! quaternion is rounded once. Each axis is near the body's own axis of the same number, and
     !! the frame is right-handed. The status is COMPLETE, REFUSED if the matrix is not positive
     !! definite, or GAVE_UP if the body is too thin; the numbers are then 0.
-    integer, intent(in) :: m
-    real(dp), intent(in) :: matrix(3, 3)        !! symmetric, finite
-    real(dp), intent(in) :: vectors(3, m)       !! torques
+    type(pair_t), intent(in) :: found(3), found_axes(3, 3)
+    integer, intent(in) :: scaling              !! of the moments, an exponent of two
+    real(dp), intent(in) :: vectors(:, :)       !! torques
     real(dp), intent(out) :: numbers(10)
     real(dp), intent(out) :: axes(3, 3)
-    real(dp), intent(out) :: components(3, m)
+    real(dp), intent(out) :: components(:, :)
     integer, intent(out) :: status
-    type(pair_t) :: a(3, 3), v(3, 3), moments(3), part
-    real(dp) :: scaled(3, 3)
+    type(pair_t) :: v(3, 3), moments(3), part
+    real(dp) :: least
     integer :: order(3)
-    integer :: i, j, k, scaling
+    integer :: i, j, k
 
     numbers = 0.0_dp
     axes = 0.0_dp
     components = 0.0_dp
-    ! The elements are at most 1, so that no product overflows.
-    scaling = exponent(maxval(abs(matrix)))
-    do i = 1, 3
-      scaled(:, i) = scale(matrix(:, i), -scaling)
-    end do
-    call begin(scaled, a, v)
-    call diagonalise(a, v)
+    least = min(found(1)%high, found(2)%high, found(3)%high)
     status = REFUSED
-    if (.not. min(a(1, 1)%high, a(2, 2)%high, a(3, 3)%high) > 0.0_dp) return
+    if (.not. least > 0.0_dp) return
     status = GAVE_UP
-    if (min(a(1, 1)%high, a(2, 2)%high, a(3, 3)%high) < THIN) return
+    if (least < THIN) return
     status = COMPLETE
+    v = found_axes
     axes = v%high
     order = nearest_axes(axes)
     v = v(:, order)
     do i = 1, 3
-      moments(i) = a(order(i), order(i))
+      moments(i) = found(order(i))
       if (v(i, i)%high < 0.0_dp) call reverse(v(:, i))
     end do
     axes = v%high
@@ -91,12 +120,12 @@ contains
       part = (moments(j) - moments(k))/moments(i)
       numbers(i) = part%high + part%low
       numbers(3 + i) = moments(i)%high
-      do j = 1, m
+      do j = 1, size(vectors, 2)
         part = (v(1, i)*vectors(1, j) + v(2, i)*vectors(2, j) + v(3, i)*vectors(3, j))/moments(i)
         components(i, j) = scale(part%high + part%low, -scaling)
       end do
     end do
-  end subroutine find_frame
+  end subroutine finish_frame
 
   pure subroutine begin(matrix, a, v)
     !! Set `v` to axes that are right to double precision, and orthogonal to double-double, and `a`

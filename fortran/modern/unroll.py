@@ -18,6 +18,7 @@ from unroll_many import attitude_sums, many_steps, paired
 MODULES = (
     "two_words",
     "word_pairs",
+    "principal_lanes",
     "principal_frames",
     "step_nodes",
     "torque_terms",

@@ -122,7 +122,7 @@ def test_a_body_is_solved_once_for_all_times(
 def test_one_matrix_has_its_axes_found_once(
     torque: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    find, counts = many_scenes._frames, []
+    find, counts = many_scenes.find_frames, []
 
     def counted(matrices: Any, vectors: Any) -> Any:
         counts.append(len(matrices))
@@ -131,7 +131,7 @@ def test_one_matrix_has_its_axes_found_once(
     scene = Scene("", (1.0, 1.0, 1.0), inertia=MATRIX.tolist())
     given: Any = {"omega": STARTS, "attitude": TURNS, "tolerance": 1e-12, **torque}
     wanted = solve_many(scene, 2.0, inertia=[MATRIX] * N, **given)
-    monkeypatch.setattr(many_scenes, "_frames", counted)
+    monkeypatch.setattr(many_scenes, "find_frames", counted)
     found = solve_many(scene, 2.0, **given)
     assert counts == [1]
     assert found.omega == pytest.approx(wanted.omega, rel=1e-12)

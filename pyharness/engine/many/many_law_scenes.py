@@ -11,9 +11,13 @@ from pyharness.engine.plan.registry import REGISTRY, requested_tolerance
 from pyharness.engine.prepared.many_laws import solve_at, solve_bodies
 from pyharness.engine.prepared.many_scenes import (
     ONES,
+    TORQUES,
     about_principal,
+    checked_rows,
     from_scene,
     from_scenes,
+    principal_rows_of_scene,
+    rows_about,
     rows_of_scene,
 )
 from pyharness.engine.prepared.solver import CODES
@@ -38,7 +42,11 @@ def solve_laws(
     if isinstance(scene, Scene):
         step_size = scene.step_size
         is_moments = "moments" in own or "coefficients" in own
-        if "inertia" in own or (scene.inertia is not None and not is_moments):
+        is_tilted = scene.inertia is not None and not is_moments
+        if is_tilted and own.keys().isdisjoint(("inertia", *TORQUES)):
+            ready, axes, turns = principal_rows_of_scene(scene)
+            own |= rows_about(checked_rows(own), axes, turns)
+        elif is_tilted or "inertia" in own:
             given = {"inertia": scene.inertia, **from_scene(scene), **own}
             own, axes, turns = about_principal(given)
         else:
@@ -62,7 +70,7 @@ def solve_laws(
     else:
         found = solve_at(ready, own, times, kernel, **options)
     if axes is not None:
-        _turn_back(found, axes, turns, own, t_end)
+        _turn_back(found, axes, turns, {**ready, **own}, t_end)
     return found if found.leaves is None else replace(found, leaves=None)
 
 

@@ -44,7 +44,7 @@ _SHAPES: dict[str, tuple[int, ...]] = {
 }  # fmt: skip
 
 
-def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Array, Array | None]:
+def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Array, Array]:
     """Return `solve_many`'s arrays about principal axes, the axes (columns), and their quaternions.
 
     An invalid inertia has coefficients NaN.
@@ -67,7 +67,7 @@ def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Array, Ar
     given_vectors = vectors[:, : 0 if is_free else None]
     if len(matrices) == 1:
         given_vectors = given_vectors.reshape(1, -1, 3)
-    numbers, axes, components = _frames(matrices, given_vectors)
+    numbers, axes, components = find_frames(matrices, given_vectors)
     if not is_free:
         vectors = components.reshape(vectors.shape)
     last = 2 + sines.shape[1]
@@ -81,37 +81,33 @@ def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Array, Ar
         "cosines": np.concatenate([vectors[:, last:], spread(cosines[..., 3:], m)], axis=2),
     }
     found = {name: np.ascontiguousarray(each) for name, each in found.items()}
-    turns = None
+    return found | rows_about(rows, axes, numbers[:, 6:]), axes, numbers[:, 6:]
+
+
+def rows_about(rows: Mapping[str, Any], axes: Array, turns: Array) -> dict[str, Any]:
+    """Return omegas and attitudes of `rows` about `axes` (columns) with quaternions `turns`."""
+    found = {}
     if "omega" in rows:
-        found["omega"] = rotated(found["omega"], axes.transpose(0, 2, 1))
+        found["omega"] = rotated(rows["omega"], axes.transpose(0, 2, 1))
     if "attitude" in rows:
-        turns = numbers[:, 6:]
         conjugate = turns * np.array([1.0, -1.0, -1.0, -1.0])
-        found["attitude"] = turned_back(unit_quaternions(found["attitude"]), conjugate)
-    return found, axes, turns
+        found["attitude"] = turned_back(unit_quaternions(rows["attitude"]), conjugate)
+    return found
 
 
-def _frames(matrices: Array, vectors: Array) -> tuple[Array, Array, Array]:
+def find_frames(matrices: Array, vectors: Array) -> tuple[Array, Array, Array]:
     """Return numbers of n bodies, their principal axes (columns), and components of `vectors`.
 
     The numbers, (n, 10), are A, B, C (NaN if the inertia is invalid), the moments over a power of
     two, and the quaternion of the axes. The components, (n, k, 3), are over the moments.
     """
-    with np.errstate(all="ignore"):
-        opposite = matrices.transpose(0, 2, 1)
-        largest = np.abs(matrices).max(axis=(1, 2))
-        is_right = np.isfinite(largest) & (
-            np.abs(matrices - opposite).max(axis=(1, 2)) <= SYMMETRIC * largest
-        )
-        matrices = np.where(is_right[:, None, None], 0.5 * matrices + 0.5 * opposite, np.eye(3))
     # The coefficients A, B, C are more accurate than rounded moments.
     numbers, axes, components, status = (
-        np.ascontiguousarray(each.T)
-        for each in extension().inertia_frames(matrices.transpose(1, 2, 0), vectors.T)
+        each.T for each in extension().inertia_frames(matrices.T, SYMMETRIC, vectors.T)
     )
     axes = axes.transpose(0, 2, 1)
     for i in np.flatnonzero((status == Statuses.GAVE_UP) & np.isfinite(vectors).all(axis=(1, 2))):
-        (a, b, c), (d, e, f), (g, h, k) = matrices[i].tolist()
+        (a, b, c), (d, e, f), (g, h, k) = (0.5 * matrices[i] + 0.5 * matrices[i].T).tolist()
         frame = principal_frame(((a, b, c), (d, e, f), (g, h, k)))
         i1, i2, i3 = exact = frame.exact_moments
         exact_coefficients = (i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3
@@ -123,14 +119,14 @@ def _frames(matrices: Array, vectors: Array) -> tuple[Array, Array, Array]:
             turned = frame.into((Fraction(x), Fraction(y), Fraction(z)))
             parts = zip(turned, exact, strict=True)
             components[i, row] = [nearest_float(part / moment) for part, moment in parts]
-    numbers[~is_right | (status == Statuses.REFUSED), :3] = np.nan
+    numbers[status == Statuses.REFUSED, :3] = np.nan
     return numbers, axes, components
 
 
 def axes_of_inertia(matrices: Array) -> tuple[Array, Array, Array]:
     """Return A, B, C (NaN if invalid) of n bodies, their principal axes, and inverse inertias."""
     n = len(matrices)
-    numbers, axes, components = _frames(matrices, np.broadcast_to(np.eye(3), (n, 3, 3)))
+    numbers, axes, components = find_frames(matrices, np.broadcast_to(np.eye(3), (n, 3, 3)))
     return numbers[:, :3], axes, np.einsum("nik,njk->nij", axes, components)
 
 
@@ -161,6 +157,17 @@ def keep_with(scene: Scene, key: tuple[Any, ...], make: Callable[[], Any]) -> An
             _kept.clear()
         found = _kept[full] = scene, make()
     return found[1]
+
+
+def principal_rows_of_scene(scene: Scene) -> tuple[dict[str, Any], Array, Array]:
+    """Return the arrays of a scene about principal axes; see `about_principal`."""
+
+    def convert() -> Any:
+        rows, axes, turns = about_principal(from_scene(scene))
+        return {**rows, "merged": tuple(rows[name] for name in MERGED)}, axes, turns
+
+    found: tuple[dict[str, Any], Array, Array] = keep_with(scene, ("principal",), convert)
+    return found
 
 
 def rows_of_scene(scene: Scene) -> dict[str, Any]:

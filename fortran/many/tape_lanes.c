@@ -98,6 +98,8 @@ struct group {
   lanes **factors;                /* of each term: a constant of the motion, or NULL */
   lanes *scaled;                  /* of each term: its coefficient, times the factor */
   const struct leaves *leaves;    /* compiled for these registers; or NULL */
+  int n_active;                   /* operations whose terms are to be computed, in `operations` */
+  int n_read, *read;              /* slots whose values amid the step are read, ascending */
   int *depends; /* of each slot: the unknowns on which it depends, as bits; the next is the time */
   double is_varying;              /* 1 if the Jacobian depends on the time, or 0 */
   lanes *middle, *noises;         /* of each slot: value amid the step, rounding error */
@@ -316,7 +318,7 @@ static void expand(struct group *g)
     g->leaves->expand_lanes(*g->a, tape->coefficients, tape->constants, &g->h, g->order);
     return;
   }
-  const struct operation *const end = g->operations + tape->n_operations;
+  const struct operation *const end = g->operations + g->n_active;
   for (int k = 0; k < g->order; k++) {
     const double whole = k, per_k = 1.0 / whole;
     for (const struct operation *each = g->operations; k > 0 && each < end; each++) {
@@ -327,7 +329,7 @@ static void expand(struct group *g)
       case PRODUCT: multiply(o, x, y, k); break;
       case SCALED: o[k] = x[0] * y[k]; break;
       TERM_CASES
-      default: break; /* a table, or constant */
+      default: break; /* a table */
       }
     }
     const lanes part = g->h / (k + 1.0);
@@ -458,6 +460,24 @@ static void find_constants(struct group *g)
     for (int i = 0; i < tape->starts[tape->n_combinations] - 1; i++)
       if (tape->slots[i] == out) g->terms[i] = each->y, g->factors[i] = each->x;
   }
+  for (int n = 0; n < tape->n_operations; n++)
+    if (g->operations[n].kind != FIXED) g->operations[g->n_active++] = g->operations[n];
+}
+
+/* Find the slots whose values amid the step are read, but for those of products and quotients, which
+   follow from others. */
+static void find_read(struct group *g)
+{
+  const struct tape *tape = &g->all->tape;
+  for (int slot = 0; slot < g->all->n_slots; slot++) {
+    int is_read = is_operand(tape, slot + 1);
+    for (int n = 0; n < tape->n_operations; n++) {
+      const int kind = recurrence_of(tape->operations[n]), out = tape->operations[n][3] - 1;
+      if (kind == PRODUCT || kind == QUOTIENT) is_read &= out != slot;
+      else if (kind != LINEAR && kind != TABLE) is_read |= out == slot || out + 1 == slot;
+    }
+    if (is_read) g->read[g->n_read++] = slot;
+  }
 }
 
 /* Return the derivative of a combination by an unknown. */
@@ -483,10 +503,11 @@ static void set_jacobian(struct group *g, lanes factor, lanes jacobian[][MOST])
     return;
   }
   lanes *const m = g->middle, (*const v)[MOST] = g->tangents;
-  for (int n = 0; n < g->all->n_slots; n++) {
+  for (int i = 0; i < g->n_read; i++) {
+    const int n = g->read[i];
     lanes sum = {0.0};
     /* The order is above the number of these terms. */
-    for (int k = FEW_TERMS - 1; k > 0; k--) sum = half * (sum + g->a[n][k]);
+    for (int k = FEW_TERMS - 1; k > 0 && g->depends[n]; k--) sum = half * (sum + g->a[n][k]);
     m[n] = g->a[n][0] + sum;
   }
   for (int j = 0; j < g->n; j++) v[FIRST_UNKNOWN + j][j] = all_of(1.0);
@@ -1051,7 +1072,8 @@ void OF_LEVEL(solve_tape_bodies, LEVEL)(struct bodies *all)
   all->interrupted = 0;
   memset(&g, 0, sizeof g);
   g.depends = calloc(n_slots, sizeof *g.depends);
-  g.operations = malloc(n * sizeof *g.operations + 2 * n_terms * sizeof *g.terms);
+  g.operations = malloc(n * sizeof *g.operations + 2 * n_terms * sizeof *g.terms
+                        + n_slots * sizeof *g.read);
   if (memory != NULL && g.depends != NULL && g.operations != NULL) g.order = order_for(all, g.depends);
   if (g.order == 0) {
     free(memory);
@@ -1072,9 +1094,11 @@ void OF_LEVEL(solve_tape_bodies, LEVEL)(struct bodies *all)
   g.scaled = memory + n_slots * of_slot;
   g.terms = (lanes **)(g.operations + n);
   g.factors = g.terms + n_terms;
+  g.read = (int *)(g.factors + n_terms);
   find_series(&g);
   find_dependences(&g);
   find_constants(&g);
+  find_read(&g);
   for (int i = 0; i < SIDE_BY_SIDE; i++) clear(&g, i);
   g.h = g.previous = g.scale = g.local = all_of(1.0);
   for (;;) {

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, solve_many
-from pyharness.engine.many_scenes import find_frames
+from pyharness.engine.prepared.many_scenes import find_frames
 from pyharness.model.inertia import principal_frame
 from pyharness.model.trajectory import Array
 

@@ -34,8 +34,7 @@ def main(arguments: Sequence[str]) -> int:
     if "--passed" in arguments:
         PASSED.write_text(_git("rev-parse", "HEAD"))
         return 0
-    paths = changed(arguments[0] if arguments else PASSED.read_text().strip())
-    folders = campaigns_of(paths)
+    folders = campaigns_of(changed(arguments[0] if arguments else PASSED.read_text().strip()))
     if not folders:
         print("test-changed: no package with campaign tests differs")
         return 0

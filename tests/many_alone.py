@@ -63,12 +63,10 @@ def mixed(n: int, seed: int, by_moments: bool = True, waves: int = _WAVES) -> di
     t_end[rng.random(n) < 0.05] = 0.0
     t_end[rng.random(n) < 0.05] *= 30.0
     drawn = {
-        "moments" if by_moments else "coefficients": body,
-        "omega": omega0,
+        "moments" if by_moments else "coefficients": body, "omega": omega0,
         "torque_constant": np.where(kind >= 2, size * vectors(), 0.0),
-        "torque_rate": np.where(kind >= 4, 0.1 * size * rate * vectors(), 0.0),
-        "t_end": t_end,
-    }
+        "torque_rate": np.where(kind >= 4, 0.1 * size * rate * vectors(), 0.0), "t_end": t_end,
+    }  # fmt: skip
     for name in ("sines", "cosines"):
         drawn[name] = np.zeros((n, waves, 4))
         for wave in range(waves):

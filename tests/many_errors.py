@@ -46,11 +46,9 @@ def scene_of(drawn: dict[str, Any], row: int) -> Scene:
     }
     zero = np.zeros((row + 1, 3))
     law = TorqueLaw(
-        drawn.get("torque_constant", zero)[row],
-        drawn.get("torque_rate", zero)[row],
-        waves["sines"],
-        waves["cosines"],
-    )
+        drawn.get("torque_constant", zero)[row], drawn.get("torque_rate", zero)[row],
+        waves["sines"], waves["cosines"],
+    )  # fmt: skip
     return Scene("", drawn["omega"][row], moments=drawn["moments"][row], torque=law)
 
 

@@ -14,13 +14,9 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 CATALOGUE = ROOT / "tests" / "messages.txt"
 _ERRORS = (
-    "InputError",
-    "NotBuiltError",
-    "TimedError",
-    "WorkLimitError",
-    "ImpossibleBodyWarning",
+    "InputError", "NotBuiltError", "TimedError", "WorkLimitError", "ImpossibleBodyWarning",
     "unknown",
-)
+)  # fmt: skip
 _CALL = re.compile(rf"(?<!class )(?<!def )(?<![\w`])(?P<begin>(?:{'|'.join(_ERRORS)})\()")
 _CONSTANT = re.compile(r'(?m)^(?P<name>[A-Z_][A-Z0-9_]*) = (?P<begin>(?:\(\s*)?f?")')
 
@@ -94,8 +90,7 @@ def _constants() -> dict[str, ast.expr]:
 
 
 def _of_module(text: str) -> dict[str, ast.expr]:
-    found = _expressions(text, _CONSTANT)
-    return {match["name"]: each for match, each in found if _is_text(each)}
+    return {match["name"]: each for match, each in _expressions(text, _CONSTANT) if _is_text(each)}
 
 
 if __name__ == "__main__":

@@ -56,8 +56,7 @@ def run(files: Sequence[str], seconds: float) -> int:
     # In chunks, because all files may take longer to collect than the time that there is.
     for chunk in _chunks(files):
         if counter.left() > 0.0:
-            command = [*options, "-m", "not campaign", *chunk]
-            codes.append(pytest.main(command, plugins=[counter]))
+            codes.append(pytest.main([*options, "-m", "not campaign", *chunk], plugins=[counter]))
     print(f"quick: {counter.passed} tests passed of {len(files)} files; make test runs all")
     return int(any(code not in _WELL for code in codes) or counter.failed > 0)
 

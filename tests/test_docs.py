@@ -29,6 +29,7 @@ from pyharness.views import render as views
 from pyharness.views.render import csv_text
 from tests.conftest import Patch, Printed
 from tests.json_reference import SCHEMA, schema_of
+from tests.tables import tables
 
 ROOT = Path(__file__).parent.parent
 DOCS = sorted((ROOT / "docs").rglob("*.md"))
@@ -97,13 +98,10 @@ def _is_excerpt(shown: str, output: str) -> bool:
     return re.fullmatch(r"\n(?:.*\n)*?".join(parts), output) is not None
 
 
-@pytest.mark.parametrize(
-    ("shown", "agrees"),
-    [
-        ("a\nb\nc\nd\n", True), ("a\n...\nd\n", True), ("a\n...\nc\nd\n", True),
-        ("a\n...\ne\n", False), ("a\nc\n...\nd\n", False), ("b\n...\nd\n", False), ("a\n", False),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("shown", "agrees"), [
+    ("a\nb\nc\nd\n", True), ("a\n...\nd\n", True), ("a\n...\nc\nd\n", True),
+    ("a\n...\ne\n", False), ("a\nc\n...\nd\n", False), ("b\n...\nd\n", False), ("a\n", False),
+])  # fmt: skip
 def test_an_excerpt_leaves_out_lines_and_changes_none(shown: str, agrees: bool) -> None:
     assert _is_excerpt(shown, "a\nb\nc\nd\n") == agrees
 
@@ -196,28 +194,11 @@ def test_scene_file_in_the_reference_is_one(tmp_path: Path) -> None:
     assert scene.torque.is_zero
     every = tomllib.loads(text)
     keys = {f"{name}.{key}" for name, table in every.items() if name != "name" for key in table}
-    named = set(re.findall(r"`(\w+\.\w+)`", SCENES.read_text()))
-    assert keys <= named
+    assert keys <= set(re.findall(r"`(\w+\.\w+)`", SCENES.read_text()))
 
 
 @pytest.mark.sampled
-@pytest.mark.parametrize(
-    "command",
-    [
-        "run --case 3 --program runge-kutta", "run --case 3 --program two-term --word cdc48",
-        "run --scene docs/space-torque.toml --method auto --times 1 --attitude matrix",
-        "run --case 6 --program two-term", "compare --case 3",
-        "compare --case 3 --program two-term --attitude --word cdc48",
-        "compare --scene docs/damped.toml --method auto,dop853",
-        "compare --case 3 --program two-term --ablate", "plan --case 3",
-        "claims --explain abstract-superior", "defects",
-        "defects stage-base", "defects 1660", "cards runge-kutta:860", "cards --origins",
-        "deck --program two-term --dialect ftn", "limits --case 6",
-        "family --case 5 --terms 1 --weighting galerkin", "rotations --case 6", "doctor",
-        "verify --only orders",
-        "verify --only random --draws 3", "stress --only matrices",
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize("command", tables(__file__)["json_has_the_documented_fields"])
 def test_json_has_the_documented_fields(command: str, printed: Printed, monkeypatch: Patch) -> None:
     monkeypatch.chdir(ROOT)
     record = json.loads(printed(f"{command} --format json"))

@@ -40,10 +40,8 @@ def test_example_has_its_parts(name: str) -> None:
     first = PYTHON.search(text)
     assert first is not None
     introduction = text[: first.start()].partition("\n")[2]
-    sentences = re.findall(r"[.!?:](?=\s+[A-Z`]|\s*$)", introduction.strip())
-    assert 3 <= len(sentences) <= 7
-    lines = [line for line in first[1].splitlines() if line.strip()]
-    assert 10 <= len(lines) <= 34
+    assert 3 <= len(re.findall(r"[.!?:](?=\s+[A-Z`]|\s*$)", introduction.strip())) <= 7
+    assert 10 <= len([line for line in first[1].splitlines() if line.strip()]) <= 34
     assert all(len(line) <= 100 for block in PYTHON.findall(text) for line in block.splitlines())
     assert all(len(line) <= 120 for line in text.splitlines())
     assert len(PYTHON.findall(text)) == 2

@@ -83,8 +83,7 @@ def test_types_accept_what_runs_and_refuse_what_does_not(tmp_path: Path) -> None
     mistakes = tmp_path / "mistakes.py"
     names = "Listing, Scene, TorqueLaw, case_scene, prepare, read_scene, solve, subset"
     mistakes.write_text(f"import pyharness; from pyharness import {names}{MISTAKES}")
-    script = shutil.copy(SCRIPT, tmp_path)
-    found, text = _mypy(tmp_path, Path(script), mistakes)
+    found, text = _mypy(tmp_path, Path(shutil.copy(SCRIPT, tmp_path)), mistakes)
     lines = mistakes.read_text().splitlines()
     assert found == {("mistakes.py", n) for n in range(2, len(lines) + 1)}, text
 
@@ -111,8 +110,7 @@ def test_what_the_package_shows() -> None:
 def test_doctor_covers_what_the_package_needs() -> None:
     names = {re.split("[^A-Za-z_-]", each)[0] for each in PROJECT["dependencies"]}
     assert names == {"numpy", "scipy", *build.REQUIRED}
-    extras = PROJECT["optional-dependencies"]
-    for extra, needed in extras.items():
+    for extra, needed in PROJECT["optional-dependencies"].items():
         if extra != "peers":
             assert {re.split("[^A-Za-z_-]", each)[0] for each in needed} & set(build.OPTIONAL), (
                 extra
@@ -170,8 +168,7 @@ def test_the_licences_of_others_are_declared() -> None:
     assert ROOT / "LICENSE" in declared
     assert ROOT / "THIRD-PARTY.md" in declared
     notice = (ROOT / "THIRD-PARTY.md").read_text()
-    vendored = tomllib.loads((ROOT / "web/vendor/vendor.toml").read_text())["package"]
-    for each in vendored:
+    for each in tomllib.loads((ROOT / "web/vendor/vendor.toml").read_text())["package"]:
         assert ROOT / "web/vendor" / each["name"] / "LICENSE" in declared
         row = re.search(rf"^.*\b{each['name']} {each['version']} .*$", notice, re.MULTILINE | re.I)
         assert row is not None, each["name"]
@@ -207,8 +204,7 @@ def test_the_citation_is_that_of_the_project() -> None:
     assert citation["keywords"] == PROJECT["keywords"]
     assert citation["authors"] == [{"name": each["name"]} for each in PROJECT["authors"]]
     (thesis,) = citation["references"]
-    readme = " ".join((ROOT / "README.md").read_text().split())
-    assert f"*{thesis['title']}*" in readme
+    assert f"*{thesis['title']}*" in " ".join((ROOT / "README.md").read_text().split())
     assert thesis["year"] == 1982
 
 

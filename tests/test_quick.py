@@ -11,6 +11,7 @@ import pytest
 from tests.changed import campaigns_of
 from tests.changed import changed as changed_since
 from tests.quick import ROOT, Counter, main, nearest, sources
+from tests.tables import tables
 
 TESTS = {
     "tests/engine/test_taylor.py": "from pyharness import solve",
@@ -50,21 +51,7 @@ def test_every_source_has_tests() -> None:
 
 @pytest.mark.campaign
 def test_it_ends_when_the_time_is_up(tmp_path: Path) -> None:
-    cases = [
-        (60.0, "pass", 0, "2 tests passed of 2"),
-        (60.0, "assert False", 1, "1 tests passed of 2"),
-        (2.0, "time.sleep(90)", 0, "1 tests passed of 2"),
-        (
-            2.0,
-            """
-    try: time.sleep(90)
-    except Exception: assert False
-def test_b(): pass""",
-            0,
-            "1 tests passed of 2",
-        ),
-        (-1.0, "pass", 0, "0 tests passed of 2"),
-    ]
+    cases = tables(__file__)["cases"]
     (tmp_path / "test_z.py").write_text("def test_z(): pass\n")
     runs = []
     for number, (seconds, body, _, _) in enumerate(cases):
@@ -113,24 +100,21 @@ def test_a_commit_that_is_none_is_refused(capsys: pytest.CaptureFixture[str]) ->
     assert capsys.readouterr().err.count("\n") == 1
 
 
-@pytest.mark.parametrize(
-    ("paths", "wanted"),
-    [
-        ([], []),
-        (["CHANGELOG.md", "tests/messages.txt"], []),
-        (["pyharness/history/account.py", "web/story/story.js"],
-         ["tests/browser", "tests/edition", "tests/history"]),
-        (["tests/bench/test_terms.py", "tests/browser/screen.py"],
-         ["tests/bench/test_terms.py", "tests/browser"]),
-        (["tests/history/test_gone.py"], []),
-        (["tests/test_words.py", "tests/changed.py"],
-         ["tests/test_quick.py", "tests/test_words.py"]),
-        (["tests/within.py"], ["tests"]),
-        (["pyharness/model/scene.py"], ["tests"]),
-        (["fortran/modern/problem.f90"], ["tests"]),
-        (None, ["tests"]),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("paths", "wanted"), [
+    ([], []),
+    (["CHANGELOG.md", "tests/messages.txt"], []),
+    (["pyharness/history/account.py", "web/story/story.js"],
+     ["tests/browser", "tests/edition", "tests/history"]),
+    (["tests/bench/test_terms.py", "tests/browser/screen.py"],
+     ["tests/bench/test_terms.py", "tests/browser"]),
+    (["tests/history/test_gone.py"], []),
+    (["tests/test_words.py", "tests/changed.py"],
+     ["tests/test_quick.py", "tests/test_words.py"]),
+    (["tests/within.py"], ["tests"]),
+    (["pyharness/model/scene.py"], ["tests"]),
+    (["fortran/modern/problem.f90"], ["tests"]),
+    (None, ["tests"]),
+])  # fmt: skip
 def test_campaigns_of_what_differs(paths: list[str] | None, wanted: list[str]) -> None:
     assert campaigns_of(paths) == wanted
     assert changed_since("no-such-commit") is None

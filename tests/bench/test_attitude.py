@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pyharness import Scene, case_scene
 from pyharness.bench import peers
 from pyharness.bench.contenders import SceneContender, list_own_contenders
 from pyharness.bench.measure import Finding, error_of, workloads
@@ -16,8 +17,6 @@ from pyharness.bench.scores import groups
 from pyharness.checks.compare.candidates import End
 from pyharness.cli.main import main
 from pyharness.model.attitude import IDENTITY, quaternion_rates
-from pyharness.model.scene import Scene
-from pyharness.model.scene_file import case_scene
 from pyharness.truth.reference import Reference, reference
 
 Capture = pytest.CaptureFixture[str]
@@ -118,11 +117,9 @@ def test_loads_are_all_cases_from_the_axes_of_space() -> None:
     assert {load.scene.attitude for load in loads} == {IDENTITY}
     found = groups(Finding(loads, [], [], {}, {}))
     assert {name: [load.label for load in group] for name, group in found.items()} == {
-        "torque, T = 3": ["1", "5", "6", "7"],
-        "torque-free, T = 3": ["2", "3", "4"],
-        "torque, T = 100": ["1L", "5L", "7L"],
-        "torque-free, T = 100": ["2L", "3L", "4L"],
-    }
+        "torque, T = 3": ["1", "5", "6", "7"], "torque-free, T = 3": ["2", "3", "4"],
+        "torque, T = 100": ["1L", "5L", "7L"], "torque-free, T = 100": ["2L", "3L", "4L"],
+    }  # fmt: skip
     assert [load.horizon for load in workloads(6, attitude=True)] == [3.0]
     drawn, bare = random_load("f", 2, attitude=True), random_load("f", 2)
     assert (drawn.truth, drawn.scene) == (None, replace(bare.scene, attitude=IDENTITY))

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pyharness import InputError, Scene, TorqueLaw, case_scene
 from pyharness.bench import measure as bench
 from pyharness.bench.contenders import Maker, SceneContender, list_own_contenders
 from pyharness.bench.measure import (
@@ -31,10 +32,6 @@ from pyharness.bench.scores import Score, groups, means, scores, yardstick
 from pyharness.checks.compare.candidates import End, Ready, not_finite
 from pyharness.cli.main import main
 from pyharness.cli.verbs.bench import chosen
-from pyharness.model.errors import InputError
-from pyharness.model.scene import Scene
-from pyharness.model.scene_file import case_scene
-from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
 from pyharness.truth.reference import reference
 from pyharness.views.render import render
@@ -70,11 +67,9 @@ ROWS = [
     _row(OTHER, "heyoka", 8e-6, 1e-13),
 ]  # fmt: skip
 KNOWN = _finding(
-    ROWS,
-    Refusal(SHORT, "slow", 1e-15, "no tolerance below 2.2e-14"),
-    Refusal(SHORT, "slow", 1e-15, "refused"),
-    Refusal(OTHER, "slow", None, "refused"),
-)
+    ROWS, Refusal(SHORT, "slow", 1e-15, "no tolerance below 2.2e-14"),
+    Refusal(SHORT, "slow", 1e-15, "refused"), Refusal(OTHER, "slow", None, "refused"),
+)  # fmt: skip
 
 
 def test_time_to_an_error_is_that_of_the_fastest_setting_that_reaches_it() -> None:
@@ -279,8 +274,7 @@ def test_a_call_that_never_ends_is_ended(right: Array, monkeypatch: Patch) -> No
             pass
         return End(right)
 
-    endless = SceneContender("endless", "tolerance", _fake(answer), (1e-3, 1e-5))
-    found = measure([SHORT], [endless])
+    found = measure([SHORT], [SceneContender("endless", "tolerance", _fake(answer), (1e-3, 1e-5))])
     assert [row.setting for row in found.rows] == [1e-5]
     assert found.refused == [Refusal(SHORT, "endless", 1e-3, "RuntimeError: ended after 0.05 s")]
 
@@ -302,8 +296,7 @@ def test_source_written_for_numba_is_runge_kutta_of_the_scene(scene: Scene) -> N
     function = compiled_function(steps_source(scene, RK4))
     omega0, omega = np.array(scene.omega), np.empty(3)
     function(omega0, 1.0, 100, omega)
-    ours = prepare(scene, "rk4")(omega0, 1.0)
-    assert omega == pytest.approx(ours, rel=1e-11, abs=1e-11)
+    assert omega == pytest.approx(prepare(scene, "rk4")(omega0, 1.0), rel=1e-11, abs=1e-11)
 
 
 @pytest.mark.external
@@ -316,8 +309,7 @@ def test_peer_solves_every_law(name: str) -> None:
     for scene in (LAWS[4], LAWS[-1]):
         ready = peer.prepare(scene)(2.0, 1000.0 if peer.setting == "steps" else 1e-12)
         for _ in range(2):
-            end = ready.read(ready.run())
-            error: Any = relative_error(end.omega, reference(scene, [2.0]))
+            error: Any = relative_error(ready.read(ready.run()).omega, reference(scene, [2.0]))
             assert error < 1e-10
 
 
@@ -364,8 +356,7 @@ def test_a_package_stands_for_its_contenders() -> None:
 
 @pytest.mark.parametrize("order", [2, 4, 8])
 def test_slopes_stand_where_no_curve_does(order: int) -> None:
-    figure_module = pytest.importorskip("matplotlib.figure")
-    axes = figure_module.Figure().subplots()
+    axes = pytest.importorskip("matplotlib.figure").Figure().subplots()
     count = np.geomspace(50.0, 1e6, 500)
     error = 0.5 * (count / 43.0) ** -float(order)
     axes.loglog(count[error > 1e-15], error[error > 1e-15])

@@ -48,14 +48,12 @@ def test_scenes_are_what_their_kinds_say(loads: list[Workload]) -> None:
         assert not scene.is_impossible
         least, middle, most = sorted(scene.moments)
         known = {
-            "compact": most / least <= 1.5,
-            "flat": 0.95 <= most / (least + middle) <= 1.0,
+            "compact": most / least <= 1.5, "flat": 0.95 <= most / (least + middle) <= 1.0,
             "needle-like": least <= 0.1 * middle,
             "nearly symmetric": min(middle / least, most / middle) <= 1.01,
-            "no torque": law.is_zero,
-            "constant torque": all(law.constant) and not law.varies,
+            "no torque": law.is_zero, "constant torque": all(law.constant) and not law.varies,
             "ramp": all(law.rate) and not any(law.constant),
-        }
+        }  # fmt: skip
         waves = law.sines + law.cosines
         known |= {name: len(waves) == n for name, n in zip(LAWS[3:], (1, 3, 10), strict=True)}
         ratios = [frequency / math.hypot(*scene.omega) for _, frequency in waves]

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pyharness import InputError, Scene, opaque
 from pyharness.bench import ensemble_measure as measuring
 from pyharness.bench import measure as bench
 from pyharness.bench import term_loads
@@ -33,9 +34,6 @@ from pyharness.bench.term_report import Terms, summaries, term_report
 from pyharness.cli.main import main
 from pyharness.engine.system.recorded import slopes_of
 from pyharness.engine.torques.term_file import KINDS
-from pyharness.model.errors import InputError
-from pyharness.model.scene import Scene
-from pyharness.model.state_torque import opaque
 from pyharness.truth.reference import Reference
 from pyharness.views.render import render
 

@@ -11,10 +11,9 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.support.select import Select
 from selenium.webdriver.support.wait import WebDriverWait
 
-from pyharness import case_scene, run_program
+from pyharness import Trajectory, case_scene, run_program
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, subset
-from pyharness.model.trajectory import Trajectory
 from pyharness.thesis.printer import page
 from tests.browser.screen import UNNAMED, WIDTHS, fragment, opening, screen, text_of, too_wide
 
@@ -169,8 +168,7 @@ def _check_rows(rows: list[list[str]], twin: Trajectory, step: int) -> None:
     for row, exact in zip(rows, [*twin.omega[step], *twin.velocity[step]], strict=False):
         assert float(row[1]) == _rounded_as(row[1], exact)
     for _, program, solution, error, *_ in rows[:3]:
-        apart = float(error)
-        assert abs(float(program) - float(solution)) == pytest.approx(apart, rel=0.02)
+        assert abs(float(program) - float(solution)) == pytest.approx(float(error), rel=0.02)
         assert len(program) < 10
 
 
@@ -314,8 +312,7 @@ def test_choices_without_effect_are_last(browser: Chrome, laboratory: Open) -> N
     for program in PROGRAMS:
         laboratory(f"#case=2&program={program}&listing=original")
         _wait(browser, lambda: any(map(any, browser.execute_script(_SWITCHES))))
-        groups = browser.execute_script(_SWITCHES)
-        assert all(idle == sorted(idle) for idle in groups), program
+        assert all(idle == sorted(idle) for idle in browser.execute_script(_SWITCHES)), program
 
 
 @pytest.mark.campaign
@@ -414,8 +411,7 @@ def test_what_is_wrong_stays_until_it_is_mended(browser: Chrome, laboratory: Ope
     program.select_by_visible_text("two-term")
     assert "steps: '100x'" in text_of(browser, "problems")
     assert field.get_property("value") == "100x"
-    step = browser.find_element(By.ID, "step-size")
-    step.send_keys("y", Keys.TAB)
+    browser.find_element(By.ID, "step-size").send_keys("y", Keys.TAB)
     assert "steps: '100x'" in text_of(browser, "problems")
     assert "step-size: '0.01y'" in text_of(browser, "problems")
     # The page has kept the switches of the other program.

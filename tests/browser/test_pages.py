@@ -30,65 +30,8 @@ def addresses(site: Path) -> list[str]:
 
 STYLES = Path(__file__).parents[2] / "web" / "site"
 _CONTRAST = "color-contrast"
-# Mark one element with text for each path of tags, classes and other attributes by which a style
-# may select, and return the paths. Elements of one path have the same colours, in every row of a
-# table and on every page, so that one of them suffices.
-_MARK_ONE_OF_EACH = """
-const [attributes, ids, seen] = arguments;
-const sheets = [...document.styleSheets].map((each) => each.href?.replace(/.*\\//, ""));
-const paths = new Map([[document.documentElement, sheets.join()]]);
-const old = new Set(seen), found = new Set();
-for (const each of document.querySelectorAll("body, body *")) {
-  const own = attributes.map((name) => each.getAttribute(name) ?? "").join("|")
-    + (ids.includes(each.id) ? each.id : "");
-  const path = `${paths.get(each.parentElement) ?? ""}>${each.tagName}|${own}`;
-  paths.set(each, path);
-  const text = [...each.childNodes].some((node) => node.nodeType === 3 && node.data.trim());
-  if (text && !old.has(path) && !found.has(path) && each.checkVisibility()) {
-    found.add(path);
-    each.dataset.sample = "";
-  }
-}
-return [...found];
-"""
-# Remove the elements of <main> whose structure has occurred before, on this page or on an earlier
-# one, and return the structures that are new. A structure is a text: for an element and for all
-# within it the tag, the names of the attributes, the values of those that rules of accessibility
-# read, such as `role`, and whether there is text. The script keeps headings, elements that
-# _MARK_ONE_OF_EACH has marked, and in every table a row of each structure.
-_THIN = """
-const known = new Set(arguments[0]), found = [];
-const telling = /^(class|role|type|scope|tabindex|lang|aria-(?!label|describedby|controls).*)$/;
-const shapes = new Map();
-const shape = (each) => {
-  if (!shapes.has(each)) {
-    const own = [...each.attributes].filter(({ name }) => name !== "data-sample")
-      .map(({ name, value }) =>
-        telling.test(name) ? `${name}=${value}` : name + (value.trim() ? "" : "!"));
-    const text = [...each.childNodes].some((node) => node.nodeType === 3 && node.data.trim());
-    const inside = each.tagName === "math" ? [] : new Set([...each.children].map(shape));
-    shapes.set(each, `${each.tagName} ${own.sort()}${text ? "T" : ""}(${[...inside].sort()})`);
-  }
-  return shapes.get(each);
-};
-const thin = (whole, path, old, note) => {
-  for (const each of [...whole.children]) {
-    const here = `${path}>${shape(each)}`;
-    if (/^H[1-6]$/.test(each.tagName)) continue;
-    const marked = each.matches("[data-sample]") || each.querySelector("[data-sample]");
-    if (old.has(here) && !marked) { each.remove(); continue; }
-    old.add(here);
-    note(here);
-    const below = `${path}>${each.tagName}`;
-    if (/^(DIV|SECTION|ARTICLE|UL|OL|LI|FIGURE)$/.test(each.tagName)) thin(each, below, old, note);
-    else if (/^(TABLE|TBODY)$/.test(each.tagName)) thin(each, below, new Set(), () => {});
-  }
-};
-shape(document.body);
-const main = document.querySelector("main");
-if (main) thin(main, "", known, (each) => found.push(each));
-return found;
-"""
+_MARK_ONE_OF_EACH = "\n" + Path(__file__).with_name("mark.js").read_text()
+_THIN = Path(__file__).with_name("thin.js").read_text()
 
 
 class Examined:
@@ -285,8 +228,7 @@ def test_what_is_wrong_is_found(browser: Chrome, tmp_path: Path) -> None:
 
 def test_a_reader_chooses_dark_or_light(browser: Chrome, site: Path) -> None:
     def paper() -> str:
-        script = "return getComputedStyle(document.body).backgroundColor"
-        return str(browser.execute_script(script))
+        return str(browser.execute_script("return getComputedStyle(document.body).backgroundColor"))
 
     with screen(browser, 1000, "light"):
         browser.get((site / "index.html").as_uri())

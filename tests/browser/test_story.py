@@ -11,10 +11,9 @@ from selenium.webdriver import Chrome, Keys
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.select import Select
 
-from pyharness import case_scene, run_program
+from pyharness import Listing, case_scene, run_program, subset
 from pyharness.edition import story
 from pyharness.edition.decks import TITLES
-from pyharness.model.listing import Listing, subset
 from pyharness.truth.reference import reference
 from tests.browser.screen import click, on_paper, opening, screen, without_scripts
 
@@ -157,19 +156,16 @@ def test_either_fault_can_be_switched_off(browser: Chrome) -> None:
     both = _value(browser, "from-limit")
     Select(browser.find_element(By.ID, "step-size")).select_by_index(3)
     assert _value(browser, "from-limit") < 0.2 * both
-    scene = case_scene(2)
-    finer = replace(scene, step_size=0.01 / 8, steps=800)
+    finer = replace(case_scene(2), step_size=0.01 / 8, steps=800)
     truth = reference(finer, finer.times()).omega[:, 0]
     fixes: list[str] = []
     for fault, slot in (("stage-base", "one-solution"), ("base-not-restored", "none-solution")):
         fixes.append(fault)
         click(browser, f"input[name=fault][value={fault}]")
-        listing = subset("runge-kutta", fix=fixes)
-        run = run_program(finer, listing, "python", may_stop=False)
+        run = run_program(finer, subset("runge-kutta", fix=fixes), "python", may_stop=False)
         expected = np.abs(run.omega[:, 0] - truth).max()
         assert _value(browser, slot) == pytest.approx(expected, rel=1e-9, abs=1e-14)
-        limit = browser.find_element(By.CSS_SELECTOR, "[data-slot=from-limit]")
-        assert not limit.is_displayed()
+        assert not browser.find_element(By.CSS_SELECTOR, "[data-slot=from-limit]").is_displayed()
 
 
 @pytest.mark.campaign

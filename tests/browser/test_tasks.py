@@ -12,8 +12,7 @@ _TOP = "return document.getElementById(arguments[0]).getBoundingClientRect().top
 
 
 def _go(browser: Chrome, entry: str) -> None:
-    menu = browser.find_element(By.CSS_SELECTOR, "header nav")
-    menu.find_element(By.LINK_TEXT, entry).click()
+    browser.find_element(By.CSS_SELECTOR, "header nav").find_element(By.LINK_TEXT, entry).click()
 
 
 def _seen(browser: Chrome, selector: str) -> str:

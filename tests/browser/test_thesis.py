@@ -12,23 +12,8 @@ from pyharness.edition import ledger
 from pyharness.history.ablation import entries
 from tests.browser.screen import errors, on_paper, screen, without_scripts
 
-_OPEN = """
-const [id] = arguments, named = document.getElementById(id);
-const folded = [...(named.matches("details") ? [named] : []), ...named.querySelectorAll("details")];
-const others = [...document.querySelectorAll(".claim, .sentence")].filter((each) => each !== named);
-return {
-  folded: folded.length,
-  open: folded.filter((each) => each.open).length,
-  others: others.filter((each) => each.open || each.querySelector("details[open]")).length,
-  top: named.getBoundingClientRect().top,
-};
-"""
-_BOXES = """
-return arguments[0].map((each) => {
-  const { left, right, top, bottom } = document.querySelector(each).getBoundingClientRect();
-  return { left, right, top, bottom };
-});
-"""
+_OPEN = Path(__file__).with_name("open.js").read_text()
+_BOXES = Path(__file__).with_name("boxes.js").read_text()
 
 
 def _boxes(browser: Chrome, *selectors: str) -> list[dict[str, float]]:
@@ -124,8 +109,7 @@ def test_claims_and_apparatus_are_short(browser: Chrome, site: Path, page: str, 
     printed = browser.execute_cdp_cmd("Page.printToPDF", paper)["data"]
     assert len(re.findall(rb"/Type\s*/Page\b", base64.b64decode(printed))) <= most
     with screen(browser, 360):
-        height = browser.execute_script("return document.documentElement.scrollHeight")
-        assert height < 10000
+        assert browser.execute_script("return document.documentElement.scrollHeight") < 10000
 
 
 @pytest.mark.campaign

@@ -49,13 +49,10 @@ def _with_state(torque: Callable[..., Any]) -> Callable[..., Any]:
 
 _WAVES = [((0.1, 0.2, 0.3), 2.0)]
 TORQUES: dict[str, Any] = {
-    "none": TorqueLaw(),
-    "law": TorqueLaw((0.1, 0.2, -0.1), sines=_WAVES),
-    "law in space": TorqueLaw((0.1, 0.2, -0.1), frame="space"),
-    "linear": linear,
-    "ready": gravity_gradient(MOMENTS, 0.3),
-    "clipped": clipped,
-}
+    "none": TorqueLaw(), "law": TorqueLaw((0.1, 0.2, -0.1), sines=_WAVES),
+    "law in space": TorqueLaw((0.1, 0.2, -0.1), frame="space"), "linear": linear,
+    "ready": gravity_gradient(MOMENTS, 0.3), "clipped": clipped,
+}  # fmt: skip
 BODIES = "moments", "arrays of moments", "matrix", "arrays of matrices"
 
 

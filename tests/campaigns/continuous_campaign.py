@@ -26,18 +26,8 @@ from tests.campaigns.switched_scenes import controlled
 MODULE = "tests.campaigns.continuous_campaign"
 TIMES, _GRID = 300, 900  # random times, and equidistant ones between which roots are counted
 KINDS = (
-    "axis",
-    "axis",
-    "axes",
-    "axes",
-    "own",
-    "own",
-    "law",
-    "state",
-    "sudden",
-    "ready",
-    "switched",
-)
+    "axis", "axis", "axes", "axes", "own", "own", "law", "state", "sudden", "ready", "switched",
+)  # fmt: skip
 MOST_DEGREE = 30
 MOST_GROWTH = 1e6
 _FINEST = 1e-14

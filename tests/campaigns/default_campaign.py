@@ -21,8 +21,7 @@ _GRAVITY = 9.81  # m/s2
 
 def _body(source: Random, size: float = 1.0) -> Triple:
     low, middle = sorted(source.uniform(0.3, 1.0) for _ in range(2))
-    high = source.uniform(middle, 0.99 * (low + middle))
-    return low * size, middle * size, high * size
+    return low * size, middle * size, source.uniform(middle, 0.99 * (low + middle)) * size
 
 
 def _vector(source: Random, size: float) -> Any:
@@ -42,8 +41,7 @@ def _free(source: Random) -> tuple[Scene, float]:
 def _driven(source: Random) -> tuple[Scene, float]:
     wave = _vector(source, 0.3), source.uniform(0.1, 3.0)
     law = TorqueLaw(_vector(source, 0.1), sines=[wave])
-    scene = Scene("", _vector(source, 1.0), _body(source), torque=law)
-    return scene, source.uniform(5.0, 50.0)
+    return Scene("", _vector(source, 1.0), _body(source), torque=law), source.uniform(5.0, 50.0)
 
 
 def _top(source: Random) -> tuple[Scene, float]:
@@ -112,15 +110,9 @@ def _fly_by(source: Random) -> tuple[Scene, float]:
 
 
 KINDS: dict[str, Callable[[Random], tuple[Scene, float]]] = {
-    "free": _free,
-    "driven": _driven,
-    "heavy top": _top,
-    "detumbling": _detumbling,
-    "gravity gradient": _orbiting,
-    "slew": _slew,
-    "wheels": _wheels,
-    "fly-by": _fly_by,
-}
+    "free": _free, "driven": _driven, "heavy top": _top, "detumbling": _detumbling,
+    "gravity gradient": _orbiting, "slew": _slew, "wheels": _wheels, "fly-by": _fly_by,
+}  # fmt: skip
 
 
 def motion(number: int, seed: str) -> tuple[str, Scene, float]:

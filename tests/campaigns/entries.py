@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from pyharness import ChangingInertia, InputError, Scene, prepare, solve, solve_many
+from pyharness import ChangingInertia, InputError, Scene, TorqueLaw, prepare, solve, solve_many
 from pyharness.model.attitude import IDENTITY, angle_between
 from pyharness.model.state_torque import of_law
-from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
 from pyharness.truth.decimal_series import taylor_series
 from pyharness.truth.reference import exact_coefficients
@@ -106,15 +105,13 @@ def results(scene: Scene, times: list[float], tolerance: float) -> Iterator[Resu
         try:
             yield solved(entry, scene, times, tolerance)
         except InputError as refusal:
-            none = np.zeros((0, 3))
-            yield Result(entry, none, None, f"refused: {refusal}", None, None, False)
+            yield Result(entry, np.zeros((0, 3)), None, f"refused: {refusal}", None, None, False)
 
 
 def _rows(entry: str, scene: Scene, times: list[float], tolerance: float) -> Result:
     turning = scene.attitude is not None
     if entry == "trajectory":
-        ready = _ready(scene, tolerance=tolerance, attitude=turning)
-        found = ready.trajectory(scene.omega, times)
+        found = _ready(scene, tolerance=tolerance, attitude=turning).trajectory(scene.omega, times)
     else:
         found = solve(scene, times, entry.split()[1], tolerance, attitude=turning)
     values = found.omega, found.attitude, found.ended, found.error, found.growth

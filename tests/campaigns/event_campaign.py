@@ -64,8 +64,7 @@ def planted(kind: str, rng: np.random.Generator) -> Planted:
         # Pairs of roots at a distance of down to 1e-6 rad.
         gap = 10.0 ** rng.uniform(-6.0, 0.0)
         n = np.arange(-1, int(rate * end / (2.0 * np.pi)) + 3)
-        both = np.array([2.0 * np.pi * n - gap, 2.0 * np.pi * n + gap])
-        angles = np.sort(both.ravel())
+        angles = np.sort(np.array([2.0 * np.pi * n - gap, 2.0 * np.pi * n + gap]).ravel())
         roots = (angles - phase) / rate
         changes = np.where(np.arange(len(roots)) % 2, -1, 1)
         rounding = np.full(len(roots), 8.0 * _EPS * (1.0 + rate * end) / (rate * np.sin(gap)))
@@ -209,8 +208,7 @@ def _of_omega(end: float, rng: np.random.Generator) -> Planted:
         return _of_omega(end, rng)
     # An extremum of omega is flat.
     rounding = np.where(tilt[order] == 0.0, 1e-4, 1e-9) / rate
-    planted = _within(function, end, roots, 0 * order, rounding)
-    return replace(planted, scene=scene)
+    return replace(_within(function, end, roots, 0 * order, rounding), scene=scene)
 
 
 def search(kind: str, seed: int, tally: driver.Tally) -> None:

@@ -117,8 +117,7 @@ def _sign(random: Random, source: str) -> Drawn:
     for axis in range(3):
         if ast.unparse(node).startswith(f"n{axis + 1} + "):
             fault, says = f"gyroscopic-sign-{axis + 1}", f"the sign after n{axis + 1} in slopes"
-    swapped = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.USub: ast.UAdd}
-    node.op = swapped[type(node.op)]()
+    node.op = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.USub: ast.UAdd}[type(node.op)]()
     return Drawn(says, _solve(ast.unparse(tree)), fault)
 
 

@@ -13,20 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.checks.scenes.state_scenes import (
-    READY,
-    STEADY,
-    SUDDEN,
-    TIMED,
-    TURNING,
-    draw,
-    draw_ready,
-)
-from pyharness.engine.many.many import solve_many
+from pyharness import Scene, solve_many
+from pyharness.checks.scenes import state_scenes
 from pyharness.engine.system.leaf_cache import leaves_of
 from pyharness.engine.system.recorded import Step, inputs_of, kernel_tape, system_of, taylor_step
 from pyharness.model.constant_body import with_constant_body
-from pyharness.model.scene import Scene
 from pyharness.model.tape import Tape, slot_values
 from pyharness.model.tape_arrays import ARRAYS
 from pyharness.model.trajectory import Array
@@ -50,9 +41,11 @@ def try_torque(tally: Tally) -> None:
     """Compare the terms of one step."""
     source = Random(f"leaves {tally.seed} {tally.number}")
     if source.random() < 0.3:
-        scene, time = draw_ready(source, READY + TIMED)
+        scene, time = state_scenes.draw_ready(source, state_scenes.READY + state_scenes.TIMED)
     else:
-        scene, time = draw(source, STEADY + TURNING + SUDDEN)
+        scene, time = state_scenes.draw(
+            source, state_scenes.STEADY + state_scenes.TURNING + state_scenes.SUDDEN
+        )
     tape = system_of(with_constant_body(scene))
     address, leaves = leaves_of(tape)
     if not address:

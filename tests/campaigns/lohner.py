@@ -86,8 +86,7 @@ class Euler:
         when = ball(times[0]).union(ball(times[1]))
         series = [[arb(0)] * count for _ in range(3)]
         for i in range(3):
-            linear = [self.constant[i] + self.rate[i] * when, self.rate[i] * h]
-            series[i][:2] = linear[:count]
+            series[i][:2] = [self.constant[i] + self.rate[i] * when, self.rate[i] * h][:count]
         for amplitude, frequency, first in self.waves:
             sine, cosine = (frequency * when).sin_cos()
             derivatives, factor = [sine, cosine, -sine, -cosine], arb(1)

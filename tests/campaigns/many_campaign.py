@@ -115,8 +115,7 @@ def _judge(
     if found.own is not None:
         pairs.append(("states", found.own, one.own, np.abs(path.own).max()))
     for name, ours, theirs, scale in pairs:
-        rows = np.array([ours[row] for row in places])
-        apart = np.abs(rows - theirs).max()
+        apart = np.abs(np.array([ours[row] for row in places]) - theirs).max()
         tally.judge(f"{batch.kind}: {name}", apart / (scale or 1.0), limit, more)
 
 

@@ -31,11 +31,8 @@ _EFFORT = 0.1  # factor on the work limit of a solution
 _PARTS = (0.37, 1.0)  # of the last time
 # Weights of the solutions with twice and once the difference, on both sides: order four.
 _STENCIL = (
-    (-2, Decimal(1) / 12),
-    (-1, Decimal(-8) / 12),
-    (1, Decimal(8) / 12),
-    (2, Decimal(-1) / 12),
-)
+    (-2, Decimal(1) / 12), (-1, Decimal(-8) / 12), (1, Decimal(8) / 12), (2, Decimal(-1) / 12),
+)  # fmt: skip
 
 
 def random_scene(source: Random, kind: str) -> tuple[Scene, float, list[str]]:
@@ -51,8 +48,7 @@ def random_scene(source: Random, kind: str) -> tuple[Scene, float, list[str]]:
     if kind == "free":
         return scene, time, [*names, "torque.constant"]
     if kind == "function":
-        keywords = {name: source.uniform(0.05, 0.5) for name in "abc"}
-        torque: Any = partial(_torque, **keywords)
+        torque: Any = partial(_torque, **{name: source.uniform(0.05, 0.5) for name in "abc"})
         # Towards earlier times omega would grow without bound.
         return (
             replace(scene, torque=torque),
@@ -63,8 +59,7 @@ def random_scene(source: Random, kind: str) -> tuple[Scene, float, list[str]]:
     law = TorqueLaw(_three(source, 0.2), _three(source, 0.02), [wave], [wave], "body")
     names += [f"torque.{name}" for name in ("constant", "rate", "sines", "cosines")]
     if kind == "space":
-        start = _three(source, 1.0)
-        scene = replace(scene, attitude=(1.0, *start))
+        scene = replace(scene, attitude=(1.0, *_three(source, 1.0)))
         return replace(scene, torque=replace(law, frame="space")), time, [*names, "attitude"]
     return replace(scene, torque=law), time, names
 

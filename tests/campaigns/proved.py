@@ -32,12 +32,10 @@ import numpy as np
 
 from docs.campaign.page import DATA, write_page
 from docs.campaign.tally import Run, Tally, command, merged
-from pyharness import ImpossibleBodyWarning, InputError, Scene, solve
+from pyharness import ImpossibleBodyWarning, InputError, Scene, StateTorque, Trajectory, solve
 from pyharness.checks.scenes.random_scenes import draw as draw_law
 from pyharness.checks.scenes.state_scenes import draw as draw_state
 from pyharness.model.attitude import product
-from pyharness.model.state_torque import StateTorque
-from pyharness.model.trajectory import Trajectory
 from pyharness.truth.certificate import prove
 from pyharness.truth.enclosed import Balls, Enclosure, largest_radius
 from pyharness.truth.enclosure import enclose
@@ -56,12 +54,9 @@ _METHODS = {"auto": 1e-14, "taylor": 1e-14, "closed-form": 1e-14, "dop853": 1e-1
 # The part of the scenes in which a slow result is computed if it takes little work, and the work
 # (rad) from which on the part is lower in proportion.
 _SLOW = {
-    "reference": (1.0, 3.0),
-    "precise": (0.05, 3.0),
-    "taylor": (1.0, 10_000.0),
-    "dop853": (0.05, 10.0),
-    "rk45": (0.05, 10.0),
-}
+    "reference": (1.0, 3.0), "precise": (0.05, 3.0), "taylor": (1.0, 10_000.0),
+    "dop853": (0.05, 10.0), "rk45": (0.05, 10.0),
+}  # fmt: skip
 _SLOW_WITH_TORQUE = {"reference": (0.5, 30.0), "precise": (0.5, 30.0)}
 _ALL = 1 / 100  # part of the scenes without torque in which every result is computed
 _ROUNDING, _ANGLE_ROUNDING = 2e-16, 4.5e-16
@@ -160,8 +155,7 @@ def angle(attitude: Sequence[float], balls: Balls) -> float:
     """
     first, *rest = map(Fraction, attitude)
     scalar, *vector = product((first, *(-x for x in rest)), balls.middle)
-    sine = min(1.0, math.sqrt(float(sum(x * x for x in vector))))
-    half = math.asin(sine)
+    half = math.asin(min(1.0, math.sqrt(float(sum(x * x for x in vector)))))
     return 2.0 * (half if scalar > 0 else math.pi - half) + 8.0 * float(balls.radius)
 
 
@@ -272,8 +266,7 @@ def _judge_method(
     # A series takes the amplification from any earlier time, and a closed form from fewer times.
     growth = max(growth, end.growth or 0.0)
     if growth < MOST_GROWTH:
-        walk = math.sqrt(1.0 + end.steps / 1000.0)
-        case.judge(name, error, tolerance + 4e-15 * growth * walk)
+        case.judge(name, error, tolerance + 4e-15 * growth * math.sqrt(1.0 + end.steps / 1000.0))
     if end.error is not None:
         beyond, estimate = max(0.0, error - rounding), max(end.error, rounding)
         case.tally.judge_estimate(case.place, f"{case.group} {name}", beyond, estimate)

@@ -81,8 +81,7 @@ def high(source: Random) -> Case:
     omega = source.choice([(0.0, 0.0, 0.0), (0.0, 0.3, 0.0)])
     scene = Scene("high state", omega, moments=BRICK, states={"x": 0.0},
                   torque=lambda t, w, s: (0.0 * w, {"x": rate(t)}))  # fmt: skip
-    truth = np.array([[*omega, x] for x in rows])
-    return Case(scene, times, truth, max(omega))
+    return Case(scene, times, np.array([[*omega, x] for x in rows]), max(omega))
 
 
 def dragged(source: Random) -> Case:
@@ -139,8 +138,7 @@ def smooth_motion(
     state: Array = np.array(start)
     zones = [(i, side) for i in range(3) for side in (1.0, -1.0)]
     while time < end:
-        inside = [i for i in range(3) if abs(state[i]) < near]
-        if inside:
+        if [i for i in range(3) if abs(state[i]) < near]:
             raise ValueError("two rates are near 0, or one turns there")
         found: Any = solve_ivp(lambda t, w: rates(w), (time, end), state,
                           events=[entered(*zone) for zone in zones], **options)  # fmt: skip

@@ -92,8 +92,7 @@ def try_scene(tally: driver.Tally) -> None:
     _judge(tally, group, (truth, states), found, tolerance, more)
     if found.ended == "complete" and found.growth < 1e6 and tally.number % 3 == 2:
         change = amplified(body, truth, source.randrange(3))
-        unknowns = len(found.y)
-        limit = math.sqrt(found.growth**2 + unknowns - 1)
+        limit = math.sqrt(found.growth**2 + len(found.y) - 1)
         tally.judge("amplification", change, 1.02 * limit, more)
     if not body.states:
         for each in results(scene, times, tolerance):

@@ -86,8 +86,7 @@ def addresses(tapes: list[Tape], place: Path) -> list[int]:
         texts.append(f"const void *const leaves_{number}[9] = {{(void *)expand_{number}}};")
     place.joinpath("terms.c").write_text("\n".join(texts))
     library = place / "terms.so"
-    command = [*compiler(), *_FLAGS, str(place / "terms.c"), "-o", str(library)]
-    subprocess.run(command, check=True)
+    subprocess.run([*compiler(), *_FLAGS, str(place / "terms.c"), "-o", str(library)], check=True)
     loaded = ctypes.CDLL(str(library))
     names = (f"leaves_{number}" for number in range(len(tapes)))
     return [ctypes.addressof(ctypes.c_void_p.in_dll(loaded, name)) for name in names]

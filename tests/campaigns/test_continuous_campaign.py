@@ -38,8 +38,7 @@ def test_the_truth_is_an_integral() -> None:
 def test_polynomials_have_all_degrees() -> None:
     degrees = set()
     for number in range(400):
-        source = Random(f"degree {number}")
-        function = continuous_campaign.polynomial(source, 1.0)
+        function = continuous_campaign.polynomial(Random(f"degree {number}"), 1.0)
         samples = np.abs([function(x) for x in (1e6, 1e7)])
         degrees.add(round(float(np.log10(samples[1] / samples[0]))))
     assert degrees == set(range(continuous_campaign.MOST_DEGREE + 1))

@@ -27,11 +27,9 @@ from tests.exact_tops import exact_coefficients, exact_top
 
 TOP = Scene("symmetric top", omega=(0.1, 1.0, 10.0), moments=(40.0, 40.0, 20.0))
 WAVES = TorqueLaw(
-    (1.0, -2.0, 0.3),
-    (0.1, 0.0, -7.0),
-    sines=[((3.0, 0.0, 1.0), 5.0), ((0.0, 1e-3, 0.0), 100.0)],
+    (1.0, -2.0, 0.3), (0.1, 0.0, -7.0), sines=[((3.0, 0.0, 1.0), 5.0), ((0.0, 1e-3, 0.0), 100.0)],
     cosines=[((0.0, 2.0, -1.0), 0.7)],
-)
+)  # fmt: skip
 
 
 def all_inside(row: Sequence[Any], exact: Sequence[Any]) -> bool:
@@ -76,8 +74,7 @@ def exact_sphere(scene: Scene, time: float) -> list[Any]:
 
 def test_symmetric_top_is_enclosed_without_wrapping() -> None:
     times = [0.0, 0.3, 5.0]
-    rows = enclosure(TOP, times, 20)
-    for time, row in zip(times, rows, strict=True):
+    for time, row in zip(times, enclosure(TOP, times, 20), strict=True):
         assert all_inside(row, exact_symmetric_top(time))
         assert largest_radius(row) < 1e-19
 

@@ -68,5 +68,4 @@ def test_an_unknown_refusal_is_reported(monkeypatch: pytest.MonkeyPatch) -> None
         raise InputError("what nobody wrote down; allowed: nothing")
 
     monkeypatch.setattr(many_campaign, "solve_many", refused)
-    tally = driver.campaign(MODULE, try_batch, 1, "test")
-    assert "what nobody wrote down" in tally.faults[0]
+    assert "what nobody wrote down" in driver.campaign(MODULE, try_batch, 1, "test").faults[0]

@@ -13,8 +13,7 @@ import pytest
 
 from docs.campaign import page as promises
 from docs.campaign.tally import Row, Tally, merged, read
-from pyharness import solve
-from pyharness.model.trajectory import Trajectory
+from pyharness import Trajectory, solve
 from pyharness.truth.enclosed import Balls
 from pyharness.truth.reference import Reference, reference
 from tests.campaigns import proved
@@ -90,8 +89,7 @@ def test_a_planted_fault_is_found(
     # The command that is printed repeats the same scene alone.
     again = shlex.split(tally.broken[0]["command"])
     assert again[:3] == ["python", "-m", "tests.campaigns.proved"]
-    number = int(again[5])
-    alone = proved.campaign(int(again[3]), again[4], number, again[7].split(","))
+    alone = proved.campaign(int(again[3]), again[4], int(again[5]), again[7].split(","))
     same = [each for each in tally.broken if each["command"] == tally.broken[0]["command"]]
     assert alone.broken == same
 

@@ -61,5 +61,4 @@ def test_scenes_have_one_to_three_elements() -> None:
     source = Random("elements")
     for _ in range(20):
         kinds, body = controlled(source)
-        tables = int(body.table is not None)
-        assert len(body.elements) + tables <= 1 + len(kinds.split(" + ")) <= 4
+        assert len(body.elements) + int(body.table is not None) <= 1 + len(kinds.split(" + ")) <= 4

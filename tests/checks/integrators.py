@@ -6,13 +6,12 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import pytest
 from jsonschema import Draft202012Validator
 
 from pyharness.cli.main import main
+from tests.conftest import Capture
 from tests.json_reference import schema_of
 
-Capture = pytest.CaptureFixture[str]
 ROOT = Path(__file__).parent.parent.parent
 FOLDER = ROOT / "docs/how-to/integrator"
 RK4 = FOLDER / "rk4.py"

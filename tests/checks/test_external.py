@@ -70,8 +70,7 @@ def test_a_file_of_the_users_is_read(tmp_path: Path) -> None:
         _read(tmp_path, _GOOD.replace("[body]", "[body"))
     problem = _read(tmp_path, _GOOD)
     assert (problem.name, problem.unit, problem.title) == ("mine", "rad/s", "a top")
-    accuracies = [each and each.accuracy for each in problem.values[0].omega]
-    assert accuracies == [5e-6, None, 5e-6]
+    assert [each and each.accuracy for each in problem.values[0].omega] == [5e-6, None, 5e-6]
     checks = _checks(problem, "reference", "auto")
     assert all(check.passed for check in checks)
     only = "--only external/mine/20/reference"
@@ -293,8 +292,7 @@ def test_published_attitudes_of_the_brick_agree(tmp_path: Path) -> None:
     assert max(check.limit or 0.0 for check in checks) < 1e-7
     # Without the Earth's rotation no attitude would agree.
     bare = Rotation.from_euler("ZYX", _NASA[3][4], degrees=True).as_quat(scalar_first=True)
-    entry = f"attitude = {[f'{each:.9f}' for each in bare]}"
-    wrong = _with_attitudes(tmp_path, [("4", entry)])
+    wrong = _with_attitudes(tmp_path, [("4", f"attitude = {[f'{each:.9f}' for each in bare]}")])
     assert not any(check.passed for check in external_checks([wrong]))
 
 

@@ -36,6 +36,7 @@ from tests.checks.integrators import (
     written,
 )  # fmt: skip
 from tests.ports import documented_command
+from tests.tables import tables
 
 
 def _faults(record: Any) -> set[str]:
@@ -88,33 +89,7 @@ def test_a_higher_order_than_it_has_is_refused(capsys: Capture) -> None:
 
 
 # Changes of a line of the example, and the fault that has to be named.
-MISTAKES = (
-    ("(n1 + (i2 - i3) * y_ * z) / i1", "n1 / i1", "unknown"),
-    ("(n1 + (i2 - i3) * y_ * z) / i1|(n2 + (i3 - i1) * z * x) / i2|(n3 + (i1 - i2) * x * y_) / i3",
-     "n1 / i1|n2 / i2|n3 / i3", "gyroscopic-missing"),
-    ("(i2 - i3)|(i3 - i1)|(i1 - i2)", "(i3 - i2)|(i1 - i3)|(i2 - i1)", "gyroscopic-sign"),
-    ("[y[3:] for y in rows]", "[[y[3], -y[4], -y[5], -y[6]] for y in rows]",
-     "quaternion-transposed"),
-    ("[y[3:] for y in rows]", "[y[4:] + y[3:4] for y in rows]", "scalar-last"),
-    ("c * z - d * y_|d * x - b * z|b * y_ - c * x", "d * y_ - c * z|b * z - d * x|c * x - b * y_",
-     "attitude-frame"),
-    ("        0.5 * (", "        (", "attitude-rate"),
-    ('asked["omega"] + asked["attitude"]', 'asked["omega"] + [1.0, 0.0, 0.0, 0.0]',
-     "attitude-from-identity"),
-    ('(i1, i2, i3), (n1', '(i2, i1, i3), (n1', "moments-213"),
-    ('torque(asked["torque"], t)', 'torque(asked["torque"], 0.0)', "torque-frozen"),
-    ('torque(asked["torque"], t)', "(0.0, 0.0, 0.0)", "torque-missing"),
-    ("c + r * t", "c", "torque-rate-missing"),
-    ("(n1 +|(n2 +|(n3 +", "(n1 * i1 +|(n2 * i2 +|(n3 * i3 +", "torque-undivided"),
-    ("while n < round(time / h)", "while n < round(time / h) - 1", "step-late"),
-    ("step(asked, n * h, y, h)", "step(asked, n * h / 2, y, h / 2)", "half-speed"),
-    ("step(asked, n * h, y, h)", "[a + h * k for a, k in zip(y, slopes(asked, n * h, y))]",
-     "first-order"),
-    ("slopes(asked, t + h / 2,|slopes(asked, t + h,", "slopes(asked, t,|slopes(asked, t,",
-     "torque-held"),
-    ("[a + h / 2 * k for a, k in zip(y, k2)]",
-     "[a + h / 2 * (k + l) for a, k, l in zip(y, k1, k2)]", "first-order"),
-)  # fmt: skip
+MISTAKES = tables(__file__)["mistakes"]
 
 
 @pytest.mark.campaign
@@ -126,8 +101,7 @@ def test_a_mistake_in_the_source_is_named(
     remark = fault in FIRST_ORDER
     # Without a scene without torque, the long motion is left out.
     words = (command, "--seed", "mistake", "--cell")
-    record = json_of(capsys, *words, "constant-0,wave-0", status=int(not remark))
-    assert _faults(record) == {fault}
+    assert _faults(json_of(capsys, *words, "constant-0,wave-0", status=int(not remark))) == {fault}
     if remark:
         json_of(capsys, *words, "wave-0", "--order", "4", status=1)
 
@@ -273,26 +247,7 @@ def test_a_missing_attitude_in_some_answers_is_invalid() -> None:
 
 
 # A body of an answer in Python, and words of the one line that the checks report.
-ANSWERS = (
-    ("print('x', flush=True)", "no JSON"),
-    ("print('[]', flush=True)", "a list where an object belongs"),
-    ("print('{}', flush=True)", "no 'omega'; an answer has omega and attitude, or refused"),
-    ("print('{\"omega\": [], \"omega\": []}', flush=True)", 'the key "omega" occurs twice'),
-    ("print(json.dumps({'omega': [[math.nan] * 3] * 6}), flush=True)", "NaN is not JSON; write"),
-    ("print('{\"omega\": [[-Infinity, 0, 0]]}', flush=True)", "-Infinity is not JSON"),
-    ("print('{\"omega\": []}', flush=True)", "omega has 0 rows; 6 times were requested"),
-    ("print(json.dumps({'omega': [[1, 2]] * 6}), flush=True)", "omega, row 1 has 2 numbers"),
-    ("print(json.dumps({'omega': [[1, 2, 'x']] * 6}), flush=True)", "no number of binary64"),
-    ("print(json.dumps({'omega': [[1, 2, None]] * 6}), flush=True)", "where a number belongs"),
-    ("print(json.dumps({'omega': [[1, 2, 3]] * 6, 'attitude': [[0] * 4] * 6}), flush=True)",
-     "attitude, row 1: all four numbers are 0"),
-    ("print(json.dumps({'omega': [[1, 2, 3]] * 6, 'control': 'x'}), flush=True)",
-     "control is \"x\"; allowed: step_size, tolerance"),
-    ("print(json.dumps({'omega': [[1, 2, 3]] * 6, 'precision': 16}), flush=True)",
-     "precision is 16; allowed: binary64, binary32"),
-    ("print(json.dumps({'refused': ''}), flush=True)", "refused is no text"),
-    ("raise ValueError('lost')", "lost"),
-)  # fmt: skip
+ANSWERS = tables(__file__)["answers"]
 
 
 @pytest.mark.sampled
@@ -301,8 +256,7 @@ def test_an_invalid_answer_is_a_line(
     body: str, message: str, tmp_path: Path, capsys: Capture
 ) -> None:
     command = written(tmp_path, f"import json, math, sys\nfor line in sys.stdin:\n    {body}\n")
-    record = json_of(capsys, command, "--draws", "1", status=1)
-    (check,) = record["checks"]
+    (check,) = json_of(capsys, command, "--draws", "1", status=1)["checks"]
     assert check["id"] == "integrator/free-0"
     assert message in check["note"]
     assert "\n" not in check["note"]
@@ -411,11 +365,9 @@ def test_orders_of_synthetic_errors() -> None:
     steps = [0.5**k for k in range(6)]
     third = convergence("omega", steps, [h**3 for h in steps], 1e-9, False)
     assert third.order == pytest.approx(3.0)
-    stuck = convergence("omega", steps, [max(h**3, 1e-3) for h in steps], 1e-9, False)
-    assert stuck.order == 0.0
+    assert convergence("omega", steps, [max(h**3, 1e-3) for h in steps], 1e-9, False).order == 0.0
     assert convergence("omega", steps, [1e-15] * 6, 1e-12, False).order is None
-    lost = convergence("omega", steps, [math.inf] * 6, 1e-12, False)
-    assert lost.order == 0.0
+    assert convergence("omega", steps, [math.inf] * 6, 1e-12, False).order == 0.0
     late = convergence("omega", steps, [math.inf, math.inf, *[h**2 for h in steps[2:]]], 1e-9, True)
     assert late.order == pytest.approx(2.0)
     tolerances = [10.0**-k for k in range(3, 9)]
@@ -434,8 +386,7 @@ def test_growth_of_synthetic_drifts() -> None:
 
 
 def test_a_request_has_what_the_guide_says() -> None:
-    scene = draw_moderate("request", "wave", 0)
-    asked = json.loads(request(scene, [1.0, 2.0], 0.5, 1e-6))
+    asked = json.loads(request(draw_moderate("request", "wave", 0), [1.0, 2.0], 0.5, 1e-6))
     guide = (ROOT / "docs/how-to/integrators.md").read_text()
     for field in asked:
         assert f"| `{field}` |" in guide
@@ -468,5 +419,4 @@ def test_other_integrators(package: str, words: str, faults: set[str], capsys: C
     pytest.importorskip(package)
     name, *rest = words.split()
     command = shlex.join([sys.executable, str(FOLDER / name), *rest])
-    record = json_of(capsys, command, "--draws", "1", "--seed", "others")
-    assert _faults(record) == faults
+    assert _faults(json_of(capsys, command, "--draws", "1", "--seed", "others")) == faults

@@ -67,8 +67,7 @@ def test_the_covered_ranges_are_those_of_the_requests(
         ("\nfor line in sys.stdin:", LOGGING),
         ("json.dumps(answer)", f"json.dumps(answer | {{'control': '{control}'}})"),
     )
-    record = json_of(capsys, command, *words)
-    ranges, logged = record["covered"], _logged(tmp_path / "log")
+    ranges, logged = json_of(capsys, command, *words)["covered"], _logged(tmp_path / "log")
     other = {"step_size": "tolerance", "tolerance": "step_size"}[control]
     assert ranges.pop(other) is None
     assert logged.pop(other)
@@ -88,8 +87,7 @@ def test_what_was_refused_is_not_covered() -> None:
         return {"omega": solve(asked)["omega"]} if free else {"refused": "a torque"}
 
     solve = next(right("refused")).solve
-    found = campaign.judged(Drawn("", only_free, ""), problems("refused", 1))
-    ranges: Any = covered(found.tried)
+    ranges: Any = covered(campaign.judged(Drawn("", only_free, ""), problems("refused", 1)).tried)
     assert ranges.torques == ("none",)
     assert ranges.torque_duration is None
     assert not ranges.attitude

@@ -18,6 +18,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from pyharness import InputError, Scene, TorqueLaw, Trajectory, solve
 from pyharness.checks import cells as verify_programs
 from pyharness.checks.check import BITS, DRAWS, RECORD, Check, Name, Selection, selected
 from pyharness.checks.compare.orders import Order, State
@@ -30,21 +31,15 @@ from pyharness.checks.plants.plants import PLANTS
 from pyharness.checks.random_methods import may_refuse, truth_of
 from pyharness.checks.scenes.random_scenes import draw, weekly_seed
 from pyharness.cli.main import main
-from pyharness.engine.plan.registry import METHODS
-from pyharness.engine.solve import solve
 from pyharness.engine.system import kernel_input as problem
-from pyharness.model.errors import InputError
+from pyharness.engine.plan.registry import METHODS
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
-from pyharness.model.scene import Scene
-from pyharness.model.torque_law import TorqueLaw
-from pyharness.model.trajectory import Trajectory
 from pyharness.thesis import compiled
 from pyharness.thesis.cells import all_cells, cell_name
 from pyharness.thesis.programs import PROGRAM_REGISTRY, Program
-from tests.conftest import ResultOf
+from tests.conftest import Capture, ResultOf
 
-Capture = pytest.CaptureFixture[str]
 BY_NAME = {plant.name: plant for plant in PLANTS}
 ONE_BIT = BY_NAME["ulp-in-fortran"]
 
@@ -80,8 +75,7 @@ def test_selection_is_by_whole_parts() -> None:
 
 @pytest.mark.campaign
 def test_json_is_as_agreed(capsys: Capture) -> None:
-    only = "cells/two-term/case-3,orders/rk4"
-    assert main(["verify", "--format", "json", "--only", only]) == 0
+    assert main(["verify", "--format", "json", "--only", "cells/two-term/case-3,orders/rk4"]) == 0
     record = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
     assert (record["schema"], record["passed"], record["seed"]) == (1, True, weekly_seed())
     assert {"id", "passed", "value", "limit", "basis", "replay"} <= set(record["checks"][0])
@@ -147,8 +141,7 @@ def test_seed_changes_weekly_and_is_printed(capsys: Capture) -> None:
 
 @pytest.mark.parametrize(("seed", "draws"), [("a b", 3), ("", 3), ("$(x)", DRAWS + 1)])
 def test_replay_of_a_draw_is_read_by_the_shell_as_it_was_given(seed: str, draws: int) -> None:
-    chosen = Selection(only=[f"random/{draws - 1}/program"], seed=seed, draws=draws)
-    [check] = verify(chosen)
+    [check] = verify(Selection(only=[f"random/{draws - 1}/program"], seed=seed, draws=draws))
     words = shlex.split(check.replay)
     assert words[words.index("--seed") + 1] == seed
     # An option with its default value is not repeated.
@@ -278,8 +271,7 @@ def test_no_record_is_said(tmp_path: Path, capsys: Capture) -> None:
 @pytest.mark.parametrize("name", ["sign-in-both", "stale-solver"])
 def test_plant_is_caught_by_more_than_the_record(name: str) -> None:
     plant = BY_NAME[name]
-    chosen = Selection(seed="fixed", draws=12, thin=True, only=plant.kinds)
-    found = plants.outcome(plant, chosen)
+    found = plants.outcome(plant, Selection(seed="fixed", draws=12, thin=True, only=plant.kinds))
     assert found.passed
     assert "(golden" not in found.note
 
@@ -377,8 +369,7 @@ def test_in_a_plain_scene_only_few_may_refuse(
     drawn = draw("x", 0)
     truth = truth_of(drawn)
     truth = replace(truth, flow=replace(truth.flow, amplification=growth))
-    tried = MethodRun(method, tolerance, drawn.scene, Answer)
-    assert may_refuse(tried, truth, why) == may
+    assert may_refuse(MethodRun(method, tolerance, drawn.scene, Answer), truth, why) == may
 
 
 def test_error_is_relative_to_the_largest_omega_on_the_way() -> None:

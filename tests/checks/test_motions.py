@@ -22,8 +22,7 @@ def test_the_axial_top_is_the_reference() -> None:
     scene = Scene("", (1.0, 2.0, 3.0), moments=(40.0, 40.0, 20.0), torque=law)
     times = [0.3, 2.0]
     truth = reference(scene, times, precise=True)
-    found = brouwer.floats(axial_top(scene, times))
-    assert np.abs(found - truth.omega).max() <= 2.0 * truth.error
+    assert np.abs(brouwer.floats(axial_top(scene, times)) - truth.omega).max() <= 2.0 * truth.error
 
 
 @pytest.mark.campaign
@@ -84,5 +83,4 @@ def test_a_buffer_that_threads_share_is_found(shared: bool) -> None:
 
         return threads.Job("planted", threads.SCENES[0], call)
 
-    differing = threads.different([job(number) for number in range(8)], repeats=2)
-    assert bool(differing) == shared
+    assert bool(threads.different([job(number) for number in range(8)], repeats=2)) == shared

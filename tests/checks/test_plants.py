@@ -6,18 +6,15 @@ from functools import cache
 import numpy as np
 import pytest
 
+from pyharness import case_scene, prepare, run_program, solve
 from pyharness.checks.check import Selection
 from pyharness.checks.compare.agreement import differences
 from pyharness.checks.compare.orders import measured_order
 from pyharness.checks.kinds import verify
 from pyharness.checks.plants.faults import TWIN_FAULTS, twin
 from pyharness.checks.plants.plants import PLANTS, Plant
-from pyharness.engine.prepared.solver import prepare
-from pyharness.engine.solve import solve
 from pyharness.model.listing import PROGRAMS, Listing
-from pyharness.model.scene_file import case_scene
 from pyharness.thesis import compiled
-from pyharness.thesis.programs import run_program
 from pyharness.truth.reference import Reference, reference
 
 # Enough steps for the measured orders to settle.
@@ -35,14 +32,11 @@ def _seen_by(*comparisons: str) -> list[tuple[str, str]]:
 
 
 @pytest.mark.bitwise
-@pytest.mark.parametrize(
-    ("name", "program", "is_planted"),
-    [
-        *((*each, True) for each in _seen_by("bits", "truth")),
-        # The control: the same machinery without a fault raises no alarm.
-        ("sign", "two-term", False), ("axis", "four-term", False), ("step", "runge-kutta", False),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("name", "program", "is_planted"), [
+    *((*each, True) for each in _seen_by("bits", "truth")),
+    # The control: the same machinery without a fault raises no alarm.
+    ("sign", "two-term", False), ("axis", "four-term", False), ("step", "runge-kutta", False),
+])  # fmt: skip
 def test_fault_in_a_twin_is_caught(name: str, program: str, is_planted: bool) -> None:
     """The bits show every fault; the truth shows those that are larger than rounding."""
     fault, listing = TWIN_FAULTS[name], Listing.corrected(program)

@@ -23,10 +23,8 @@ from pyharness.cli.main import main
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene_file import case_numbers
 from pyharness.thesis.cells import all_cells
-from tests.conftest import ResultOf
+from tests.conftest import Capture, ResultOf
 from tests.ports import ROOT, SAMPLE, WEB, answering, documented, node, sample
-
-Capture = pytest.CaptureFixture[str]
 
 
 def _python(path: Path, text: str) -> str:
@@ -86,8 +84,7 @@ STOP = {"step": 2, "variable": "V2", "quotient": "inf"}
 
 
 def test_numbers_are_read_in_every_form() -> None:
-    answer = read_answer(json.dumps(FINE).encode(), 2)
-    first = answer.rows[0]
+    first = read_answer(json.dumps(FINE).encode(), 2).rows[0]
     assert first[:3].tolist() == [0.01, 1.0, 3.0]
     assert math.copysign(1.0, first[3]) == -1.0
     assert math.isinf(first[4])
@@ -125,17 +122,14 @@ def test_what_is_no_answer_is_told_in_a_line(change: dict[str, Any], words: str)
         read_answer(json.dumps({**FINE, **change}).encode(), 2)
 
 
-@pytest.mark.parametrize(
-    ("line", "words"),
-    [
-        (b"step 1", "no JSON: 'step 1'"), (b"", "no JSON: ''"), (b"\xff\x00", "no JSON: "),
-        (b"[" * 100_000, "no JSON: "), (b"3", "a whole number where an object belongs"),
-        (b"9" * 5000, "no JSON: "), (b'{"rows": []}', "no 'ended'; an answer has rows"),
-        (b'{"rows": [], "ended": "complete", "rows": [[]]}', 'the key "rows" occurs twice'),
-        (b'{"stop": {"step": 1, "step": 2}}', 'the key "step" occurs twice'),
-        (b'{"rows": [[NaN]]}', "NaN is not JSON"), (b"[-Infinity]", "-Infinity is not JSON"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("line", "words"), [
+    (b"step 1", "no JSON: 'step 1'"), (b"", "no JSON: ''"), (b"\xff\x00", "no JSON: "),
+    (b"[" * 100_000, "no JSON: "), (b"3", "a whole number where an object belongs"),
+    (b"9" * 5000, "no JSON: "), (b'{"rows": []}', "no 'ended'; an answer has rows"),
+    (b'{"rows": [], "ended": "complete", "rows": [[]]}', 'the key "rows" occurs twice'),
+    (b'{"stop": {"step": 1, "step": 2}}', 'the key "step" occurs twice'),
+    (b'{"rows": [[NaN]]}', "NaN is not JSON"), (b"[-Infinity]", "-Infinity is not JSON"),
+])  # fmt: skip
 def test_what_is_no_object_is_told_in_a_line(line: bytes, words: str) -> None:
     with pytest.raises(PortError, match=re.escape(words)) as caught:
         read_answer(line, 2)

@@ -8,16 +8,16 @@ from pathlib import Path
 import pytest
 from mpmath import mp
 
-from pyharness import run_program
+from pyharness import Scene, run_program
 from pyharness.checks.port import differences, port
 from pyharness.checks.port_process import PortProcess
 from pyharness.checks.port_protocol import ENDINGS, read_answer, request
 from pyharness.checks.scenes.random_scenes import draw
 from pyharness.model.listing import PROGRAMS, Listing
-from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw, Wave
 from pyharness.thesis.linear_solver import leqt1f
 from tests.ports import WEB, node, run_javascript, sample, with_fault
+from tests.tables import tables
 
 
 @pytest.mark.campaign
@@ -61,26 +61,7 @@ def test_a_torque_of_waves_alone_acts(program: str, waves: str) -> None:
 
 
 # File, passage, faulty passage, and the programs in which the fault shows.
-FAULTS = {
-    "the control": ("equations.js", "m[0] + a *", "m[0] + a *", ""),
-    "a sign": ("equations.js", "m[2] + c * u[0]", "m[2] - c * u[0]", "two-term four-term"),
-    "another order": (
-        "runge-kutta.js", "2 * (slope[2][i] + slope[3][i])", "2 * slope[2][i] + 2 * slope[3][i]",
-        "runge-kutta",
-    ),
-    "the points of the stop test": (
-        "runge-kutta.js", "distances(result, base)", "distances(result, firstPoint)", "runge-kutta",
-    ),
-    "a defect forgotten": ("two-term.js", '"c1-for-c"', '"no-such"', "two-term"),
-    "a point of collocation": ("four-term.js", "dt * 0.6", "dt * 0.60000001", "four-term"),
-    "a multiplier": (
-        "linear-solver.js", "a[i][j] / a[j][j]", "a[i][j] * (1 / a[j][j])", "four-term",
-    ),
-    "IER": ("linear-solver.js", "b)), 0]", "b)), 1]", "two-term four-term"),
-    "sine": (
-        "circular.js", "turned(x, 0)", "turned(x, 0) * 1.001", "two-term four-term runge-kutta",
-    ),
-}  # fmt: skip
+FAULTS = tables(__file__)["faults"]
 
 
 @pytest.mark.sampled
@@ -118,7 +99,6 @@ def test_the_linear_solver_of_the_javascript_has_the_twins_bits() -> None:
         systems.append([matrix, [[source.gauss(0.0, 1.0) for _ in range(n)] for _ in range(2)]])
     systems.append([[[1.0, 2.0], [2.0, 4.0]], [[1.0, 1.0]]])
     body = "return systems.map(([a, b]) => solver.leqt1f(a, b))"
-    modules = {"solver": WEB / "programs/linear-solver.js"}
-    found = run_javascript(modules, body, systems=systems)
+    found = run_javascript({"solver": WEB / "programs/linear-solver.js"}, body, systems=systems)
     wanted = [[[list(column) for column in x], ier] for x, ier in (leqt1f(*s) for s in systems)]
     assert found == wanted

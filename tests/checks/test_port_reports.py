@@ -122,8 +122,7 @@ def test_a_wrong_port_fails_the_control(tmp_path: Path, capsys: Capture) -> None
     (failed,) = (each["id"] for each in record["checks"] if not each["passed"])
     assert failed == "self-test/none"
     assert main(["verify", "--port", documented_command(), "--self-test", "--cell", CELL]) == 0
-    printed = capsys.readouterr().out
-    assert printed.endswith("without effect\n")
+    assert capsys.readouterr().out.endswith("without effect\n")
     assert main(["verify", "--port", "false", "--self-test", "--cell", CELL]) == 1
     assert "FAILED none: no fault: nothing may fail" in capsys.readouterr().out
 
@@ -136,8 +135,7 @@ def test_a_check_that_sees_nothing_would_fail_the_self_test(monkeypatch: Patch) 
         run = run_program(cell.scene, cell.listing)
         columns = run.recorded_time, *run.omega.T, *run.velocity.T  # type: ignore[union-attr]
         rows = [[float(x).hex() for x in row] for row in zip(*columns, strict=True)]
-        right = {**json.loads(line), "rows": rows}
-        return compared(cell, twin, json.dumps(right).encode(), *rest)
+        return compared(cell, twin, json.dumps({**json.loads(line), "rows": rows}).encode(), *rest)
 
     monkeypatch.setattr("pyharness.checks.plants.port_plants.compared", blind)
     cells = port_cells(["two-term"], [2], [CELL])
@@ -198,8 +196,7 @@ def test_a_wrong_end_alone_is_told_without_a_false_comparison(
 ) -> None:
     """Regression test: with equal rows, the line said ``0 > 0``."""
     ending = "import types; run = types.SimpleNamespace(ended='overflow', stop=None, ier=run.ier)"
-    command = answering(tmp_path / "port.py", ending)
-    assert main(["verify", "--port", command, "--cell", CELL]) == 1
+    assert main(["verify", "--port", answering(tmp_path / "port.py", ending), "--cell", CELL]) == 1
     assert f"FAILED port/{CELL} 0, limit 0 (derived; ended: overflow" in capsys.readouterr().out
 
 

@@ -87,8 +87,7 @@ def test_fault_is_seen(trial: str) -> None:
 def test_a_restarted_scene_has_the_torque_of_later_times() -> None:
     sines, cosines = [((1.0, 2.0, 3.0), 1.5)], [((0.3, -0.2, 0.5), 0.7)]
     law = TorqueLaw((0.1, 0.2, 0.3), (0.4, -0.5, 0.6), sines, cosines)
-    scene = Scene("", (0.2, 1.0, -0.3), moments=MOMENTS, torque=law)
-    later = restarted_at(scene, np.ones(3), 2.0)
+    later = restarted_at(Scene("", (0.2, 1.0, -0.3), moments=MOMENTS, torque=law), np.ones(3), 2.0)
     moved: Any = later.torque
     assert (later.omega, later.moments) == ((1.0, 1.0, 1.0), MOMENTS)
     for time in (0.0, 0.7, -1.3):

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pyharness import Listing, case_scene
 from pyharness.checks.stress_report import regions_picture
 from pyharness.checks.theory import collocation_matrices
 from pyharness.checks.theory.amplification import (
@@ -21,8 +22,6 @@ from pyharness.checks.theory.schemes import SCHEMES, TERMS, Numbers, Series, loc
 from pyharness.checks.theory.step_errors import Forecaster, path
 from pyharness.cli.main import main
 from pyharness.engine.plan.registry import FIXED_STEP
-from pyharness.model.listing import Listing
-from pyharness.model.scene_file import case_scene
 from pyharness.thesis import collocation
 from pyharness.thesis.linear_solver import leqt1f
 from pyharness.views.pictures import saved
@@ -180,7 +179,6 @@ def test_linear_theory_does_not_see_the_moved_points() -> None:
 
 
 def test_growth_that_rounding_alone_makes_is_none() -> None:
-    found = {each.name: each.growth for each in regions().regions}
-    growth = found["runge-kutta corrected, rk4"]
+    growth = {each.name: each.growth for each in regions().regions}["runge-kutta corrected, rk4"]
     assert (growth[:40] == 0.0).all()
     assert (abs(growth[growth != 0.0]) > 1e-13).all()

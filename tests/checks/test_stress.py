@@ -12,16 +12,13 @@ from xml.etree import ElementTree as xml
 import numpy as np
 import pytest
 
+from pyharness import Scene, Trajectory, read_scene, solve
 from pyharness.checks import hold as truth
 from pyharness.checks.check import BITS, Check, Name
 from pyharness.checks.compare.candidates import End
 from pyharness.checks.scenes.extreme import EXTREMES, in_steps
 from pyharness.checks.stress import named, stress, worst
 from pyharness.cli.main import main
-from pyharness.engine.solve import solve
-from pyharness.engine.torques.scene_reader import read_scene
-from pyharness.model.scene import Scene
-from pyharness.model.trajectory import Trajectory
 from pyharness.thesis.programs import PROGRAM_REGISTRY
 from tests.checks.stressed import checks_of, failed
 from tests.conftest import Capture, Patch
@@ -101,8 +98,7 @@ def test_the_worst_is_the_nearest_to_its_limit_or_failed() -> None:
 
 
 def _run(capsys: Capture, *arguments: str) -> tuple[int, str]:
-    code = main(["stress", *arguments])
-    return code, capsys.readouterr().out
+    return main(["stress", *arguments]), capsys.readouterr().out
 
 
 @pytest.mark.campaign
@@ -217,16 +213,13 @@ def figures(monkeypatch: Patch) -> list[Any]:
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize(
-    ("only", "key"),
-    [
-        # Programs have their own markers, and a long name is placed above the kinds of disturbance.
-        ("separatrix/improved-euler,separatrix/gauss-1,separatrix/two-term",
-         "coarse error,coarse drift,steps error,steps drift,original,corrected,no setting"),
-        # Four bodies each, with names as long as impossible-three.
-        ("shapes/closed-form", "fine error,fine drift"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("only", "key"), [
+    # Programs have their own markers, and a long name is placed above the kinds of disturbance.
+    ("separatrix/improved-euler,separatrix/gauss-1,separatrix/two-term",
+     "coarse error,coarse drift,steps error,steps drift,original,corrected,no setting"),
+    # Four bodies each, with names as long as impossible-three.
+    ("shapes/closed-form", "fine error,fine drift"),
+])  # fmt: skip
 def test_picture_shows_what_its_numbers_say_and_no_title_meets_another(
     only: str, key: str, figures: list[Any], capsys: Capture, tmp_path: Path
 ) -> None:

@@ -10,13 +10,7 @@ import pytest
 
 from pyharness import InputError
 from pyharness.checks import golden
-from pyharness.cli.output import (
-    check_folder,
-    check_replaceable,
-    check_tree,
-    write_folder,
-    write_tree,
-)
+from pyharness.cli import output
 from pyharness.edition.report import MARK
 from pyharness.model.output_files import check_inside
 from tests.refused import refused
@@ -40,14 +34,10 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 # The targets of links, by path in the foreign folder.
 LINKS: dict[str, dict[str, str]] = {
-    "file": {"b": "/mine"},
-    "relative": {"b": "../outside/mine"},
-    "dangling": {"b": "/none"},
-    "twice": {"b": "second", "second": "/mine"},
-    "through a folder": {"b": "sub/mine", "sub": "/"},
-    "folder": {"b": "/"},
-    "loop": {"b": "b"},
-}
+    "file": {"b": "/mine"}, "relative": {"b": "../outside/mine"}, "dangling": {"b": "/none"},
+    "twice": {"b": "second", "second": "/mine"}, "through a folder": {"b": "sub/mine", "sub": "/"},
+    "folder": {"b": "/"}, "loop": {"b": "b"},
+}  # fmt: skip
 
 
 def link(foreign: Path, outside: Path, kind: str) -> None:
@@ -63,9 +53,9 @@ def test_files_in_a_folder_are_not_written_elsewhere(
     link(foreign, outside, kind)
     refused = partial(pytest.raises, InputError, match=f"^--out '{foreign}': 'b' leads out of it, ")
     with refused():
-        check_folder(str(foreign), iter(NEW), "--out")
+        output.check_folder(str(foreign), iter(NEW), "--out")
     with refused():
-        write_folder(str(foreign), NEW, "--out")
+        output.write_folder(str(foreign), NEW, "--out")
     assert contents(outside) == {"mine": b"mine"}
     assert not (foreign / "a").exists()
 
@@ -75,8 +65,8 @@ def test_files_that_are_linked_within_the_folder_are_written(outside: Path, tmp_
     (foreign / "a").symlink_to("target")
     os.link(outside / "mine", foreign / "b")
     (tmp_path / "link").symlink_to(foreign)
-    check_folder(str(tmp_path / "link"), NEW, "--out")
-    write_folder(str(tmp_path / "link"), NEW, "--out")
+    output.check_folder(str(tmp_path / "link"), NEW, "--out")
+    output.write_folder(str(tmp_path / "link"), NEW, "--out")
     assert contents(foreign) == {**NEW, "target": NEW["a"]}
     assert contents(outside) == {"mine": b"mine"}
 
@@ -103,10 +93,9 @@ def test_a_tree_that_is_made_anew_removes_links_alone(
     else:
         link(foreign, outside, kind)
     listed = ["b", "second", "sub", "b/mine", "sub/mine", "../outside/mine", str(outside / "mine")]
-    mark = {"schema": 1, "files": dict.fromkeys(listed, 1)}
-    (foreign / MARK).write_text(json.dumps(mark))
-    check_tree(str(foreign), MARK, "--out")
-    write_tree(str(foreign), NEW, "--out")
+    (foreign / MARK).write_text(json.dumps({"schema": 1, "files": dict.fromkeys(listed, 1)}))
+    output.check_tree(str(foreign), MARK, "--out")
+    output.write_tree(str(foreign), NEW, "--out")
     assert contents(foreign) == NEW
     assert contents(outside) == {"mine": b"mine"}
     assert {path.name for path in tmp_path.iterdir()} == {"foreign", "outside"}
@@ -119,8 +108,8 @@ def test_a_golden_record_that_is_made_anew_removes_links_alone(
     (outside / "mine").write_text("# Written by: python -m pyharness verify --update\n")
     before = contents(outside)
     (foreign / "taylor.toml").symlink_to(outside / "mine")
-    check_replaceable(str(foreign), golden.files_made, "--record")
-    write_tree(str(foreign), {"taylor.toml": b"new"}, "--record")
+    output.check_replaceable(str(foreign), golden.files_made, "--record")
+    output.write_tree(str(foreign), {"taylor.toml": b"new"}, "--record")
     assert contents(foreign) == {"taylor.toml": b"new"}
     assert contents(outside) == before
 
@@ -132,11 +121,11 @@ def test_folders_that_a_killed_process_left_do_not_matter(
     site = tmp_path / "site"
     with monkeypatch.context() as patched:
         patched.setattr(shutil, "rmtree", lambda *_, **__: None)
-        write_tree(str(site), NEW, "--out")
-        write_tree(str(site), NEW, "--out")
+        output.write_tree(str(site), NEW, "--out")
+        output.write_tree(str(site), NEW, "--out")
     left = set(tmp_path.iterdir()) - {site}
     assert left
-    check_replaceable(str(site), lambda _: {*NEW}, "--out")
-    write_tree(str(site), {"a": b"newer"}, "--out")
+    output.check_replaceable(str(site), lambda _: {*NEW}, "--out")
+    output.write_tree(str(site), {"a": b"newer"}, "--out")
     assert contents(site) == {"a": b"newer"}
     assert set(tmp_path.iterdir()) - {site} == left

@@ -18,11 +18,9 @@ from pyharness.model import pipes
 from pyharness.model.errors import printable
 from pyharness.model.output_files import check_writable
 from pyharness.model.pipes import read_input
-from tests.conftest import ResultOf
+from tests.conftest import Capture, Patch, ResultOf
 from tests.refused import refused
 from tests.sweep.sweeps import axis
-
-Capture = pytest.CaptureFixture[str]
 
 BODY = "[body]\nmoments = [3.0, 2.0, 1.0]\n[initial]\nomega = [0.0, 1.0, 1.0]\n"
 SWEEP = "[scene]\ncase = 3\n[solve]\nt_end = 1.0\n" + axis("omega.1", [1.0, 2.0])
@@ -36,7 +34,7 @@ STEERING = "\x1b[31m\x07\u202e\x9b"
 
 
 @pytest.fixture(autouse=True)
-def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: Patch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(pipes, "PATIENCE", 0.05)
 
@@ -144,7 +142,7 @@ def test_output_layer_keeps_lines_and_letters(capsys: Capture) -> None:
 
 @pytest.mark.parametrize("name", ["/proc/site", "x" * 256])
 def test_folder_that_can_not_be_made_is_refused_before_any_work(
-    name: str, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+    name: str, capsys: Capture, monkeypatch: Patch
 ) -> None:
     """Permissions do not restrict a superuser, so the test tries to make the folder."""
     site = importlib.import_module("pyharness.edition.site")
@@ -154,7 +152,7 @@ def test_folder_that_can_not_be_made_is_refused_before_any_work(
 
 
 def test_file_that_can_not_be_written_is_refused_before_any_work(
-    capsys: Capture, monkeypatch: pytest.MonkeyPatch
+    capsys: Capture, monkeypatch: Patch
 ) -> None:
     monkeypatch.setattr("pyharness.engine.solve.solve", lambda *_: pytest.fail("worked"))
     for path in ("/proc/rows", "x" * 256):
@@ -217,7 +215,7 @@ def test_name_that_the_terminal_or_the_picture_can_not_write(tmp_path: Path) -> 
     assert picture.exists()
 
 
-def test_a_closed_pipe_keeps_the_exit_status(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_closed_pipe_keeps_the_exit_status(monkeypatch: Patch) -> None:
     """Regression test: `verify ... | grep -q` ended with status 0 although a check had failed."""
     for form in ("table", "json"):
         reader, writer = os.pipe()

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from tests.cli.interrupts import SWEEP, hearing, left_behind, trials
+from tests.tables import tables
 
 # A command that interrupts itself; `body` is one of the ways in which an interrupt can get lost.
 SCRIPT = """
@@ -38,21 +39,7 @@ code = interruption.run_interruptible(main.main)
 print("code", code)
 interruption.leave(code)
 """
-LOST = {
-    "caught": "try: interrupt()\n    except BaseException: pass\n    return waited()",
-    "dropped by a finalizer": "Finalized()\n    return waited()",
-    "turned into another error": "try: interrupt()\n    except BaseException: raise ImportError",
-    "turned into an error of input": (
-        "from pyharness.model.errors import InputError\n"
-        "    try: interrupt()\n    except BaseException: raise InputError('no zarr')"
-    ),
-    "at the very end": "try: interrupt()\n    except BaseException: return 0",
-    "with a warning": (
-        "import asyncio, warnings\n    begun = asyncio.sleep(1.0)\n"
-        "    try: interrupt()\n    finally:\n        del begun; warnings.warn('left', UserWarning)"
-    ),
-    "passed on": "interrupt()\n    return waited()",
-}
+LOST = tables(__file__)["lost"]
 
 
 def python(*arguments: str, **more: Any) -> "subprocess.CompletedProcess[str]":

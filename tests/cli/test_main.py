@@ -18,12 +18,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import case_scene, read_scene, run_program, solve, subset
+from pyharness import Listing, NotBuiltError, case_scene, read_scene, run_program, solve, subset
 from pyharness.cli.main import VERBS, main
 from pyharness.cli.parser import Parser
 from pyharness.model import build, extension
-from pyharness.model.errors import NotBuiltError
-from pyharness.model.listing import Listing
 from pyharness.model.report import short
 from pyharness.thesis import compiled
 from tests.conftest import Capture, Patch, Printed, ResultOf
@@ -376,8 +374,7 @@ def test_doctor_sees_that_subnormal_numbers_become_0() -> None:
 
 
 def _python(*arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, *arguments]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+    return subprocess.run([sys.executable, *arguments], capture_output=True, text=True, check=False)
 
 
 @pytest.mark.campaign

@@ -211,11 +211,6 @@ def test_a_link_is_followed_wherever_it_leads(there: bool, elsewhere: Path, tmp_
     assert set(tmp_path.iterdir()) <= {link, elsewhere}
 
 
-def test_the_root_of_all_folders_is_refused() -> None:
-    with pytest.raises(InputError, match="is the folder that you are in, or one above it"):
-        output.check_tree("/", "edition.json", "--out")
-
-
 def test_a_link_that_leads_nowhere_is_refused(result_of: ResultOf, tmp_path: Path) -> None:
     (tmp_path / "lost").symlink_to(tmp_path / "no folder" / "file")
     (tmp_path / "loop").symlink_to(tmp_path / "loop")

@@ -56,5 +56,4 @@ def test_bar_is_within_the_terminal_and_removed(command: str) -> None:
 
 def test_nothing_is_shown_without_a_terminal() -> None:
     command = [sys.executable, "-m", "pyharness", "verify", "--only", "orders"]
-    found = subprocess.run(command, capture_output=True, check=True)
-    assert found.stderr == b""
+    assert subprocess.run(command, capture_output=True, check=True).stderr == b""

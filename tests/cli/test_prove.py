@@ -51,8 +51,7 @@ def test_table_has_the_proved_values(printed: Printed) -> None:
 def test_json_has_the_documented_fields(printed: Printed, command: str) -> None:
     if "new.json" not in command and "case" not in command:
         pytest.importorskip("flint")
-    record = valid(printed(f"{command} --format json"))
-    for row in record["rows"]:
+    for row in valid(printed(f"{command} --format json"))["rows"]:
         assert len(row["omega"]) == 3
         assert row["radius"] <= 1.2e-4
 
@@ -60,8 +59,7 @@ def test_json_has_the_documented_fields(printed: Printed, command: str) -> None:
 def test_csv_has_a_line_for_each_component(printed: Printed) -> None:
     lines = list(csv.reader(printed(f"{DIGITS} --format csv").splitlines()))
     head = next(n for n, line in enumerate(lines) if line[:2] == ["time", "quantity"])
-    names = [line[1] for line in lines[head + 1 :]]
-    assert names == ["omega1", "omega2", "omega3", "energy"] * 2
+    assert [line[1] for line in lines[head + 1 :]] == ["omega1", "omega2", "omega3", "energy"] * 2
     record = json.loads(printed(f"{DIGITS} --format json"))
     assert [line[2] for line in lines[head + 1 : head + 4]] == record["rows"][0]["omega"]
 
@@ -101,8 +99,7 @@ def test_falsified_certificate_has_exit_status_1(capsys: Capture, result_of: Res
         ("text.json,good.json", 1),
     ):  # fmt: skip
         assert main(["prove", "--check", names, "--format", "json"]) == status
-        found = valid(capsys.readouterr().out)["certificates"]
-        for each in found:
+        for each in valid(capsys.readouterr().out)["certificates"]:
             assert each["proved"] == (each["file"] == "good.json")
             assert bool(each["reason"]) != each["proved"]
     shown = result_of(["prove", "--check", "bad.json"], 1).out

@@ -125,8 +125,7 @@ def main() -> int:
     if CHECKOUT in chosen:
         due = _due(twin.result(), compiled_words())
         checks += compared(CHECKOUT, _digests_here("fortran"), due, _listed())
-    report = checks_report("cross", checks, summary(skipped, checks, 2))
-    print(render(report, "table"), end="")
+    print(render(checks_report("cross", checks, summary(skipped, checks, 2)), "table"), end="")
     return 0 if all(check.passed for check in checks) else 1
 
 
@@ -207,16 +206,14 @@ def _checked(build: Build, twin: dict[str, str]) -> Iterator[Check]:
         yield from _faults(tree)
         _tell(name, begin, built, built)
         return
-    arguments = ["-m", "tests.cross.digests", "fortran", "digests.json"]
-    done = _run(tree, arguments, traps=build.checked)
+    done = _run(tree, ["-m", "tests.cross.digests", "fortran", "digests.json"], traps=build.checked)
     if done.returncode:
         yield Check(Name("build", name), False, None, None, None, done.stdout[-1000:], replay)
         return
     record = json.loads((tree / "digests.json").read_text())
     wrong = false_claims(build, tree, record)
     yield Check(Name("build", name), not wrong, None, None, None, "; ".join(wrong), replay)
-    due = _due(twin, record["words"])
-    bits = list(compared(name, record["digests"], due, _listed()))
+    bits = list(compared(name, record["digests"], _due(twin, record["words"]), _listed()))
     if build.contract != "off":
         seen = sum(not check.passed for check in bits)
         note = f"{seen} of {len(bits)} cells differ" if seen else "the comparison sees no fault"

@@ -32,8 +32,7 @@ def digest(run: Trajectory) -> str:
         bits = np.ascontiguousarray(np.where(np.isnan(array), np.nan, array))
         summed.update(repr(bits.shape).encode() + bits.tobytes())
     if run.exact is not None:
-        numbers = [(x.m, x.e) for x in run.exact.ravel().tolist()]
-        summed.update(repr(numbers).encode())
+        summed.update(repr([(x.m, x.e) for x in run.exact.ravel().tolist()]).encode())
     if run.ier is not None:
         summed.update(np.ascontiguousarray(run.ier, dtype=np.int32).tobytes())
     return summed.hexdigest()[:16]
@@ -92,12 +91,9 @@ def replay(cell: str) -> str:
 def main(language: str, file: str) -> None:
     """Write the digests, and a description of the build that computed them."""
     record = {
-        "extension": _kernels.__file__,
-        "compiler": f"{_build.COMPILER} {_build.COMPILER_VERSION}",
-        "flags": _build.FLAGS,
-        "words": compiled_words(),
-        "digests": dict(all_digests(language)),
-    }
+        "extension": _kernels.__file__, "compiler": f"{_build.COMPILER} {_build.COMPILER_VERSION}",
+        "flags": _build.FLAGS, "words": compiled_words(), "digests": dict(all_digests(language)),
+    }  # fmt: skip
     Path(file).write_text(json.dumps(record))
 
 

@@ -11,11 +11,9 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from pyharness import case_scene
+from pyharness import Listing, Stop, case_scene
 from pyharness.model.codes import Methods, Operations, Statuses
 from pyharness.model.extension import COMPLETE, GAVE_UP, OVERFLOW
-from pyharness.model.listing import Listing
-from pyharness.model.trajectory import Stop
 from pyharness.thesis import compiled
 from tests import traps
 from tests.cross.builds import ROOT, Build, false_claims
@@ -32,19 +30,14 @@ def test_contributing_has_the_number_of_runs_that_are_compared() -> None:
 def test_digest_sees_every_bit_and_every_counter() -> None:
     run: Any = compiled.run(case_scene(3), Listing.original("two-term"))
     changed = [
-        replace(run, steps=run.steps - 1),
-        replace(run, evaluations=run.evaluations + 1),
-        replace(run, ended="overflow"),
-        replace(run, stop=Stop(25, "V2", 501.0)),
-        replace(run, stop=Stop(25, "V2", 502.0)),
-        replace(run, ier=run.ier + 129),
-        replace(run, omega=_next(run.omega)),
-        replace(run, velocity=_next(run.velocity)),
-        replace(run, recorded_time=_next(run.recorded_time)),
-        replace(run, time=_next(run.time)),
+        replace(run, steps=run.steps - 1), replace(run, evaluations=run.evaluations + 1),
+        replace(run, ended="overflow"), replace(run, stop=Stop(25, "V2", 501.0)),
+        replace(run, stop=Stop(25, "V2", 502.0)), replace(run, ier=run.ier + 129),
+        replace(run, omega=_next(run.omega)), replace(run, velocity=_next(run.velocity)),
+        replace(run, recorded_time=_next(run.recorded_time)), replace(run, time=_next(run.time)),
         replace(run, velocity=np.where(np.arange(3) == 0, -0.0, run.velocity)),
         replace(run, velocity=np.where(np.arange(3) == 0, 0.0, run.velocity)),
-    ]
+    ]  # fmt: skip
     words = [digest(each) for each in (run, *changed)]
     assert len(set(words)) == len(words)
     assert digest(compiled.run(case_scene(3), Listing.original("two-term"))) == words[0]

@@ -17,6 +17,7 @@ from pyharness.history.ablation import entries
 from pyharness.history.claims.laboratory import Laboratory
 from pyharness.history.claims.ledger import claim, judgement, judgements
 from pyharness.model.facts import facts
+from tests.tables import tables
 
 # All need the verdicts on the claims.
 pytestmark = pytest.mark.campaign
@@ -25,19 +26,7 @@ TEMPLATE = (HERE / f"{ARTICLE}.in").read_text()
 TEXT = (HERE / ARTICLE).read_text()
 THESIS = ROOT.parent / "shared" / "thesis" / "thesis.txt"
 # Formulas with digits, each of which is derived or quoted.
-FORMULAS = (
-    r"$I_1, I_2, I_3$", r"$A = (I_2 - I_3)/I_1$", r"$B = (I_3 - I_1)/I_2$",
-    r"$C = (I_1 - I_2)/I_3$", r"$\frac{h}{2} F(p)$", r"$2 \sin 2.5t$",
-    r"$(2 \sin 2.5t,\ 2 \cos 2.5t - 1,\ 10)$", r"$\dot p = \frac{1}{2} F(p, t)$",
-    r"$p(0) = \omega(0)$", r"$\sin 5t$", r"$\dot\omega = F - \frac{2}{9} t^2 Q(F)$",
-    r"$C = 0$", r"$F_3 = 0$",
-    r"$y(t/2)$", r"$$y(0) + \int_0^t F(y(s/2))\,ds = 2\,y(t/2) - y(0).$$", r"$t/3$", r"$2t/3$",
-    r"$g(s) = F + s F'F + s^2 Q(F)$", r"$g(t/3)$", r"$g(2t/3)$",
-    r"$$2\,g(t/3) - g(2t/3) = F - \tfrac{2}{9} t^2 Q(F).$$",
-    r"$h (1 + \dots + n) = t^2/(2h) + t/2$",
-    r"$$\dot\omega_1 = A\,\omega_2\omega_3 + M_1, \quad \dot\omega_2 = B\,\omega_1\omega_3 + M_2, "
-    r"\quad \dot\omega_3 = C\,\omega_1\omega_2 + M_3.$$",
-)  # fmt: skip
+FORMULAS = tables(__file__)["formulas"]
 # Digits that are no results: years, places in the thesis and in books, cases, names and units.
 NAMES = (
     r"\b(?:19|20)\d\d\b", r"\b[sS]ection [IV]+\.\d\b", r"\bequations? \d+(?: to \d+)?",
@@ -45,25 +34,7 @@ NAMES = (
     r"\bLEQT1F\b", r"\bU\(1\)", r"`C1`", r"\bCDC 6600\b", r"\s1/s\b", r"\]\(\.\./figures/[\w.-]+\)",
 )  # fmt: skip
 # Words of number that are counts by definition, orders of methods, parts of a name, or pronouns.
-COUNTS = (
-    "half an Euler step", "Two-term collocation", "Four-term collocation", "three points",
-    "three, four and five terms", "Two terms are", "Two in the use of", "half a point at",
-    "not one of discretization",
-    "three FORTRAN programs", "two by collocation and one by a Runge-Kutta method",
-    "the seven cases", "One moves", "two others together", "at half the speed", "half speed",
-    "seven cases", "fourth order",
-    "order two", "three programs", "three questions", "order four", "thirds of the step",
-    "for two terms and at fifths for four", "one machine reading", "From the second step on",
-    "to one digit", "two-term", "third, separate",
-    "three main programs", "misplaces one page",
-    "double precision", "One right-hand side", "One body",
-    "with three choices", "for two terms", "for four,", "two terms",
-    "as four", "about twice the time", "last fifth", "a known solution in two cases",
-    "its three products", "one observation",
-    "two implementations", "three or five terms",
-    "three or four terms",
-    "four-term", "where one exists", "tends to zero", "are zero",
-)  # fmt: skip
+COUNTS = tables(__file__)["counts"]
 WORDS = (
     r"\b(?:zero|one|two|three|four|five|six|seven|eight|nine|ten|eleven|twelve|twelfth|dozen|"
     r"hundred|thousand|million|half|thirds?|fourth|fifths?|second|twice|double)\b"
@@ -226,8 +197,7 @@ def test_the_introduction_argues_from_the_step_and_a_picture_shows_the_points() 
     assert "“the same step size is used throughout”" in introduction
     assert "{{ run.product }}" in introduction
     assert "(../figures/figure-points.svg)" in TEMPLATE
-    figures = re.findall(r"^\*Figure ([A-Z])\.", TEMPLATE, re.MULTILINE)
-    assert figures == ["A", "B", "C"]
+    assert re.findall(r"^\*Figure ([A-Z])\.", TEMPLATE, re.MULTILINE) == ["A", "B", "C"]
 
 
 def test_the_thesis_cites_none_of_the_sources_on_the_practice_of_its_time() -> None:

@@ -24,6 +24,7 @@ from tests.checks.scenes.free_motions import KINDS, Motion, draw
 from tests.conftest import Printed
 from tests.exact_attitude import exact
 from tests.ports import WEB, run_javascript, with_fault
+from tests.tables import tables
 
 BODY = WEB / "body"
 IDENTITY = [1.0, 0.0, 0.0, 0.0]
@@ -105,22 +106,7 @@ def test_the_closed_form_is_true() -> None:
 
 
 # Passages of the modules, and faults that are planted in them.
-FAULTS = {
-    "the phase in one number": ("closed-form.js", "rest + (advance[1] + orbit.start[1])", "0"),
-    "the rate in one number": (
-        "closed-form.js", "const angle = times(orbit.halfRate, t);",
-        "const angle = [orbit.halfRate[0] * t, 0];",
-    ),
-    "one level less of the sum": ("closed-form.js", "<= LAST) break", "<= 1e-9) break"),
-    "a moment for another": (
-        "closed-form.js", "divide(momentum, [moment[1], 0])", "divide(momentum, [moment[0], 0])",
-    ),
-    "the narrow gap in double-double": ("closed-form.js", "CANCELLED = 1e-4", "CANCELLED = 0"),
-    "a term of the series": ("theta.js", "(c[1] * c4 + c[2] * c6)", "(c[2] * c6)"),
-    "the term of exponentials": ("theta.js", "let n = 4; n >= 0", "let n = 2; n >= 0"),
-    "half periods": ("theta.js", "if (turns % 2 !== 0)", "if (turns % 2 === 1)"),
-    "the start of the phase": ("theta.js", "return [phase, (slope", "return [phase, (0 * slope"),
-}  # fmt: skip
+FAULTS = tables(__file__)["faults"]
 
 
 @pytest.mark.sampled

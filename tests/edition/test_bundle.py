@@ -13,6 +13,7 @@ from pyharness.checks.port_protocol import requested_scene
 from pyharness.edition.bundle import bundle
 from pyharness.model.listing import PROGRAMS, Listing
 from tests.ports import WEB, engine
+from tests.tables import tables
 
 
 def _run(script: str, **known: object) -> str:
@@ -58,22 +59,7 @@ def test_every_module_is_there_once_and_behind_what_it_needs() -> None:
     assert re.search(r"^\s*(import|export)\b", text, re.MULTILINE) is None
 
 
-@pytest.mark.parametrize(("text", "line", "told"), [
-    ('import x from "./other.js";', 1, "a form that is not known: import x from"),
-    ('\n\nimport "./other.js";', 3, "a form that is not known"),
-    ('import { one } from "other";', 1, "a form that is not known"),
-    ('import { one } from "./other.js"', 1, "a form that is not known"),
-    ("export default 3;", 1, "a form that is not known: export default 3;"),
-    ("const a = 1;\nexport { a };", 2, "a form that is not known"),
-    ('export * from "./other.js";', 1, "a form that is not known"),
-    ("export let a = 1;", 1, "a form that is not known"),
-    ('const a = 1;\n\nconst b = import("./other.js");', 3, "a form that is not known"),
-    ("const a = import.meta.url;", 1, "a form that is not known"),
-    ('// A line.\nimport { two } from "./other.js";', 2, "other.js exports no two"),
-    ('import { one } from "./none.js";', 1, "there is no ./none.js"),
-    ('import { back } from "./round.js";', 1, "this module too"),
-    ('import {\n  one,\n} from "./other.js";\nimport x from "./other.js";', 4, "not known"),
-])  # fmt: skip
+@pytest.mark.parametrize(("text", "line", "told"), tables(__file__)["unknown_forms_are_refused"])
 def test_unknown_forms_are_refused(text: str, line: int, told: str, tmp_path: Path) -> None:
     (tmp_path / "other.js").write_text("export const one = 1;\n")
     (tmp_path / "round.js").write_text('import { x } from "./entry.js";\nexport const back = 1;\n')

@@ -144,14 +144,11 @@ def test_the_page_has_the_citation_and_the_linked_data(built_site: dict[str, byt
     assert b"navigator.clipboard.writeText" in built_site["assets/about.js"]
 
 
-@pytest.mark.parametrize(
-    "path",
-    [
-        "docs/article/bibliography.bib", "docs/article/metadata.yaml.in",
-        "docs/explanation/about-the-text.md", "pyharness/data/edition.toml", "CITATION.cff",
-        "codemeta.json",
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize("path", [
+    "docs/article/bibliography.bib", "docs/article/metadata.yaml.in",
+    "docs/explanation/about-the-text.md", "pyharness/data/edition.toml", "CITATION.cff",
+    "codemeta.json",
+])  # fmt: skip
 def test_every_full_citation_is_of_a_report_and_dates_the_thesis(path: str) -> None:
     text = shipped(path).read_text()
     assert not re.search(r"@mastersthesis|(?m:type: thesis$)|schema:Thesis", text)

@@ -34,7 +34,7 @@ from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.thesis.programs import WORD_NAMES
 from pyharness.views.render import render
-from tests.conftest import Printed, ResultOf
+from tests.conftest import Capture, Patch, Printed, ResultOf
 from tests.json_reference import schema_of
 from tests.test_packaging import ROOT
 
@@ -242,7 +242,7 @@ def test_the_script_judges(package: Package, tmp_path: Path, program: str, alter
 
 
 def test_the_script_refuses_what_is_no_page(
-    package: Package, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    package: Package, tmp_path: Path, capsys: Capture
 ) -> None:
     done = _judged(package, tmp_path, "")
     assert (done.returncode, done.stdout) == (2, "")
@@ -287,15 +287,14 @@ def test_every_page_is_listed_with_its_runs(package: Package) -> None:
     assert outcomes_table() in readme
 
 
-def _replace(monkeypatch: pytest.MonkeyPatch, made: Callable[..., Any]) -> None:
+def _replace(monkeypatch: Patch, made: Callable[..., Any]) -> None:
     """Replace the function that makes the package, where the verb finds it."""
     monkeypatch.setattr(sys.modules[data_package.__module__], "data_package", made)
 
 
 def test_the_command_writes_the_package(
-    package: Package, tmp_path: Path, result_of: ResultOf,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
+    package: Package, tmp_path: Path, result_of: ResultOf, monkeypatch: Patch
+) -> None:
     _replace(monkeypatch, lambda progress: package)
     folder = tmp_path / "package"
     for _ in range(2):  # an earlier package is replaced
@@ -311,7 +310,7 @@ def test_the_command_writes_the_package(
 
 
 def test_the_examples_of_the_guide_run(
-    package: Package, tmp_path: Path, printed: Printed, monkeypatch: pytest.MonkeyPatch
+    package: Package, tmp_path: Path, printed: Printed, monkeypatch: Patch
 ) -> None:
     pytest.importorskip("pandas")
     text = GUIDE.read_text()
@@ -397,7 +396,7 @@ def test_tables_of_the_article_follow_from_the_package(package: Package, tmp_pat
 
 @pytest.mark.parametrize("name", ["edition.json", "manifest-sha256.txt", "thesis.txt"])
 def test_a_folder_that_is_no_package_is_refused_before_any_work(
-    tmp_path: Path, result_of: ResultOf, monkeypatch: pytest.MonkeyPatch, name: str
+    tmp_path: Path, result_of: ResultOf, monkeypatch: Patch, name: str
 ) -> None:
     _replace(monkeypatch, lambda progress: pytest.fail("worked"))
     (tmp_path / name).write_text(json.dumps({"schema": 1, "files": {}}))

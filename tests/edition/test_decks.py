@@ -17,6 +17,7 @@ from pyharness.thesis.collation import expected_lines, witness_lines
 from pyharness.thesis.decks import corrections
 from pyharness.thesis.programs import run_program
 from tests.edition.pages import pages
+from tests.tables import tables
 
 
 def view_of(program: str, number: int) -> decks.CardView:
@@ -249,25 +250,8 @@ def compared(program: str, number: int) -> tuple[dict[str, list[str]], list[str]
 
 
 @pytest.mark.parametrize(
-    ("program", "number", "parts", "kinds"),
-    [
-        ("two-term", 150, {"two-term": [], "four-term": [], "runge-kutta": []}, []),
-        (
-            "two-term", 400, {"two-term": ["A1"], "four-term": ["A1"], "runge-kutta": ["A"]},
-            ["name"],
-        ),
-        (
-            "four-term", 2260,
-            {"two-term": ["100"], "four-term": ["100"], "runge-kutta": ["300"]},
-            ["statement number"],
-        ),
-        (
-            "two-term", 710, {"two-term": ["/", "3."], "four-term": ["*", ".2"]},
-            ["number", "operator"],
-        ),
-        ("runge-kutta", 860, {"runge-kutta": []}, []),
-    ],
-)  # fmt: skip
+    ("program", "number", "parts", "kinds"), tables(__file__)["what_differs_is_marked_and_named"]
+)
 def test_what_differs_is_marked_and_named(
     program: str, number: int, parts: dict[str, list[str]], kinds: list[str]
 ) -> None:
@@ -277,5 +261,4 @@ def test_what_differs_is_marked_and_named(
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_a_note_is_a_sentence_before_its_cards(built_site: dict[str, bytes], program: str) -> None:
     page = built_site[f"listing/{program}.html"].decode()
-    ends = re.findall(r'(.) <span class="muted">Cards: ', page)
-    assert ends == ["."] * len(decks.notes(program))
+    assert re.findall(r'(.) <span class="muted">Cards: ', page) == ["."] * len(decks.notes(program))

@@ -8,51 +8,39 @@ import random
 import re
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from pyharness import case_scene, run_program
+from pyharness import Scene, case_scene, run_program, solve
 from pyharness.checks.compare.agreement import differences
 from pyharness.checks.port_protocol import requested_scene
 from pyharness.checks.scenes.random_scenes import draw
 from pyharness.edition.laboratory import MOST_STEPS, context, data
-from pyharness.engine.solve import solve
 from pyharness.history.limits import limit_solution
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
 from pyharness.model.report import short
-from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers
 from pyharness.thesis.printer import page
 from pyharness.truth.reference import reference
 from tests.conftest import Printed
-from tests.ports import WEB, run_javascript
+from tests.ports import run_javascript
+from tests.tables import tables
 
-LABORATORY = WEB / "laboratory"
 
-
-def ask(body: str, given: Any) -> Any:
-    """Return the value of the JavaScript `body`, which may use `given` and the laboratory."""
-    files = {"S": "state", "E": "experiment", "R": "reference", "P": "printer-page", "K": "cards"}
-    files |= {"L": "limit", "W": "why", "I": "idle"}
-    modules = {name: LABORATORY / f"{file}.js" for name, file in files.items()}
-    modules["Q"] = WEB / "programs/equations.js"
-    return run_javascript(modules, body, data=data(), given=given)
+def ask(name: str, given: Any) -> Any:
+    """Return what a function of `laboratory.mjs` returns for the laboratory's data and `given`."""
+    module = Path(__file__).parent / "laboratory.mjs"
+    return run_javascript({"T": module}, f"return T.{name}(data, given);", data=data(), given=given)
 
 
 @pytest.mark.campaign
 def test_printer_pages_are_those_of_the_program() -> None:
     cells = list(itertools.product(case_numbers(), PROGRAMS, ("original", "corrected"), (100, 300)))
-    found = ask(
-        """return given.map(([number, program, listing, steps]) => {
-          const words = `case=${number}&program=${program}&listing=${listing}&steps=${steps}`;
-          const { scene, run } = E.experiment(data, S.stateFrom(data, words).state);
-          return P.printerPage(data.printer[program], scene, run);
-        });""",
-        cells,
-    )
+    found = ask("printerPages", cells)
     for (number, program, listing, steps), text in zip(cells, found, strict=True):
         scene = replace(case_scene(number), steps=steps)
         run = run_program(scene, subset(program, listing))
@@ -75,11 +63,8 @@ def test_numbers_that_do_not_fit_are_printed_as_the_formats_have_it() -> None:
         ["0", *(names.get(repr(x), repr(x)) for x in row)]
         for row in np.hstack([omega, velocity]).tolist()
     ]
-    body = """const rows = given.rows.map((row) => row.map(Number));
-      const run = { rows, ier: given.ier };
-      return P.printerPage(data.printer["two-term"], given.scene, run);"""
     given = {"scene": requested_scene(scene), "rows": rows, "ier": ier.tolist()}
-    assert ask(body, given) == page(scene, "two-term", changed)
+    assert ask("printedRows", given) == page(scene, "two-term", changed)
 
 
 def _words() -> list[str]:
@@ -109,15 +94,7 @@ def _words() -> list[str]:
 
 @pytest.mark.campaign
 def test_states_go_round_through_words_and_mean_what_commands_mean(printed: Printed) -> None:
-    found = ask(
-        """return given.map((words) => {
-          const { state, problems } = S.stateFrom(data, `#${words}`);
-          const again = S.stateFrom(data, S.fragmentOf(data, state));
-          const run = E.experiment(data, state).run;
-          return { state, problems, again: again.state, command: S.commandOf(data, state), run };
-        });""",
-        _words(),
-    )
+    found = ask("statesOfWords", _words())
     for each in found:
         assert each["problems"] == []
         assert each["again"] == each["state"]
@@ -133,10 +110,6 @@ def test_states_go_round_through_words_and_mean_what_commands_mean(printed: Prin
 
 
 def test_only_what_differs_is_in_the_address() -> None:
-    body = """return given.map((words) => {
-      const { state } = S.stateFrom(data, words);
-      return [S.fragmentOf(data, state), S.commandOf(data, state)];
-    });"""
     first = "case=2&program=runge-kutta&listing=original"
     asked = [
         "", "#", "keep=stage-base", "omega0=-0.0,1,10&steps=100", "conjecture=none&no-stop",
@@ -144,7 +117,7 @@ def test_only_what_differs_is_in_the_address() -> None:
         "listing=corrected&reading=do-variable&conjecture=torque-held,initial-torque",
         "omega0=0,1,10&steps=100",
     ]  # fmt: skip
-    found = ask(body, asked)
+    found = ask("addresses", asked)
     assert [each[0] for each in found] == [
         first, first, "case=2&program=runge-kutta&listing=corrected&keep=stage-base",
         f"{first}&omega0=-0,1,10", f"{first}&conjecture=none&no-stop",
@@ -154,10 +127,9 @@ def test_only_what_differs_is_in_the_address() -> None:
     given = "--case 2 --program runge-kutta --listing original --conjecture none --no-stop"
     assert found[4][1] == f"pyharness run {given}"
     # Another program keeps the switches that both have.
-    body = """const { state } = S.stateFrom(data, given);
-      return ["four-term", "runge-kutta"].map((program) =>
-        S.fragmentOf(data, { ...state, program }));"""
-    four, third = ask(body, "case=2&program=two-term&fix=dt-accumulates&conjecture=none")
+    four, third = ask(
+        "addressesOfPrograms", "case=2&program=two-term&fix=dt-accumulates&conjecture=none"
+    )
     assert four == "case=2&program=four-term&listing=original&fix=dt-accumulates&conjecture=none"
     assert third == "case=2&program=runge-kutta&listing=original&conjecture=none"
 
@@ -197,11 +169,7 @@ _WRONG_PINS = {
 
 
 def test_what_an_address_has_wrong_is_told_in_a_line_and_the_default_taken() -> None:
-    body = """return given.map((words) => {
-      const { state, problems } = S.stateFrom(data, words);
-      return [S.fragmentOf(data, state), problems];
-    });"""
-    answers = ask(body, list(_WRONG))
+    answers = ask("problemsOfWords", list(_WRONG))
     for (words, told), (fragment, problems) in zip(_WRONG.items(), answers, strict=True):
         (problem,) = problems
         assert problem.startswith(told)
@@ -210,17 +178,10 @@ def test_what_an_address_has_wrong_is_told_in_a_line_and_the_default_taken() -> 
         program = "two-term" if "two-term" in words else "runge-kutta"
         kept = [word for word in ("no-stop", "fix=stage-base") if word in words.split("&")[:-1]]
         assert fragment == "&".join([f"case=2&program={program}&listing=original", *kept])
-    body = """return given.map((pin) => {
-      const found = S.stateFrom(data, `case=2&pin=${pin}`);
-      return [found.problems, S.fragmentOf(data, found.pinned)];
-    });"""
-    answers = ask(body, list(_WRONG_PINS))
+    answers = ask("problemsOfPins", list(_WRONG_PINS))
     for told, ((problem,), fragment) in zip(_WRONG_PINS.values(), answers, strict=True):
         assert problem.startswith(told)
         assert fragment.endswith("listing=original")
-
-
-_REFERENCE = "return given.map(({ scene, times }) => R.reference(scene, times));"
 
 
 def _asked(scenes: list[Scene]) -> list[dict[str, Any]]:
@@ -244,7 +205,7 @@ def test_the_reference_is_the_decimal_one_to_rounding() -> None:
     """Over the most steps rounding does not add up: there no amplification is allowed for."""
     long = [replace(case_scene(number), steps=MOST_STEPS) for number in (2, 3, 4)]
     scenes = [*long, *_motions()]
-    answers = ask(_REFERENCE, _asked(scenes))
+    answers = ask("references", _asked(scenes))
     for index, (scene, rows) in enumerate(zip(scenes, answers, strict=True)):
         truth = reference(scene, scene.times()).omega
         largest = np.abs([*truth, scene.omega]).max()
@@ -255,27 +216,19 @@ def test_the_reference_is_the_decimal_one_to_rounding() -> None:
 
 
 def test_a_reference_that_would_take_too_long_or_leaves_every_bound_ends() -> None:
-    starts = (1e7, 1e200, 0.0)
-    scenes = [replace(case_scene(4), omega=(start,) * 3) for start in starts]
-    fast, without_bound, rest = ask(_REFERENCE, _asked(scenes))
+    scenes = [replace(case_scene(4), omega=(start,) * 3) for start in (1e7, 1e200, 0.0)]
+    fast, without_bound, rest = ask("references", _asked(scenes))
     assert len(fast) < 100
     assert without_bound == []
     assert rest == [[0.0, 0.0, 0.0]] * 100
 
 
 def test_endings_are_told() -> None:
-    body = """const run = (words) => E.experiment(data, S.stateFrom(data, words).state);
-      const found = given.map(run);
-      const { state, scene } = found[0], stop = { step: 1, variable: "UV", quotient: Infinity };
-      const steep = { state, scene, run: { ended: "stopped", rows: [], stop } };
-      const { truth, errors } = run("case=2&program=two-term&omega0=1e-3,0,2e6");
-      return [found.map((each) => [each.run.stop, E.ending(each), E.largestError(each)]),
-        E.ending(steep), truth.length, errors.map((row) => row !== null)];"""
     words = [
         "", "fix=stage-base", "case=6&program=two-term", "program=two-term&steps=1",
         "case=6&listing=corrected&lipschitz=1", "case=1&lipschitz=1e-9&steps=3&omega0=0,0,0",
     ]  # fmt: skip
-    found, steep, length, known = ask(body, words)
+    found, steep, length, known = ask("endings", words)
     (first, other, *_), told, (error, *_) = zip(*found, strict=True)
     assert (first["step"], first["variable"]) == (25, "V2")
     assert (other["step"], other["variable"]) != (25, "V2")
@@ -319,34 +272,14 @@ def test_the_page_without_script_has_the_default_state(built_site: dict[str, byt
         assert names == {name for kind in kinds for name in names_of(kind, program)}
 
 
-_STEPS = [
-    ("case=2&program=runge-kutta", 25),
-    ("case=2&program=runge-kutta", 1),
-    ("case=5&program=runge-kutta&listing=corrected", 40),
-    ("case=4&program=runge-kutta&fix=stage-base,lipschitz-per-component&no-stop", 7),
-    ("case=6&program=runge-kutta&fix=base-not-restored,lipschitz-mismatched-pairs", 5),
-    ("case=3&program=two-term", 9),
-    ("case=5&program=two-term&listing=corrected&keep=x3-reads-acl2", 3),
-    ("case=5&program=four-term", 12),
-    ("case=7&program=four-term", 2),
-    ("case=7&program=runge-kutta&listing=corrected", 4),
-]
+_STEPS = tables(__file__)["steps"]
 
 
 @pytest.mark.sampled
 @pytest.mark.parametrize(("words", "step"), _STEPS)
 def test_every_card_of_a_step_gives_the_value_beside_it(words: str, step: int) -> None:
     """Compute each card, as FORTRAN, from the values that the cards before it have given."""
-    body = """const { state } = S.stateFrom(data, given.words);
-      const { run, trace } = K.traced(data, state, given.step);
-      const passes = K.passesOf(data, state, { run, trace }, given.step);
-      const scene = E.sceneOf(data, state);
-      const active = new Set(state.active);
-      const before = run.rows.length > 1 ? run.rows[given.step - 2] : null;
-      return { passes, values: trace.values, row: run.rows[given.step - 1], before,
-        rates: [Q.eulerCoefficients(scene), Q.normalizedTorque(scene, 0),
-          Q.accelerations(scene, active)] };"""
-    found = ask(body, {"words": words, "step": step})
+    found = ask("cardsOfStep", {"words": words, "step": step})
     known = _constants(*found["rates"])
     for name, value in found["values"]:
         if name.startswith("before "):
@@ -392,27 +325,13 @@ def _value(formula: str, known: dict[str, float]) -> float:
 
 @pytest.mark.campaign
 def test_a_trace_changes_no_bit_of_a_run() -> None:
-    body = """return given.map((words) => {
-      const { state } = S.stateFrom(data, words);
-      const plain = E.experiment(data, state).run;
-      const steps = plain.rows.length;
-      const { run } = K.traced(data, state, steps);
-      return [plain.rows, run.rows, plain.stop, run.stop];
-    });"""
-    for plain, traced, stop, traced_stop in ask(body, _words()[:60]):
+    for plain, traced, stop, traced_stop in ask("traces", _words()[:60]):
         assert traced == plain
         assert traced_stop == stop
 
 
 def test_a_pinned_state_goes_round_through_the_address() -> None:
-    words = _words()
-    pairs = list(itertools.pairwise(words))
-    body = """return given.map(([words, other]) => {
-      const [state, pinned] = [words, other].map((each) => S.stateFrom(data, each).state);
-      const found = S.stateFrom(data, `#${S.fragmentOf(data, state, pinned)}`);
-      return [found, state, pinned, S.fragmentOf(data, state)];
-    });"""
-    for found, state, pinned, plain in ask(body, pairs):
+    for found, state, pinned, plain in ask("pinnedStates", list(itertools.pairwise(_words()))):
         assert found == {"state": state, "pinned": pinned, "problems": []}
         assert "pin" not in plain
 
@@ -420,13 +339,8 @@ def test_a_pinned_state_goes_round_through_the_address() -> None:
 @pytest.mark.campaign
 def test_limits_are_those_that_python_computes() -> None:
     cells = [(n, program) for n in case_numbers() for program in ("two-term", "runge-kutta")]
-    body = """return given.map(([number, program]) => {
-      const { state } = S.stateFrom(data, `case=${number}&program=${program}`);
-      const found = E.experiment(data, state);
-      return [L.limitOf(data, found), found.truth];
-    });"""
     kinds = set()
-    for (number, program), (found, truth) in zip(cells, ask(body, cells), strict=True):
+    for (number, program), (found, truth) in zip(cells, ask("limits", cells), strict=True):
         scene = case_scene(number)
         exact = reference(scene, scene.times())
         expected, *_ = limit_solution(program, scene, scene.times(), exact)
@@ -460,22 +374,9 @@ def _switched() -> Iterator[str]:
 
 @pytest.mark.campaign
 def test_every_program_converges_to_its_limit() -> None:
-    body = """const distance = (state, parts) => {
-        const finer = { ...state, stepSize: state.stepSize / parts, steps: state.steps * parts };
-        const found = E.experiment(data, { ...finer, stops: false });
-        const { kind, omega } = L.limitOf(data, found);
-        const goal = omega ?? found.truth;
-        const apart = found.run.rows.map((row, n) =>
-          Math.max(...[0, 1, 2].map((axis) => Math.abs(row[axis + 1] - goal[n][axis]))));
-        return [kind, Math.max(...apart)];
-      };
-      return given.map((words) => {
-        const { state, problems } = S.stateFrom(data, words);
-        return [problems, distance(state, 1), distance(state, 8)];
-      });"""
     words = list(_switched())
     kinds: dict[str, int] = {}
-    answers = ask(body, words)
+    answers = ask("distancesToLimit", words)
     for each, (problems, (kind, coarse), (again, fine)) in zip(words, answers, strict=True):
         assert problems == []
         assert kind == again
@@ -492,20 +393,7 @@ EXPERIMENTS = facts("experiments")["experiment"]
 @pytest.mark.sampled
 @pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda each: each["id"])
 def test_guided_experiments_show_what_they_say(experiment: dict[str, Any]) -> None:
-    body = """const { state, pinned, problems } = S.stateFrom(data, given);
-      const shown = (state) => {
-        const found = E.experiment(data, state);
-        const { kind, omega } = L.limitOf(data, found);
-        const apart = omega === null ? null : found.run.rows.map((row, n) =>
-          Math.max(...[0, 1, 2].map((axis) => Math.abs(row[axis + 1] - omega[n][axis]))));
-        return { ended: found.run.ended, steps: found.run.rows.length, limit: kind,
-          variable: found.run.stop?.variable, error: E.brief(E.largestError(found)),
-          quotient: found.run.stop && String(Math.round(found.run.stop.quotient)),
-          from_limit: apart && E.brief(Math.max(...apart)) };
-      };
-      return [problems, S.fragmentOf(data, state, pinned), shown(state),
-        pinned && shown(pinned)];"""
-    problems, fragment, shown, pinned = ask(body, experiment["state"])
+    problems, fragment, shown, pinned = ask("experimentShown", experiment["state"])
     assert problems == []
     assert fragment == experiment["state"]
     for name, value in experiment["expect"].items():
@@ -533,14 +421,12 @@ def test_there_are_eight_experiments_on_the_page(built_site: dict[str, bytes]) -
 
 
 def test_the_reason_of_an_end_is_computed_from_the_run() -> None:
-    body = """return given.map((words) =>
-      W.whyEnded(E.experiment(data, S.stateFrom(data, words).state)));"""
     words = [
         "", "case=5", "no-stop", "program=two-term", "case=6&program=two-term",
         "listing=corrected", "fix=lipschitz-per-component&lipschitz=6",
         "fix=lipschitz-tests-velocity",
     ]  # fmt: skip
-    velocity, omega, off, none, overflow, complete, joint, later = ask(body, words)
+    velocity, omega, off, none, overflow, complete, joint, later = ask("reasons", words)
     twin: Any = run_program(case_scene(2), subset("runge-kutta"), "python")
     before, after = twin.velocity[-2:, 1]
     assert f"V2 went from {before:#.4g} to {after:#.4g} m/s" in velocity
@@ -561,13 +447,9 @@ def test_the_reason_of_an_end_is_computed_from_the_run() -> None:
 
 @pytest.mark.campaign
 def test_quotients_end_the_run_where_they_exceed_the_limit() -> None:
-    body = """return given.map((words) => {
-      const found = E.experiment(data, S.stateFrom(data, words).state);
-      return [found.run.stop, W.quotientsOf(found.tests), found.run.rows.length, found.state];
-    });"""
     words = [each for each in _words() if "runge-kutta" in each]
     stopped = 0
-    for stop, quotients, rows, state in ask(body, words):
+    for stop, quotients, rows, state in ask("quotients", words):
         assert len(quotients) == rows
         limit = state["lipschitz"]
         over = [
@@ -588,12 +470,8 @@ def test_quotients_end_the_run_where_they_exceed_the_limit() -> None:
 
 @pytest.mark.campaign
 def test_a_switch_without_effect_is_found_by_running() -> None:
-    body = """return given.map((words) => {
-      const { state } = S.stateFrom(data, words);
-      return [state, [...I.idleSwitches(data, state)]];
-    });"""
     words = ["", "no-stop", "case=7&program=four-term", "case=6&program=two-term"]
-    for state, reasons in ask(body, words):
+    for state, reasons in ask("idleSwitches", words):
         scene, program = case_scene(state["case"]), state["program"]
         own = {name for kind in ("defect", "reading", "conjecture")
                for name in names_of(kind, program)}  # fmt: skip
@@ -618,5 +496,5 @@ def test_every_link_to_the_laboratory_names_a_state(built_site: dict[str, bytes]
     }
     assert len(links) > 20
     words = sorted(links)
-    found = ask("return given.map((each) => S.stateFrom(data, each).problems);", words)
+    found = ask("problems", words)
     assert {word: told for word, told in zip(words, found, strict=True) if told} == {}

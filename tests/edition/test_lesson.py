@@ -12,12 +12,11 @@ from typing import Any
 
 import pytest
 
-from pyharness import run_program
+from pyharness import case_scene, run_program
 from pyharness.edition.documents import page_of
 from pyharness.edition.laboratory import data
 from pyharness.history.ablation import entries
 from pyharness.model.listing import PROGRAMS, Listing
-from pyharness.model.scene_file import case_scene
 from pyharness.thesis.decks import compiler, deck_text, run_deck
 from tests.conftest import Patch, Printed
 from tests.ports import WEB, run_javascript
@@ -56,8 +55,7 @@ def test_notes_have_the_exercises_of_the_lesson() -> None:
 def test_plans_of_the_class_agree_with_the_times() -> None:
     minutes = [int(each) for each in re.findall(r"^\| \[\d\].*\| (\d+) min \|$", NOTES, re.M)]
     assert len(minutes) == 6
-    text = " ".join(NOTES.split())
-    assert f"exercises together take an estimated {sum(minutes)} minutes" in text
+    assert f"exercises together take an estimated {sum(minutes)} minutes" in " ".join(NOTES.split())
     assert "take three to four hours" in " ".join(LESSON.split())
     assert 180 < sum(minutes) < 240
     assert minutes[2] + minutes[5] <= 90 - 10 - 20
@@ -148,18 +146,15 @@ def _last_line(case: int, *given: Any, listing: Listing = ORIGINAL) -> list[str]
 
 @pytest.mark.sampled
 @pytest.mark.skipif(compiler() is None, reason="no gfortran")
-@pytest.mark.parametrize(
-    ("case", "changes", "end", "first", "step"),
-    [
-        (1, [], "", "3.5000", "100"), (1, [MINUS_A], "", "3.5000", "100"),
-        (1, [U1_FOR_U3], "", "3.5000", "100"), (1, [FIFTHS], "", "4.0000", "100"),
-        (1, [WEIGHTS], "", "3.5000", "100"), (1, [I2_30], "", "2.6210", "100"),
-        (1, [I2_30, MINUS_A], "", "3.4844", "100"), (1, [I2_30, U1_FOR_U3], "", "2.6946", "100"),
-        (1, [I2_30, FIFTHS], "", "2.9451", "100"), (1, [I2_30, WEIGHTS], "", "2.6184", "100"),
-        (2, [], "", "1.1631", "25"), (2, BASE, "", "0.9538", "25"),
-        (2, BASE, RESET, "0.6052", "13"), (2, [*BASE, *BASE_OF_V], RESET, "0.9996", "32"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("case", "changes", "end", "first", "step"), [
+    (1, [], "", "3.5000", "100"), (1, [MINUS_A], "", "3.5000", "100"),
+    (1, [U1_FOR_U3], "", "3.5000", "100"), (1, [FIFTHS], "", "4.0000", "100"),
+    (1, [WEIGHTS], "", "3.5000", "100"), (1, [I2_30], "", "2.6210", "100"),
+    (1, [I2_30, MINUS_A], "", "3.4844", "100"), (1, [I2_30, U1_FOR_U3], "", "2.6946", "100"),
+    (1, [I2_30, FIFTHS], "", "2.9451", "100"), (1, [I2_30, WEIGHTS], "", "2.6184", "100"),
+    (2, [], "", "1.1631", "25"), (2, BASE, "", "0.9538", "25"),
+    (2, BASE, RESET, "0.6052", "13"), (2, [*BASE, *BASE_OF_V], RESET, "0.9996", "32"),
+])  # fmt: skip
 def test_changed_decks_are_told(
     case: int, changes: Changes, end: str, first: str, step: str
 ) -> None:
@@ -192,8 +187,7 @@ def test_mended_deck_is_stopped_by_v2_as_the_notes_say() -> None:
     assert [float(each) > 500 for each in quotients] == [False, True, False, False, False]
     assert round(float(quotients[1])) == 6694
     assert last[5] == "0.0116"
-    no_limit = [*BASE, ("1390", "500.", "1.E30")]
-    later = _page(deck, no_limit, {"1530": RESET})[-100:]
+    later = _page(deck, [*BASE, ("1390", "500.", "1.E30")], {"1530": RESET})[-100:]
     assert max(float(each[5]) for each in later[:30]) == float(last[5])
     for told in ("its quotient was 6694", "right: 0.6052, 0.7961 and 10.0000", "0.0116 m/s"):
         assert told in " ".join(NOTES.split())

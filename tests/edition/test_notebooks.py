@@ -48,8 +48,7 @@ def cells(text: str, **pictures: bytes) -> list[dict[str, Any]]:
 
 def test_prose_and_code_are_cells_in_order() -> None:
     found = cells(TEXT, a=b"png")
-    kinds = [cell["cell_type"] for cell in found]
-    assert kinds == ["markdown", "code", "code", "markdown"]
+    assert [cell["cell_type"] for cell in found] == ["markdown", "code", "code", "markdown"]
     assert "".join(found[0]["source"]) == (
         "# A page\n\nSee another, a picture, and <b>.\n\n```sh\npyharness doctor\n```"
     )

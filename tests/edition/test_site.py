@@ -70,8 +70,7 @@ def test_pages_have_landmarks_and_one_title(built_site: dict[str, bytes]) -> Non
         tags = [tag for tag, _ in page.elements]
         for tag in ("main", "header", "nav", "footer", "h1", "title"):
             assert tags.count(tag) == 1, (name, tag)
-        attributes = dict(page.elements)
-        assert attributes["html"]["lang"] == "en"
+        assert dict(page.elements)["html"]["lang"] == "en"
         # A menu says where one is; a page behind an entry of it is under that entry.
         current = [each["aria-current"] for _, each in page.elements if each.get("aria-current")]
         assert current in (["page"], ["page", "page"], ["true", "page"], ["true", "true"]), name
@@ -162,8 +161,7 @@ def test_counts_and_verdicts_are_on_their_pages(built_site: dict[str, bytes]) ->
 
 def test_the_data_are_downloaded_from_every_page(built_site: dict[str, bytes]) -> None:
     for name, page in pages(built_site).items():
-        links = [each.path for each in page.targets if each.path.endswith("data.zip")]
-        assert links, name
+        assert [each.path for each in page.targets if each.path.endswith("data.zip")], name
     with zipfile.ZipFile(io.BytesIO(built_site["data.zip"])) as packed:
         found = {each.partition("/")[2]: packed.read(each) for each in packed.namelist()}
     assert found == data_package()
@@ -270,8 +268,7 @@ def test_a_page_says_under_which_entry_of_the_menu_it_is(built_site: dict[str, b
 
 
 def test_dates_pictures_and_licences_are_on_the_site(built_site: dict[str, bytes]) -> None:
-    page = built_site["about.html"].decode()
-    shown = re.findall(r"<dt>([^<]*\d)</dt>", page)
+    shown = re.findall(r"<dt>([^<]*\d)</dt>", built_site["about.html"].decode())
     assert shown == [each.date for each in timeline() if each.certainty == "certain"]
     for each in timeline():
         assert each.date in built_site["docs/explanation/about-the-text.html"].decode()

@@ -89,8 +89,7 @@ def test_what_ends_a_run_whose_omega_is_right(slots: Slots, built_site: dict[str
         assert run.stop.variable == "U1"
         change = np.abs(np.diff(run.omega[:, 0]))
         assert change[-1] == change.min() < 0.02 * change.max()
-    truth = reference(case_scene(2), list(right.time)).omega
-    assert np.abs(right.omega - truth).max() < 1e-5
+    assert np.abs(right.omega - reference(case_scene(2), list(right.time)).omega).max() < 1e-5
     assert b'data-text="alone-variable">U1<' in built_site["index.html"]
 
 
@@ -129,8 +128,7 @@ def test_what_is_assumed_is_marked(built_site: dict[str, bytes]) -> None:
     for case in case_numbers():
         assert bool(assumption(case)) == (case in assumed)
     assert "cards" in assumption(7)
-    supplied = facts("account")["statement"]
-    (text,) = [each["text"] for each in supplied if each["id"] == "supplied"]
+    (text,) = [each["text"] for each in facts("account")["statement"] if each["id"] == "supplied"]
     for page in ("index", "laboratory", "figures", "claims", "thesis"):
         told = " ".join(html.unescape(built_site[f"{page}.html"].decode()).split())
         assert told.count("* assumed") >= 2, page
@@ -146,11 +144,9 @@ def test_what_is_assumed_is_marked(built_site: dict[str, bytes]) -> None:
     home = " ".join(built_site["index.html"].decode().split())
     steps = []
     for start in ((0.0, 1.0, 10.0), (0.0, 1.0, 1.0)):
-        run = run_program(replace(case_scene(1), omega=start), subset("runge-kutta"))
-        steps.append(run.steps)
+        steps.append(run_program(replace(case_scene(1), omega=start), subset("runge-kutta")).steps)
     assert f"at steps {steps[0]} and {steps[1]}." in home
-    figures = built_site["figures.html"].decode().split("<figcaption>")[1:]
-    for part in figures:
+    for part in built_site["figures.html"].decode().split("<figcaption>")[1:]:
         caption = part.partition("</fig")[0]
         address = r"laboratory.html#case=(\d)&amp;program=([\w-]+)&amp;listing=(\w+)"
         runs = re.findall(address, caption)

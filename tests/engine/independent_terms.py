@@ -119,12 +119,9 @@ def draw(random: Random) -> Drawn:
     end = random.choice((1.0, 1.0, -0.5)) * radians / speed
     body = {kind: inertia}
     scene = Scene(
-        " + ".join(names) + f", {kind}{', short' if source.short else ''}",
-        source.vector(speed),
-        torque=torque,
-        attitude=source.quaternion() if turning else None,
-        **body,
-    )
+        " + ".join(names) + f", {kind}{', short' if source.short else ''}", source.vector(speed),
+        torque=torque, attitude=source.quaternion() if turning else None, **body,
+    )  # fmt: skip
     breaks = sorted({x for term in terms for x in term[2]})
     tolerance = 10.0 ** random.uniform(-13.0, -3.0)
     is_exact = source.short and kind != "inertia" and all(name in _EXACT for name in names)

@@ -82,8 +82,7 @@ def test_attitude_is_computed_by_default_if_the_scene_has_one() -> None:
     assert np.array_equal(default.attitude, asked.attitude)
     assert stepper.attitude.tolist() == list(scene.attitude or ())
     turn: Any = lambda t, w, q: -q[1:]  # noqa: E731
-    turning = replace(case_scene(5), torque=turn)
-    assert solve(turning, 1.0).attitude is not None
+    assert solve(replace(case_scene(5), torque=turn), 1.0).attitude is not None
     assert "attitude" in plan(case_scene(5)).skipped
     assert "attitude" not in plan(scene).skipped
 

@@ -35,8 +35,7 @@ def closed_form_attitude(
     moments: Any, omega0: Any, attitude0: Any, times: Any
 ) -> tuple[Array, Array]:
     """Return omega and attitude at times in any order."""
-    scene = Scene("", omega0, moments=moments, attitude=attitude0)
-    found: Any = known_solution(scene, times, 1.0)
+    found: Any = known_solution(Scene("", omega0, moments=moments, attitude=attitude0), times, 1.0)
     return found.omega, found.attitude
 
 
@@ -112,8 +111,7 @@ def test_montgomery_s_angle(start: tuple[float, float, float]) -> None:
     around = sign * (x * slope[:, (axis + 2) % 3] - y * slope[:, (axis + 1) % 3]) / (x * x + y * y)
     # For a periodic function the trapezoidal rule has all digits.
     solid = period * np.mean(((1.0 - sign * z) * around)[:-1])
-    energy = float(np.sum(moments * np.array(start) ** 2))
-    wanted = energy * period / size - solid
+    wanted = float(np.sum(moments * np.array(start) ** 2)) * period / size - solid
     end = attitude[-1]
     found = 2.0 * math.atan2(float(end[1:] @ m[0]), float(end[0]))
     assert abs(math.remainder(found - wanted, 2.0 * math.pi)) < 1e-12

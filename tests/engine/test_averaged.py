@@ -7,12 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import TorqueLaw, solve
+from pyharness import Scene, TorqueLaw, solve
 from pyharness.checks.scenes.random_scenes import draw
 from pyharness.engine.methods import averaged_step
 from pyharness.engine.methods.averaged_coordinates import Coordinates, torque_of
 from pyharness.model.errors import InputError, TimedError
-from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.torques import damping, rate_control, recorded
 from pyharness.truth.integer_series import integer_series
@@ -109,8 +108,7 @@ def test_rotation_about_an_axis_and_symmetric_body(
         torque=TorqueLaw((1e-6 * spin**2, 2e-6 * spin**2, -1e-6 * spin**2)),
     )  # fmt: skip
     times = [10.0 / spin, 900.0 / spin]
-    found = _averaged(scene, times)
-    assert _error(found, integer_series(scene, times).omega) < 1e-13
+    assert _error(_averaged(scene, times), integer_series(scene, times).omega) < 1e-13
 
 
 def _slow(t: Any, w: Any) -> Any:
@@ -134,8 +132,7 @@ def test_torque_whose_first_mean_is_zero_is_averaged(coefficients: tuple[float, 
     """The first sweep changes nothing; it was taken for the last one, and the scene refused."""
     a, b, c = coefficients
     scene = Scene("", SCENE.omega, coefficients=(a, b, c), torque=TorqueLaw((1e-6, 0.0, 0.0)))
-    found = _averaged(scene, [1e3])
-    assert _error(found, integer_series(scene, [1e3]).omega) < 1e-12
+    assert _error(_averaged(scene, [1e3]), integer_series(scene, [1e3]).omega) < 1e-12
 
 
 def test_rows_do_not_depend_on_other_rows_and_are_in_the_order_of_the_times() -> None:
@@ -255,8 +252,7 @@ def test_crossing_of_the_separatrix_is_refused_at_its_time() -> None:
 
 def test_rows_near_the_separatrix_are_those_of_taylor() -> None:
     law = TorqueLaw((-7.2334e-7, -5.6474e-7, -2.7866e-7))
-    moments = 1.308, 1.5601, 1.4755
-    scene = Scene("", (-0.25, 0.205, 0.9463), moments=moments, torque=law)
+    scene = Scene("", (-0.25, 0.205, 0.9463), moments=(1.308, 1.5601, 1.4755), torque=law)
     rows, others = (
         solve(scene, -83_500.0, each, 1e-9, effort=5.0).omega for each in ("averaged", "taylor")
     )

@@ -27,10 +27,8 @@ _TIME = 1.5
 
 
 def _truth(scene: Scene) -> tuple[np.ndarray, float]:
-    times = [_TIME * k / 8.0 for k in range(1, 9)]
-    found = reference(scene, times)
-    largest = max(float(np.abs(found.omega).max()), *map(abs, scene.omega))
-    return found.omega[-1], largest
+    found = reference(scene, [_TIME * k / 8.0 for k in range(1, 9)])
+    return found.omega[-1], max(float(np.abs(found.omega).max()), *map(abs, scene.omega))
 
 
 @pytest.mark.parametrize("kind", [*MERGED, *LEFT])
@@ -146,8 +144,7 @@ def test_noise_is_what_the_terms_give_over_what_they_give_together() -> None:
 
 def test_a_torque_in_space_that_cancels_is_told_of() -> None:
     amplitude = (1e9, -2e9, 1e9)
-    waves = [(amplitude, 1.0), ((-1e9, 2e9, -1e9), 1.0 + 1e-9)]
-    law = TorqueLaw(sines=waves, frame="space")
+    law = TorqueLaw(sines=[(amplitude, 1.0), ((-1e9, 2e9, -1e9), 1.0 + 1e-9)], frame="space")
     scene = Scene("", (0.3, 0.2, 0.1), moments=(1.0, 1.5, 2.0), torque=law)
     found: Any = solve(scene, [1.0], "auto", 1e-12, attitude=True)
     assert found.ended == "sensitive"

@@ -60,8 +60,7 @@ def by_momentum(scene: Scene) -> Callable[[float, Any], list[float]]:
 
     def slopes(time: float, state: Any) -> list[float]:
         momentum, (a, b, c, d) = np.array(state[:3]), state[3:]
-        inertia = sum(each * time**n for n, each in enumerate(matrices))
-        omega = np.linalg.solve(inertia, momentum)
+        omega = np.linalg.solve(sum(each * time**n for n, each in enumerate(matrices)), momentum)
         if law is None:
             given: Any = scene.torque
             push = np.array(given.at(time, omega, state[3:]))
@@ -72,11 +71,9 @@ def by_momentum(scene: Scene) -> Callable[[float, Any], list[float]]:
                 push = push + 2.0 * np.cross(v, np.cross(v, push) + a * push)
         x, y, z = omega
         turn = [
-            -0.5 * (b * x + c * y + d * z),
-            0.5 * (a * x + c * z - d * y),
-            0.5 * (a * y + d * x - b * z),
-            0.5 * (a * z + b * y - c * x),
-        ]
+            -0.5 * (b * x + c * y + d * z), 0.5 * (a * x + c * z - d * y),
+            0.5 * (a * y + d * x - b * z), 0.5 * (a * z + b * y - c * x),
+        ]  # fmt: skip
         return [*(push - np.cross(omega, momentum)), *turn]
 
     return slopes
@@ -98,8 +95,7 @@ def scipy_end(scene: Scene, time: float) -> tuple[Any, Any]:
 
 def difference(first: Any, second: Any) -> float:
     """Return the largest difference of two omegas, relative to the largest component."""
-    apart = np.abs(np.subtract(first, second)).max()
-    return float(apart / max(1e-3, np.abs(second).max()))
+    return float(np.abs(np.subtract(first, second)).max() / max(1e-3, np.abs(second).max()))
 
 
 @pytest.mark.sampled

@@ -13,8 +13,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from pyharness import InputError, Scene, TorqueLaw, prepare
-from pyharness.engine.solve import solve
+from pyharness import InputError, Scene, TorqueLaw, prepare, solve
 from pyharness.model.errors import TimedError
 from pyharness.model.extension import extension
 from pyharness.model.scene import Triple
@@ -75,8 +74,7 @@ def test_moments_of_any_size_have_their_second_words() -> None:
     moments, omega = (0.7, 1.9, 2.3), (1.1, -0.6, 0.9)
     near = solve(Scene("", omega, moments=moments), [1e6], "closed-form", 1e-9).omega
     for power in (-300, 200):
-        w = [x * 2.0**power for x in omega]
-        far = Scene("", w, moments=[x * 2.0**900 for x in moments])
+        far = Scene("", [x * 2.0**power for x in omega], moments=[x * 2.0**900 for x in moments])
         found = solve(far, [1e6 / 2.0**power], "closed-form", 1e-9).omega
         np.testing.assert_array_equal(found / 2.0**power, near)
 
@@ -249,8 +247,7 @@ def test_what_the_sum_of_a_sphere_can_not_hold_is_added_at_the_end() -> None:
     """Sixteen increments, each a twentieth of a unit in the last place, make two thirds of one."""
     pushes = tuple(((0.0, 1e-17, 0.0), 0.0) for _ in range(16))
     scene = Scene("", (0.0, 1.0, 0.0), moments=(1.0,) * 3, torque=TorqueLaw(cosines=pushes))
-    found = solve(scene, [1.0], "closed-form", 1e-9)
-    assert found.omega[0, 1] == 1.0 + 2.0**-52
+    assert solve(scene, [1.0], "closed-form", 1e-9).omega[0, 1] == 1.0 + 2.0**-52
 
 
 def test_amplification_before_the_last_time_counts_near_the_separatrix() -> None:

@@ -140,11 +140,9 @@ def test_capsule_and_function_keep_the_solver() -> None:
 
 
 def test_solution_that_fails_says_so() -> None:
-    runaway = Scene("runaway", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))
-    call = prepare(runaway, "taylor").ctypes
+    call = prepare(Scene("runaway", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0)), "taylor").ctypes
     start, state = np.ones(3), np.zeros(3)
-    status = call.function(call.data, start.ctypes.data, 2.0, state.ctypes.data)
-    assert ENDS[status] == "overflow"
+    assert ENDS[call.function(call.data, start.ctypes.data, 2.0, state.ctypes.data)] == "overflow"
     assert np.isnan(state).all()
 
 
@@ -158,13 +156,11 @@ def test_statuses_of_the_header_are_those_of_the_kernels() -> None:
 
 def test_a_copy_has_an_address_of_its_own() -> None:
     solver = prepare(BRICK)
-    again = pickle.loads(pickle.dumps(solver))
-    assert again.ctypes.data != solver.ctypes.data
+    assert pickle.loads(pickle.dumps(solver)).ctypes.data != solver.ctypes.data
 
 
 def test_a_solver_for_a_full_inertia_has_no_compiled_call() -> None:
-    matrix = ((3.0, 0.2, -0.1), (0.2, 2.0, 0.3), (-0.1, 0.3, 1.2))
-    full = Scene("full", BRICK.omega, inertia=matrix)
+    full = Scene("full", BRICK.omega, inertia=((3.0, 0.2, -0.1), (0.2, 2.0, 0.3), (-0.1, 0.3, 1.2)))
     for solver in (prepare(full), prepare(full, attitude=True)):
         assert not hasattr(solver, "ctypes")
         assert not hasattr(solver, "capsule")

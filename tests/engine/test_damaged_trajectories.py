@@ -14,11 +14,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import case_scene, load, solve
+from pyharness import Trajectory, case_scene, load, solve
 from pyharness.model.archive import archive_of
 from pyharness.model.symbols import MOST_OPERATIONS
 from pyharness.model.tape import Tape
-from pyharness.model.trajectory import Trajectory
 from tests.conftest import Patch
 from tests.engine.test_trajectory_reader import arrays_of, of_program, with_attitude
 from tests.engine.test_work import GENTLE, scene_with, written

@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import ChangingMoments, InputError, Scene, TorqueLaw, solve, torques
+from pyharness import ChangingMoments, InputError, Scene, TorqueLaw, Trajectory, solve, torques
+from pyharness.engine.steps import dense
 from pyharness.engine.methods import taylor
 from pyharness.engine.plan.registry import FIXED_STEP
-from pyharness.engine.steps import dense
 from pyharness.events import crosses
 from pyharness.model.dense_output import DenseOutput, Pieces
-from pyharness.model.trajectory import Trajectory
 from tests.campaigns import dense_campaign
 from tests.conftest import Capture, Patch
 
@@ -55,8 +54,7 @@ def largest_error(sol: DenseOutput, truth: Trajectory) -> float:
 
 
 def test_the_polynomials_join() -> None:
-    found = solve(SCENES["law"], [-4.0, 12.0], attitude=True, dense_output=True)
-    pieces = sol_of(found).states
+    pieces = sol_of(solve(SCENES["law"], [-4.0, 12.0], attitude=True, dense_output=True)).states
     assert isinstance(pieces, Pieces)
     inner = pieces.edges[1:-1]
     assert len(inner) > 10
@@ -122,8 +120,7 @@ def test_times_before_and_after() -> None:
     back = solve(SCENES["law"], [-1.0, -3.0], dense_output=True)
     assert (sol_of(back).t_min, sol_of(back).t_max) == (-3.0, 0.0)
     assert sol_of(back)(0.0) == pytest.approx(OMEGA, rel=1e-15)
-    still = sol_of(solve(BRICK, 0.0, dense_output=True))
-    assert still(0.0).tolist() == list(OMEGA)
+    assert sol_of(solve(BRICK, 0.0, dense_output=True))(0.0).tolist() == list(OMEGA)
 
 
 def test_shapes_and_defaults() -> None:

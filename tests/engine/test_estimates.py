@@ -78,8 +78,7 @@ def test_estimates_change_no_bit_and_do_not_depend_on_the_threads(name: str) -> 
     assert without.error is without.growth is without.estimates is None
     for each in ("omega", "attitude", "status"):
         np.testing.assert_array_equal(getattr(found, each), getattr(without, each))
-    again = solved(name, estimates=True, threads=3, out=found)
-    assert again is found
+    assert solved(name, estimates=True, threads=3, out=found) is found
     np.testing.assert_array_equal(found.estimates, solved(name, estimates=True).estimates)
 
 

@@ -17,14 +17,11 @@ from tests.engine.test_events import events_of, times_of, with_attributes
 POINTS = ([1.0, 2.0, 3.0, 4.0], [1.0, 2.0, 3.0, 4.0, 5.0, 6.0], [0.3, 1.7, 2.9, 6.99], [1.75, 3.5])
 
 
-@pytest.mark.parametrize(
-    ("kind", "seed"),
-    [
-        *((kind, seed) for kind in CORNERS for seed in (5000, 5001)),
-        # Corners whose value is the rounding error of a larger term, and one near the start.
-        ("rectified", 1014), ("rectified", 1008), ("rectified", 9091), ("corners", 9035),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("kind", "seed"), [
+    *((kind, seed) for kind in CORNERS for seed in (5000, 5001)),
+    # Corners whose value is the rounding error of a larger term, and one near the start.
+    ("rectified", 1014), ("rectified", 1008), ("rectified", 9091), ("corners", 9035),
+])  # fmt: skip
 def test_planted_corners_are_found(kind: str, seed: int) -> None:
     tally = driver.Tally()
     search(kind, seed, tally)
@@ -102,8 +99,7 @@ def test_corners_are_repeated_with_the_period(function: Any) -> None:
 def test_corners_are_events_without_a_direction() -> None:
     roots = times_of(BODY, 30.0, lambda t, w: w[0])
     for direction in (-1, 1):
-        event = with_attributes(lambda t, w: abs(w[0]), False, direction)
-        assert times_of(BODY, 30.0, event) == []
+        assert times_of(BODY, 30.0, with_attributes(lambda t, w: abs(w[0]), False, direction)) == []
     for count in (1, 3):
         found = solve(BODY, [0.5, 30.0], events=with_attributes(lambda t, w: abs(w[0]), count))
         assert events_of(found)[0][0] == pytest.approx(roots[:count], abs=1e-12)

@@ -92,8 +92,7 @@ def test_an_interval_of_zeros_is_shorter_than_a_polynomial() -> None:
     scene = Scene("", omega, moments=moments)
     # From a run at the tolerance 1e-13.
     for end, wanted in ((-1.0, [-0.61028]), (1.5, [0.2478, 1.0683])):
-        found = times_of(scene, end, spring, tolerance=1e-6)
-        assert found == pytest.approx(wanted, abs=1e-4)
+        assert times_of(scene, end, spring, tolerance=1e-6) == pytest.approx(wanted, abs=1e-4)
 
 
 @pytest.mark.sampled

@@ -54,14 +54,11 @@ def test_planted_roots_are_found_and_none_is_invented(kinds: tuple[str, ...], co
     assert tally.faults == []
 
 
-@pytest.mark.parametrize(
-    ("kind", "seed"),
-    [
-        ("cosine", 3000260), ("cosine", 3000518), ("polynomial", 3000822), ("edges", 1000003),
-        # A simple root was lost beside one of multiplicity 7.
-        ("odd", 5402000106),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("kind", "seed"), [
+    ("cosine", 3000260), ("cosine", 3000518), ("polynomial", 3000822), ("edges", 1000003),
+    # A simple root was lost beside one of multiplicity 7.
+    ("odd", 5402000106),
+])  # fmt: skip
 def test_roots_of_planted_functions_are_found(kind: str, seed: int) -> None:
     tally = driver.Tally()
     search(kind, seed, tally)
@@ -109,8 +106,7 @@ def test_events_of_a_body_are_those_of_scipy(method: str) -> None:
 
 
 def test_fixed_step_has_the_events_of_its_dense_output() -> None:
-    scene = replace(BODY, step_size=0.01)
-    found: Any = solve(scene, 30.0, "rk4", events=second, dense_output=True)
+    found: Any = solve(replace(BODY, step_size=0.01), 30.0, "rk4", events=second, dense_output=True)
     (times,), (states,) = events_of(found)
     assert len(times) == 4
     np.testing.assert_allclose(times, times_of(BODY, 30.0, second), atol=1e-5)

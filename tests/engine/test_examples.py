@@ -27,8 +27,7 @@ def example(name: str) -> Any:
 
 def in_space(found: Any, vectors: Array) -> Array:
     """Return vectors about the body axes, one per time, in components about the axes of space."""
-    matrices = found.found.rotation().as_matrix()
-    return np.asarray(np.einsum("nij,nj->ni", matrices, vectors))
+    return np.asarray(np.einsum("nij,nj->ni", found.found.rotation().as_matrix(), vectors))
 
 
 def test_every_program_is_an_example() -> None:
@@ -140,14 +139,12 @@ def test_page_has_the_program_and_its_picture(name: str) -> None:
 def test_picture_is_that_of_its_numbers(name: str) -> None:
     """The stored numbers beside a picture are those of today, to six digits."""
     stored = list(csv.reader((EXAMPLES / f"{name}.csv").read_text().splitlines()))
-    today = draw.picture(name).numbers.in_full()
-    old, new = stored[1:], list(today)[1:]
+    old, new = stored[1:], list(draw.picture(name).numbers.in_full())[1:]
     assert [row[0] for row in old] == [row[0] for row in new]
     was, now = (np.array([[float(x) for x in row[1:]] for row in rows]) for rows in (old, new))
     for curve in {row[0] for row in old}:
         own = [row[0] == curve for row in old]
-        error = np.abs(was[own] - now[own])
-        assert (error < 1e-5 * np.abs(was[own]).max(axis=0)).all(), curve
+        assert (np.abs(was[own] - now[own]) < 1e-5 * np.abs(was[own]).max(axis=0)).all(), curve
 
 
 @pytest.mark.campaign

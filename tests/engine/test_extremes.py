@@ -115,13 +115,10 @@ def test_scipy_gives_up_by_what_it_costs(monkeypatch: pytest.MonkeyPatch) -> Non
 RATE = (1e244, -2e244, 0.0)
 
 
-@pytest.mark.parametrize(
-    ("law", "time"),
-    [
-        (TorqueLaw(rate=RATE), 7.0), (TorqueLaw((5e163, 2e163, 0.0), RATE), 7.0),
-        (TorqueLaw(sines=[((1e150, 0.0, 0.0), 1e-220)]), 1e90),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("law", "time"), [
+    (TorqueLaw(rate=RATE), 7.0), (TorqueLaw((5e163, 2e163, 0.0), RATE), 7.0),
+    (TorqueLaw(sines=[((1e150, 0.0, 0.0), 1e-220)]), 1e90),
+])  # fmt: skip
 def test_a_torque_that_underflows_in_other_units_is_not_ignored(
     law: TorqueLaw, time: float
 ) -> None:
@@ -139,8 +136,7 @@ def test_a_torque_that_underflows_in_other_units_is_not_ignored(
 @pytest.mark.parametrize("method", ["auto", "dop853"])
 def test_a_rate_about_one_axis_does_not_underflow_beside_another_torque(method: str) -> None:
     law = TorqueLaw((1e200, 0.0, 0.0), rate=(0.0, 1e200, 0.0))
-    scene = Scene("", REST, (2.0, 2.0, 2.0), torque=law)
-    found = solve(scene, [1.0], method)
+    found = solve(Scene("", REST, (2.0, 2.0, 2.0), torque=law), [1.0], method)
     assert found.omega[0] == pytest.approx([5e199, 2.5e199, 0.0], rel=1e-9)
 
 

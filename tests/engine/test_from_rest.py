@@ -28,13 +28,10 @@ def check(omega: OfTime, rate: OfTime, end: float, tolerance: float) -> None:
     assert np.array(rows)[:, 2] == pytest.approx(float(omega(end)), rel=0.0, abs=tolerance * size)
 
 
-@pytest.mark.parametrize(
-    ("a", "n", "end", "tolerance"),
-    [
-        (3.0, 16, 2.6, 1.1e-6), (3.1, 13, 2.9, 4.3e-6), (3.9, 14, 2.7, 7.2e-5),
-        (4.5, 21, 1.7, 2.6e-6), (10.9, 8, 1.5, 1.15e-4),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("a", "n", "end", "tolerance"), [
+    (3.0, 16, 2.6, 1.1e-6), (3.1, 13, 2.9, 4.3e-6), (3.9, 14, 2.7, 7.2e-5),
+    (4.5, 21, 1.7, 2.6e-6), (10.9, 8, 1.5, 1.15e-4),
+])  # fmt: skip
 def test_terms_that_cancel_do_not_make_omega_large(
     a: float, n: int, end: float, tolerance: float
 ) -> None:
@@ -45,13 +42,10 @@ def test_terms_that_cancel_do_not_make_omega_large(
     check(lambda t: np.sin(a * t) * (1 - t / 2) ** n, rate, end, tolerance)
 
 
-@pytest.mark.parametrize(
-    ("switched", "push", "size", "a", "end", "tolerance"),
-    [
-        (3.4e-3, 0.11, 1.0, 24.1, 5.14, 5.6e-4), (1.2e-3, 24.0, 0.5, 16.3, 4.84, 1.3e-6),
-        (1.7e-3, 21.0, 0.3, 9.2, 5.1, 1.1e-3), (1.6e-3, 0.15, 0.7, 19.1, 3.88, 5.8e-4),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("switched", "push", "size", "a", "end", "tolerance"), [
+    (3.4e-3, 0.11, 1.0, 24.1, 5.14, 5.6e-4), (1.2e-3, 24.0, 0.5, 16.3, 4.84, 1.3e-6),
+    (1.7e-3, 21.0, 0.3, 9.2, 5.1, 1.1e-3), (1.6e-3, 0.15, 0.7, 19.1, 3.88, 5.8e-4),
+])  # fmt: skip
 def test_a_push_that_a_switch_ends_does_not_make_omega_large(
     switched: float, push: float, size: float, a: float, end: float, tolerance: float
 ) -> None:

@@ -13,10 +13,9 @@ import mpmath
 import numpy as np
 import pytest
 
-from pyharness import InputError, Scene, TorqueLaw, case_scene
-from pyharness.engine.plan.registry import GAUSS, METHODS
-from pyharness.engine.solve import solve
+from pyharness import InputError, Scene, TorqueLaw, case_scene, solve
 from pyharness.engine.system.kernel_input import normalized
+from pyharness.engine.plan.registry import GAUSS, METHODS
 from pyharness.model.extension import extension
 from pyharness.model.trajectory import Array
 from pyharness.truth.reference import reference
@@ -79,8 +78,7 @@ _STEPS = {
 def test_order_is_twice_the_stages(case: int, stages: int, steps: tuple[int, int]) -> None:
     law = TorqueLaw()
     if case == 7:
-        rate = case_scene(7).law.rate
-        law = TorqueLaw(rate=rate, sines=(((9.0, 9.0, 0.0), 3.0),))
+        law = TorqueLaw(rate=case_scene(7).law.rate, sines=(((9.0, 9.0, 0.0), 3.0),))
     scene = replace(case_scene(case), torque=law)
     end = 3.0
     truth = reference(scene, [end]).omega[0]
@@ -95,8 +93,7 @@ def test_finest_tolerance_is_met(method: str) -> None:
     for name, motion in motions("cases").items():
         found = solve(motion.scene, motion.times, method, finest)
         check_error(motion, found.omega, None, finest, name, steps=found.steps)
-        apart = np.abs(found.omega - motion.omega).max()
-        assert apart <= (finest + 1e-15) * motion.largest
+        assert np.abs(found.omega - motion.omega).max() <= (finest + 1e-15) * motion.largest
         assert 0 < found.steps < found.evaluations
 
 

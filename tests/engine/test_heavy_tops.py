@@ -38,8 +38,7 @@ def test_cosine_of_the_tilt_is_that_of_the_elliptic_solution() -> None:
     u0 = float(np.cos(tilt))
     along, beta = c * spin / a, 2.0 * WEIGHT / a
     # u'^2 = beta (u0 - u) (1 - u^2) - along^2 (u0 - u)^2 has the other roots:
-    other = np.roots([beta, -(along**2), along**2 * u0 - beta])
-    lowest, highest = sorted(float(x) for x in other)
+    lowest, highest = sorted(float(x) for x in np.roots([beta, -(along**2), along**2 * u0 - beta]))
     modulus = (u0 - lowest) / (highest - lowest)
     rate = mpmath.sqrt(beta * (highest - lowest)) / 2
     quarter = mpmath.ellipk(modulus)

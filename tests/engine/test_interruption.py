@@ -14,17 +14,12 @@ import numpy as np
 import pytest
 import scipy.integrate  # noqa: F401  (an interrupt within its import may be lost)
 
-from pyharness import torques
-from pyharness.engine.many.many import solve_many
-from pyharness.engine.prepared.solver import prepare
-from pyharness.engine.solve import solve
+from pyharness import Scene, prepare, run_many, solve, solve_many, torques
 from pyharness.model import extension as room
 from pyharness.model.extension import extension
 from pyharness.model.listing import PROGRAMS, Listing
-from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw, Wave
 from pyharness.thesis.compiled import run
-from pyharness.thesis.many import run_many
 from tests.cli.interrupts import hearing
 from tests.conftest import Patch
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import Scene, TorqueLaw, prepare, solve, solve_many, torques
+from pyharness import Scene, TorqueLaw, prepare, principal, solve, solve_many, torques
 from pyharness.checks.scenes.state_scenes import READY, draw, draw_ready
 from pyharness.engine.system import leaf_cache
 from pyharness.engine.system.lane_leaves import whole_source
@@ -27,7 +27,6 @@ from pyharness.model.arithmetic import REFUSED
 from pyharness.model.codes import Statuses
 from pyharness.model.constant_body import with_constant_body
 from pyharness.model.extension import extension
-from pyharness.model.principal import principal
 from pyharness.model.recurrences import OPERATIONS, WAVE
 from pyharness.model.symbols import SYMBOLS
 from pyharness.truth.reference import reference
@@ -83,8 +82,7 @@ def terms(scene: Scene, address: int, h: float) -> Any:
     array = kernel_tape(system_of(with_constant_body(scene))).copy()
     array[7:8].view(np.int64)[:] = address
     state = np.array([*scene.omega, *(scene.attitude or ())])
-    allowed = np.full(len(state), 1e-9)
-    return taylor_step(array, 0.4, state, allowed, 1e-12, abs(h), 0.4 + h).terms
+    return taylor_step(array, 0.4, state, np.full(len(state), 1e-9), 1e-12, abs(h), 0.4 + h).terms
 
 
 def scenes(number: int) -> Scene:
@@ -181,8 +179,7 @@ def test_growth_and_estimate_are_those_of_the_interpreter(attitude: Any) -> None
     assert states[1] == pytest.approx(states[0], rel=0.0, abs=1e-12)
     assert found[1].growth == pytest.approx(found[0].growth, rel=1e-9)
     assert found[1].error == pytest.approx(found[0].error, rel=0.1, abs=0.0)
-    truth = reference(scene, [2.0])
-    assert states[1][:3] == pytest.approx(truth.omega[0], rel=0.0, abs=1e-9)
+    assert states[1][:3] == pytest.approx(reference(scene, [2.0]).omega[0], rel=0.0, abs=1e-9)
 
 
 def start_many(scene: Scene, n: int) -> Any:

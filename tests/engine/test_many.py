@@ -125,8 +125,7 @@ def test_many_bodies_are_those_of_the_prepared_solver(method: str) -> None:
 def test_bodies_by_coefficients_under_a_torque_of_the_state() -> None:
     rows = np.array([(0.1, 0.2, -0.3), (0.2, 0.1, -0.3)])
     scene = Scene("", (1, 2, 3), coefficients=rows[0], torque=torques.damping(0.1))
-    found = solve_many(scene, 2.0, coefficients=rows)
-    for row, omega in zip(rows, found.omega, strict=True):
+    for row, omega in zip(rows, solve_many(scene, 2.0, coefficients=rows).omega, strict=True):
         alone = solve(replace(scene, coefficients=row), 2.0)
         assert omega == pytest.approx(alone.omega[0], rel=1e-9)
 
@@ -141,8 +140,7 @@ def test_kernels_refuse_a_method_that_they_do_not_have() -> None:
             solver = prepare(scene, "rk4")
             assert np.isnan(solver(scene.omega, 1.0)).all()
             assert solver.status == "refused"
-            found = solve_many(scene, 1.0, omega=np.ones((40, 3)), method="rk4")
-            assert not found.has_result.any()
+            assert not solve_many(scene, 1.0, omega=np.ones((40, 3)), method="rk4").has_result.any()
     rows = extension().fixed_step_solution(
         *normalized(scene), scene.omega, [1.0], 99, 0.1, effort=np.array([1.0, 0.0])
     )
@@ -153,12 +151,10 @@ def test_what_has_no_lanes_is_solved_one_by_one() -> None:
     starts = np.random.default_rng(1).standard_normal((5, 3))
     law = TorqueLaw(rate=(1.0, 0.0, 2.0), sines=[((1.0, 2.0, 0.0), 3.0)])
     ways = [
-        (replace(TOP, torque=law), "rk4"),
-        (replace(TOP, moments=(2.0, 2.0, 1.0)), "rk4"),
-        (replace(TOP, torque=law), "gauss-3"),
-        (TOP, "quick"),
+        (replace(TOP, torque=law), "rk4"), (replace(TOP, moments=(2.0, 2.0, 1.0)), "rk4"),
+        (replace(TOP, torque=law), "gauss-3"), (TOP, "quick"),
         (replace(TOP, moments=(2.0, 2.0, 2.0), torque=law), "auto"),
-    ]
+    ]  # fmt: skip
     for scene, method in ways:
         solver = prepare(scene, method, 1e-6)
         alone = [solver(start, 1.5) for start in starts]
@@ -335,22 +331,18 @@ def test_loops_as_written_do_what_they_do_written_out(
         found = solve_many(TOP, method=name, tolerance=tolerance, step=0.001, **drawn)
         solved = status == Statuses.COMPLETE
         assert np.count_nonzero(solved) > 20
-        scale = np.abs(found.omega).max(axis=1, keepdims=True)
-        off = np.abs(omega - found.omega) / scale
+        off = np.abs(omega - found.omega) / np.abs(found.omega).max(axis=1, keepdims=True)
         assert off[solved].max() <= 1e-11
         if found.attitude is not None:
             assert np.abs(attitude - found.attitude)[solved].max() <= 1e-11
 
 
-@pytest.mark.parametrize(
-    "torque",
-    [
-        TorqueLaw(),
-        TorqueLaw(constant=(1.0, -2.0, 0.5)),
-        TorqueLaw(sines=[((1.0, 2.0, 3.0), 2.0), ((1.0, 2.0, 3.5), -2.0)]),
-        TorqueLaw(constant=(1.0, 0.0, 2.0), cosines=[((1.0, 2.0, 3.0), 0.0)]),
-    ],
-)
+@pytest.mark.parametrize("torque", [
+    TorqueLaw(),
+    TorqueLaw(constant=(1.0, -2.0, 0.5)),
+    TorqueLaw(sines=[((1.0, 2.0, 3.0), 2.0), ((1.0, 2.0, 3.5), -2.0)]),
+    TorqueLaw(constant=(1.0, 0.0, 2.0), cosines=[((1.0, 2.0, 3.0), 0.0)]),
+])  # fmt: skip
 def test_a_scene_and_the_same_arrays_have_the_same_bits(torque: TorqueLaw) -> None:
     """The rows of a scene are kept from call to call, and an array replaces only its own row."""
     scene = replace(TOP, torque=torque)
@@ -365,8 +357,7 @@ def test_a_scene_and_the_same_arrays_have_the_same_bits(torque: TorqueLaw) -> No
     assert same(solve_many(scene, 3.0, omega=starts), first)
     for name, array in arrays.items():
         assert same(solve_many(scene, 3.0, omega=starts, **{name: array}), first), name
-    other = solve_many(scene, 3.0, omega=starts, torque_constant=(3.0, 1.0, 1.0))
-    assert not same(other, first)
+    assert not same(solve_many(scene, 3.0, omega=starts, torque_constant=(3.0, 1.0, 1.0)), first)
     assert same(solve_many(scene, 3.0, omega=starts), first)
 
 
@@ -415,14 +406,11 @@ def test_a_prepared_solver_takes_many_starts() -> None:
         assert np.allclose(many(starts, 2.0)[1], usual.attitude, rtol=0.0, atol=1e-9)
 
 
-@pytest.mark.parametrize(
-    "torque",
-    [
-        TorqueLaw((1.0, 0.0, 0.0)),
-        TorqueLaw((1.0, 0.0, 0.0), frame="space"),
-        torques.damping([1.0, 2.0, 3.0]),
-    ],
-)
+@pytest.mark.parametrize("torque", [
+    TorqueLaw((1.0, 0.0, 0.0)),
+    TorqueLaw((1.0, 0.0, 0.0), frame="space"),
+    torques.damping([1.0, 2.0, 3.0]),
+])  # fmt: skip
 def test_a_bad_attitude_spoils_no_other_of_a_prepared_solver(torque: Any) -> None:
     """Under most torques one such row had raised an error, and all results were lost."""
     starts, turns = np.ones((3, 3)), np.ones((3, 4))
@@ -438,19 +426,11 @@ def test_a_bad_attitude_spoils_no_other_of_a_prepared_solver(torque: Any) -> Non
     assert np.array_equal(omega[1], good[0][1])
 
 
-@pytest.mark.parametrize(
-    "given",
-    [
-        {"omega": np.ones((5, 2))},
-        {"omega": "abc"},
-        {"omega": [10**400, 1, 1]},
-        {"omega": [[1.0, 2.0, 3.0], [1.0]]},
-        {"omega": np.ones((4, 3)), "moments": np.ones((3, 3))},
-        {"moments": [1.0, 1, 1], "coefficients": [1.0, 1, 1]},
-        {"threads": 0},
-        {"effort": 0.0},
-    ],
-)
+@pytest.mark.parametrize("given", [
+    {"omega": np.ones((5, 2))}, {"omega": "abc"}, {"omega": [10**400, 1, 1]},
+    {"omega": [[1.0, 2.0, 3.0], [1.0]]}, {"omega": np.ones((4, 3)), "moments": np.ones((3, 3))},
+    {"moments": [1.0, 1, 1], "coefficients": [1.0, 1, 1]}, {"threads": 0}, {"effort": 0.0},
+])  # fmt: skip
 def test_mistake_has_the_same_words_for_methods_and_programs(given: dict[str, Any]) -> None:
     with pytest.raises(InputError) as first:
         solve_many(TOP, 1.0, **given)
@@ -470,7 +450,6 @@ def test_one_row_is_shared_and_fractions_are_numbers() -> None:
     found = solve_many(TOP, times, omega=starts[:1], moments=moments)
     wanted = solve_many(TOP, times, omega=starts, moments=np.tile([2.5, 3.0, 4.0], (4, 1)))
     assert np.array_equal(found.omega, wanted.omega)
-    sizes = np.full(4, 0.01)
-    run = run_many(TOP, LISTING, omega=starts[:1], moments=moments, step_size=sizes)
+    run = run_many(TOP, LISTING, omega=starts[:1], moments=moments, step_size=np.full(4, 0.01))
     alone = run_many(TOP, LISTING, omega=starts[0], moments=[2.5, 3.0, 4.0], step_size=0.01)
     assert np.array_equal(run.omega, np.tile(alone.omega, (4, 1, 1)))

@@ -23,8 +23,7 @@ def test_no_bit_depends_on_other_bodies(method: str, level: int) -> None:
     """`python -m tests.many_alone` tries more."""
     settings = {"method": method, "tolerance": 10.0 ** -min(9, METHODS[method]), "effort": 1e-4}
     for by_moments in (True, False):
-        drawn = mixed(80, 5, by_moments)
-        assert differing(drawn, 1, alone=10, **settings) == {}
+        assert differing(mixed(80, 5, by_moments), 1, alone=10, **settings) == {}
 
 
 @pytest.mark.parametrize("tolerance", [1e-14, 1e-6])
@@ -200,8 +199,7 @@ def test_what_amplifies_errors_is_left_to_the_single_kernel(tolerance: float, le
 
 def test_estimates_of_lanes_are_trusted_less_where_errors_grow(level: int) -> None:
     """Test one of 200 000 random bodies, whose error by lanes alone would be near the tolerance."""
-    drawn = unstable(5000, 108, with_torque=True)
-    body = {name: values[946:947] for name, values in drawn.items()}
+    body = {name: values[946:947] for name, values in unstable(5000, 108, with_torque=True).items()}
     truth = solve_many(BASE, method="taylor", tolerance=1e-13, **body).omega
     found = solve_many(BASE, method="taylor", tolerance=1e-3, **body)
     assert found.ended[0] == "complete"

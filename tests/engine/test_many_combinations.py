@@ -204,8 +204,7 @@ def test_a_state_that_stays_zero_is_solved() -> None:
 
 
 def reasons(**given: Any) -> dict[int, str]:
-    torque = given.pop("torque", TorqueLaw())
-    scene = Scene("", (1.0, 1.0, 1.0), moments=MOMENTS, torque=torque)
+    scene = Scene("", (1.0, 1.0, 1.0), moments=MOMENTS, torque=given.pop("torque", TorqueLaw()))
     found: Ensemble = solve_many(scene, 1.0, **given)
     return found.refusals or {}
 

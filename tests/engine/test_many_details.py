@@ -146,8 +146,7 @@ def test_a_body_without_result_has_no_details() -> None:
     assert found.t_events[0][0] is not None
     assert [each is None for each in found.t_events[0]] == [False, True, True]
     assert [each is None for each in found.y_events[0]] == [False, True, True]
-    missing = np.isnan(found.sensitivities["moments"]).all(axis=(1, 2))
-    assert missing.tolist() == [False, True, True]
+    assert np.isnan(found.sensitivities["moments"]).all(axis=(1, 2)).tolist() == [False, True, True]
     assert list(found.refusals) == [1]
     assert "I2 is -3" in found.refusals[1]
 

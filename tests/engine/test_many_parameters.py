@@ -79,8 +79,7 @@ def test_each_body_is_solved_to_the_tolerance(kind: str, with_moments: bool) -> 
             attitude=kind == "attitude",
         )  # fmt: skip
         last = -1 if given["t_end"][i] > 0 else 0
-        largest = np.abs(truth.omega).max()
-        allowed = largest * (1e-8 + 4e-15 * found.growth[i])
+        allowed = np.abs(truth.omega).max() * (1e-8 + 4e-15 * found.growth[i])
         assert np.abs(found.omega[i] - truth.omega[last]).max() <= allowed
         if truth.attitude is not None and found.attitude is not None:
             apart = np.abs(found.attitude[i]) - np.abs(truth.attitude[last])

@@ -39,8 +39,7 @@ def wheel(t: Any, omega: Any, attitude: Any, states: Any) -> Any:
 def keeps_momentum(found: Any, tolerance: float) -> Any:
     momentum = found.omega * np.array(MOMENTS)
     momentum[:, 2] += found.states["wheel"]
-    kept = turned_to_space(found.attitude, momentum)
-    yield np.ptp(kept, axis=0), 20.0 * tolerance + 1e-13
+    yield np.ptp(turned_to_space(found.attitude, momentum), axis=0), 20.0 * tolerance + 1e-13
     yield 0.5, np.ptp(found.states["wheel"])
 
 

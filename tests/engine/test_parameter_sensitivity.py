@@ -12,12 +12,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pyharness import InputError, Scene, TorqueLaw, load, solve
+from pyharness import ChangingMoments, InputError, Scene, TorqueLaw, load, solve
 from pyharness.engine.system.parameters import parameters_of
 from pyharness.engine.torques.scene_reader import scene_of_file
 from pyharness.events import crosses
 from pyharness.model.attitude import product
-from pyharness.model.changing import ChangingMoments
 from pyharness.torques import damping, recorded, table
 from tests.campaigns import parameter_campaign
 from tests.campaigns.parameter_campaign import KINDS, LIMIT, random_scene
@@ -45,8 +44,7 @@ def differences(
 
     def rows(k: int, size: float) -> Any:
         changed = [x + size * (k == j) for j, x in enumerate(values)]
-        found = solve(made(changed), times, "taylor", 1e-15, attitude=attitude)
-        return found.y.T
+        return solve(made(changed), times, "taylor", 1e-15, attitude=attitude).y.T
 
     h = 2.0**-9
     columns = [
@@ -101,8 +99,7 @@ def test_every_parameter_of_a_law_on_both_sides_of_0(times: list[float]) -> None
         ),
     }  # fmt: skip
     for name, (scene_of, values) in made.items():
-        expected = differences(scene_of, values, times, attitude=True)
-        check(found[name], expected, 2e-8)
+        check(found[name], differences(scene_of, values, times, attitude=True), 2e-8)
 
 
 def test_rows_at_time_0_are_the_derivatives_of_the_initial_state() -> None:
@@ -129,8 +126,7 @@ def test_more_columns_than_lanes() -> None:
     names = ("omega", "moments", "torque.cosines", "torque.sines", "torque.constant")
     together = slopes(scene, [2.0, 5.0], *names)
     for name in names:
-        alone = slopes(scene, [2.0, 5.0], name)
-        check(together[name], alone, 1e-12)
+        check(together[name], slopes(scene, [2.0, 5.0], name), 1e-12)
 
 
 def pushed_by(torque: Any, scene: Scene = BRICK) -> Scene:
@@ -139,8 +135,7 @@ def pushed_by(torque: Any, scene: Scene = BRICK) -> Scene:
 
 def _full(values: Any) -> Scene:
     a, b, c, d, e, f = values
-    matrix = ((a, d, e), (d, b, f), (e, f, c))
-    return Scene("full", BRICK.omega, inertia=matrix, torque=LAW)
+    return Scene("full", BRICK.omega, inertia=((a, d, e), (d, b, f), (e, f, c)), torque=LAW)
 
 
 def _soon(t: Any) -> Any:
@@ -242,8 +237,7 @@ def _constant(t: Any, omega: Any, *, constant: float = 0.0) -> Any:
 def test_a_torque_that_is_0_need_not_have_periodic_derivatives(law: Any) -> None:
     scene = Scene("zero", (0.1, 0.5, 0.3), moments=(1.0, 2.0, 3.0), torque=law)
     assert scene.torque.is_zero
-    known = parameters_of(scene)
-    names = [name for name in known if name.startswith("torque")]
+    names = [name for name in parameters_of(scene) if name.startswith("torque")]
     found, series = (slopes(scene, [10.0, 200.0], *names, method=x) for x in ("auto", "taylor"))
     if len(names) == 1:
         assert names == ["torque.constant"]

@@ -15,9 +15,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import InputError, Scene, case_scene, prepare
+from pyharness import InputError, Scene, Solver, case_scene, prepare
 from pyharness.engine.prepared.compiled_call import check_call
-from pyharness.engine.prepared.solver import Solver
 from pyharness.model.trajectory import Array
 from tests.engine.test_prepared import RUNAWAY
 

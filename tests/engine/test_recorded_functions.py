@@ -165,16 +165,6 @@ def test_recorded_function_has_the_values_of_numpy(number: int) -> None:
     assert found == pytest.approx([float(x) for x in torque(1.75, omega)], rel=1e-14)
 
 
-@pytest.mark.parametrize(("torque", "message"), [
-    (lambda t, w: -w * np.interp(w, [-np.inf, 1, np.inf], [1, 3, 4]), "not finite"),
-    (lambda t, w: -w * np.interp(t, [0, 2, 1], [1, 3, 4]), "not in ascending order"),
-    (lambda t, w: w * np.interp(1, [0, 2, 1], [1, 3, 4], w[0]), "not in ascending order"),
-    (lambda t, w: -w * np.interp(t, [0, 1], [1, 3, 4]), "not of the same length"),
-])  # fmt: skip
-def test_what_numpy_would_compute_otherwise_is_refused(torque: Torque, message: str) -> None:
-    refused(message, recorded, torque)
-
-
 def test_new_arrays_take_symbols_unless_they_are_of_integers() -> None:
     def torque(t: Any, omega: Any, kind: Any = float) -> Any:
         found, other = np.zeros(3, dtype=kind), np.empty(3)

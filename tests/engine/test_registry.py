@@ -7,10 +7,9 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from pyharness import Scene, TorqueLaw, case_scene, prepare, solve_many
+from pyharness import Scene, TorqueLaw, case_scene, prepare, solve, solve_many
 from pyharness.engine.plan.registry import METHODS, REGISTRY, SCIPY_METHODS
 from pyharness.engine.problem.rescaled import scaled
-from pyharness.engine.solve import solve
 from pyharness.model.errors import TimedError
 from pyharness.thesis.programs import PROGRAM_REGISTRY
 from tests.conftest import Patch

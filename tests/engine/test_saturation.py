@@ -41,8 +41,7 @@ def test_bounded_torque_is_solved(name: str) -> None:
     assert found.ended == "complete"
     assert found.omega[:, 0] == pytest.approx([0.0, 0.5], abs=1e-8)
     assert abs(found.omega[1, 0] - 0.5) / 0.5 <= found.error < 1e-8
-    solver = prepare(scene, tolerance=1e-8)
-    assert solver((0.0, 0.0, 0.0), 25.0)[0] == pytest.approx(0.5, abs=1e-8)
+    assert prepare(scene, tolerance=1e-8)((0.0, 0.0, 0.0), 25.0)[0] == pytest.approx(0.5, abs=1e-8)
     many = solve_many(scene, 25.0, omega=np.zeros((3, 3)), tolerance=1e-8)
     assert many.omega[:, 0] == pytest.approx(0.5, abs=1e-8)
     stepper = Stepper(scene, 1e-10)

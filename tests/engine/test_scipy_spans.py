@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import Scene, opaque, solve
-from pyharness.engine.methods.scipy_run import series_beside
+from pyharness import Scene, StateTorque, opaque, solve
 from pyharness.engine.plan.registry import SCIPY_METHODS
+from pyharness.engine.methods.scipy_run import series_beside
 from pyharness.engine.problem.sides import joined
-from pyharness.model.state_torque import StateTorque
 from pyharness.torques import table
 
 SPHERE = Scene("", (0.0, 0.0, 1.0), moments=(2.0, 2.0, 3.0))
@@ -64,8 +63,7 @@ def test_spans_are_short_where_the_torque_is(sign: float) -> None:
     assert np.abs(beside.rows - solve(scene, np.sort(times)).omega[:: int(sign)]).max() < 1e-9
     spans = beside.spans
     assert spans[-1].end == 20.0 * sign
-    own = next(each for each in spans if abs(each.end) >= 14.0)
-    assert own.longest < 0.02
+    assert next(each for each in spans if abs(each.end) >= 14.0).longest < 0.02
     assert spans[0].longest > 0.1
 
 

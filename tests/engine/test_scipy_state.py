@@ -10,14 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import TorqueLaw, solve
+from pyharness import Scene, TorqueLaw, Trajectory, solve
 from pyharness.checks.scenes.state_scenes import draw
 from pyharness.engine.methods import scipy_state
 from pyharness.engine.methods.scipy_ivp import FINEST, finest_tolerance, scipy_method
 from pyharness.model.errors import InputError, TimedError
-from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque, opaque, replayed
-from pyharness.model.trajectory import Trajectory
 from pyharness.torques import table
 from pyharness.truth.reference import Reference, reference
 
@@ -159,8 +157,7 @@ def test_the_rows_end_where_the_torque_is_singular(
     assert found.time.tolist() == [0.5, 1.0, 3.0][:rows]
     assert np.isfinite(found.omega).all()
     if rows and torque.tape is not None:
-        truth = reference(scene, [0.5, 1.0][:rows])
-        assert _error(found, truth) <= 1e-7
+        assert _error(found, reference(scene, [0.5, 1.0][:rows])) <= 1e-7
 
 
 @pytest.mark.parametrize("name", METHODS)
@@ -274,8 +271,7 @@ def test_the_smallest_tolerance_can_be_met(name: str) -> None:
         scene, times = _random_scene(number)
         least = 1.06 * finest_tolerance(name, scene, times[-1])
         assert FINEST[name] <= least < 1e-6
-        found = scipy_method(name)(scene, times, least)
-        assert _error(found, reference(scene, times)) <= least
+        assert _error(scipy_method(name)(scene, times, least), reference(scene, times)) <= least
 
 
 def test_threads_may_use_lsoda_at_a_time() -> None:

@@ -83,8 +83,7 @@ def test_a_stepper_goes_on(name: str) -> None:
 @pytest.mark.parametrize("start", [0.0, 0.3])
 @pytest.mark.parametrize("n", [17, 20, 26, 40])
 def test_high_powers_of_time_from_rest(n: int, start: float) -> None:
-    scene = _about_z(lambda t, w: (n + 1) * t**n, start)
-    found: Any = solve(scene, [0.5, 1.0])
+    found: Any = solve(_about_z(lambda t, w: (n + 1) * t**n, start), [0.5, 1.0])
     assert found.ended == "complete"
     assert found.omega[:, 2] - start == pytest.approx([0.5 ** (n + 1), 1.0], abs=1e-12)
     pulse = solve(_about_z(lambda t, w: (4.0 * t * (1.0 - t)) ** n, start), 1.0).omega[0, 2]
@@ -177,8 +176,7 @@ def test_what_stops_in_a_finite_time_remains_at_0(name: str, tolerance: float, s
 @pytest.mark.parametrize("power", [0.5, 2 / 3])
 def test_what_may_leave_0_is_not_kept_there(power: float) -> None:
     """Past its touch of 0 the motion is not unique: it may stay for any time."""
-    scene = _about_z(lambda t, w: np.abs(w[2]) ** power, -1.0)
-    found = solve(scene, [1.0, 2.5 / (1.0 - power)])
+    found = solve(_about_z(lambda t, w: np.abs(w[2]) ** power, -1.0), [1.0, 2.5 / (1.0 - power)])
     assert found.ended in ("sensitive", "singular")
     if found.ended == "sensitive":
         assert found.omega[-1, 2] > 0.0

@@ -73,8 +73,7 @@ def test_the_state_within_the_last_step() -> None:
 
 
 def test_before_the_first_step_the_state_is_that_of_time_0() -> None:
-    stepper = Stepper(BRICK, attitude=True)
-    assert stepper.at(0.0).tolist() == [0.1, 2.0, 0.3, 1.0, 0.0, 0.0, 0.0]
+    assert Stepper(BRICK, attitude=True).at(0.0).tolist() == [0.1, 2.0, 0.3, 1.0, 0.0, 0.0, 0.0]
     assert Stepper(BRICK).attitude is None
 
 
@@ -207,8 +206,7 @@ def test_a_level_is_crossed_where_the_operand_is_a_rounding_error() -> None:
 
 def test_a_switch_that_becomes_invisible_is_passed() -> None:
     def torque(t: Any, w: Any) -> list[Any]:
-        pulse = np.exp(-689.6 * (t + 0.8234) ** 2)
-        return [0.1 * np.sign(np.sin(0.8 * pulse)), 0.0 * w[0], 0.0]
+        return [0.1 * np.sign(np.sin(0.8 * np.exp(-689.6 * (t + 0.8234) ** 2))), 0.0 * w[0], 0.0]
 
     stepper = Stepper(Scene("", (0.0, 0.0, 0.4), moments=(1.7, 1.3, 2.5), torque=torque), 1e-6)
     stepper.until(0.5)

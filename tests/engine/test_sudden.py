@@ -139,8 +139,7 @@ def test_a_high_power_is_a_series_of_pulses(name: str) -> None:
     times = [t for t, _ in rows]
     change = np.array([each for _, each in rows])
     if not change.all():
-        found = quad(value, 0.0, times[-1], epsabs=1e-13, epsrel=1e-13, limit=1000)
-        change = np.array([found[0]])
+        change = np.array([quad(value, 0.0, times[-1], epsabs=1e-13, epsrel=1e-13, limit=1000)[0]])
     scale = max(0.3, 0.1 + change[-1])
     for tolerance in (1e-3, 1e-6, 1e-9, 1e-12):
         solution = solve(scene, times, "taylor", tolerance)

@@ -10,7 +10,6 @@ import pytest
 from pyharness import Scene, solve
 from tests.conftest import Patch
 from tests.engine.entry_points import ball, check_ends, ends_of
-from tests.refused import refused
 
 Torque = Callable[[Any, Any], Any]
 BRICK = (1.0, 2.0, 2.5)
@@ -76,11 +75,6 @@ def test_roots_of_fast_and_of_slow_operands_are_exact() -> None:
         found = solve(ball(relay), [5.0], tolerance=tolerance)
         error = abs(found.omega[0, 0] / (5.3 - off.sum()) - 1.0)
         assert error <= 0.1 * tolerance + 1e-14 or found.ended == "sensitive"
-
-
-def test_methods_of_scipy_tell_of_sliding() -> None:
-    scene = ball(lambda t, omega: [-0.1 * np.sign(omega[0]), 0.0, 0.0])
-    refused("back and forth", solve, scene, [10.0], "dop853")
 
 
 @pytest.mark.parametrize("gap", [1e-9, 1e-11, 3e-9])

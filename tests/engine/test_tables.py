@@ -31,11 +31,9 @@ TORQUES = SOURCE.normal(size=(4, 3))
 SPHERE: dict[str, Any] = {"moments": (2.0, 2.0, 2.0)}
 BODY: dict[str, Any] = {"moments": (1.5, 2.0, 3.0)}
 CASES: dict[str, StateTorque] = {
-    "held": table(TIMES, VALUES, "held"),
-    "linear": table(TIMES, VALUES),
-    "cubic": table(TIMES, VALUES, "cubic"),
-    "pulses": pulses(STARTS, DURATIONS, TORQUES),
-}
+    "held": table(TIMES, VALUES, "held"), "linear": table(TIMES, VALUES),
+    "cubic": table(TIMES, VALUES, "cubic"), "pulses": pulses(STARTS, DURATIONS, TORQUES),
+}  # fmt: skip
 
 
 def at(torque: StateTorque, t: float) -> Array:
@@ -94,8 +92,7 @@ def test_pulses_act_from_their_start_until_their_end() -> None:
 
 
 def test_one_torque_is_that_of_all_pulses() -> None:
-    torque = pulses(STARTS, DURATIONS, TORQUES[0])
-    assert torque == pulses(STARTS, DURATIONS, [TORQUES[0]] * 4)
+    assert pulses(STARTS, DURATIONS, TORQUES[0]) == pulses(STARTS, DURATIONS, [TORQUES[0]] * 4)
     # Three rows are torques of three pulses, and three numbers are one torque.
     assert at(pulses([0, 1, 2], [1, 1, 1], TORQUES[:3]), 1.5).tolist() == TORQUES[1].tolist()
     assert at(pulses([0, 1, 2], [1, 1, 1], TORQUES[0]), 1.5).tolist() == TORQUES[0].tolist()
@@ -103,8 +100,7 @@ def test_one_torque_is_that_of_all_pulses() -> None:
 
 def test_pulses_that_touch_but_for_rounding_have_no_gap_and_no_overlap() -> None:
     starts = [n * 0.1 for n in range(50)]
-    torque = pulses(starts, [0.1] * 50, [(n, 0, 0) for n in range(1, 51)])
-    (found,) = tables_of(torque)
+    (found,) = tables_of(pulses(starts, [0.1] * 50, [(n, 0, 0) for n in range(1, 51)]))
     assert len(found.breaks) == 52
     assert np.diff(found.breaks[1:]) == pytest.approx(0.1)
     assert len(tables_of(pulses(starts, [0.1] * 50, (1, 0, 0)))[0].breaks) == 3
@@ -166,8 +162,7 @@ def integral(each: Table, t: Fraction) -> Fraction:
     def until(end: Fraction) -> Fraction:
         """Return the integral from a time before all others."""
         total, begins = Fraction(0), [Fraction(-100), *map(Fraction, each.breaks[1:])]
-        ends = [*begins[1:], Fraction(100)]
-        rows = zip(begins, ends, each.breaks, each.pieces, strict=True)
+        rows = zip(begins, [*begins[1:], Fraction(100)], each.breaks, each.pieces, strict=True)
         for begin, after, origin, piece in rows:
             for power, c in enumerate(piece, 1):
                 low, high = (min(x, end) - Fraction(origin) for x in (begin, after))
@@ -206,17 +201,14 @@ def test_reference_of_held_torques_is_the_sum_of_torque_times_duration() -> None
 def test_reference_accepts_a_short_pulse_in_a_long_motion() -> None:
     """A step that ends early at a break is no sign of many steps until the end."""
     torque = pulses([1e-9, 1e-6], [1e-9, 1e-9], (2e9, 0, 0))
-    scene = Scene("short", (0.0, 0.0, 0.0), torque=torque, **SPHERE)
-    found = reference(scene, [1e6], effort=0.01)
+    found = reference(Scene("short", (0.0, 0.0, 0.0), torque=torque, **SPHERE), [1e6], effort=0.01)
     assert found.omega[0] == pytest.approx([2.0, 0.0, 0.0], rel=1e-9)
 
 
 def test_reference_accepts_many_pulses_before_a_long_motion() -> None:
-    starts = [1e-6 * n for n in range(50)]
-    torque = pulses(starts, [5e-7] * 50, (8e4, 0, 0))
+    torque = pulses([1e-6 * n for n in range(50)], [5e-7] * 50, (8e4, 0, 0))
     scene = Scene("many", (0.0, 0.0, 0.0), torque=torque, **SPHERE)
-    found = reference(scene, [1e6], effort=1.0)
-    assert found.omega[0] == pytest.approx([1.0, 0.0, 0.0], rel=1e-9)
+    assert reference(scene, [1e6], effort=1.0).omega[0] == pytest.approx([1.0, 0.0, 0.0], rel=1e-9)
     # Each pulse takes two steps, which count in the work limit.
     refused("50", reference, scene, [1e6], effort=0.0025)
 
@@ -290,8 +282,7 @@ def test_arrays_and_frames_are_those_of_lists() -> None:
     masked = np.ma.masked_greater(values[:3], 2.0 * values.max())
     assert table([0, 1, 2], masked) == table([0, 1, 2], values[:3])
     refused("values", table, [0, 1, 2], np.ma.masked_less(values[:3], 0.0))
-    diagonal = table([0, 1, 2], np.eye(3))
-    assert diagonal.terms == table([0, 1, 2], np.eye(3).tolist()).terms
+    assert table([0, 1, 2], np.eye(3)).terms == table([0, 1, 2], np.eye(3).tolist()).terms
 
 
 def test_a_long_table_is_solved_piece_by_piece() -> None:

@@ -10,12 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import Scene, case_scene
-from pyharness.engine.solve import solve
+from pyharness import Scene, TorqueLaw, case_scene, solve
 from pyharness.engine.system.kernel_input import normalized
 from pyharness.model.build import build
 from pyharness.model.extension import extension
-from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
 from pyharness.model.values import Triple
 from pyharness.truth.elliptic import torque_free
@@ -147,8 +145,7 @@ def test_loops_as_written_do_what_they_do_written_out(tmp_path: Path) -> None:
 
 
 def test_row_that_overflows_within_a_step_ends_the_rows() -> None:
-    law = TorqueLaw((1e308, 0.0, 0.0))
-    scene = Scene("", (0.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=law)
+    scene = Scene("", (0.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=TorqueLaw((1e308, 0.0, 0.0)))
     for times in ([1.0, 3.0, 4.0], [3.0], [1.0, 1.5, 3.0]):
         found = solve(scene, times, "taylor", 1e-9)
         assert found.ended == "overflow"
@@ -160,8 +157,7 @@ def test_row_that_overflows_within_a_step_ends_the_rows() -> None:
 )
 def test_growth_of_small_differences_is_followed_the_right_way(kind: str, number: int) -> None:
     """Test the draws, of 1500, that a wrongly propagated perturbation would affect most."""
-    scenes = timed_scenes(kind, [11, list(NASTY).index(kind)])
-    scene, time = next(islice(scenes, number, None))
+    scene, time = next(islice(timed_scenes(kind, [11, list(NASTY).index(kind)]), number, None))
     truth = solve(scene, np.linspace(0.0, time, 33)[1:], "taylor", 1e-15).omega
     scale = max(np.abs(truth).max(), *map(abs, scene.omega))
     assert np.abs(_end(scene, time, 1e-3)[0] - truth[-1]).max() <= 0.4e-3 * scale

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import Scene, TorqueLaw, case_scene
-from pyharness.engine.solve import solve
+from pyharness import Scene, TorqueLaw, case_scene, solve
 from pyharness.model.scene import Triple
 from pyharness.model.trajectory import ROUNDING, Trajectory
 from pyharness.truth.reference import reference

@@ -139,8 +139,7 @@ FIRST: dict[str, tuple[dict[str, Any], Any, str]] = {
 @pytest.mark.parametrize("first", FIRST)
 def test_terms_are_added_to_the_rest_of_the_torque(first: str, tmp_path: Path) -> None:
     given, torque, shown = FIRST[first]
-    terms = [table for table, _ in TERMS[::3]]
-    scene = scene_with(**given, terms=[DAMPING, *terms])
+    scene = scene_with(**given, terms=[DAMPING, *[table for table, _ in TERMS[::3]]])
     assert isinstance(scene.torque, StateTorque)
     wanted = sum((make() for _, make in TERMS[::3]), torques.damping(0.1)) + torque
     for t, omega, attitude in states(5):
@@ -194,13 +193,10 @@ def test_schema_of_the_record_has_one_form_of_torque() -> None:
     record = scene_record(scene_with(terms=[DAMPING]))
     assert record["torque"] == {"terms": [DAMPING]}
     wrong: list[dict[str, Any]] = [
-        {"terms": []},
-        {"terms": [{"matrix": 0.1}]},
-        {"terms": [DAMPING], "opaque": True},
-        {"terms": [DAMPING], "recorded": 1},
-        {"terms": [DAMPING], "frame": "space"},
+        {"terms": []}, {"terms": [{"matrix": 0.1}]}, {"terms": [DAMPING], "opaque": True},
+        {"terms": [DAMPING], "recorded": 1}, {"terms": [DAMPING], "frame": "space"},
         {**WAVES, "terms": [DAMPING], "expression": ["0"] * 3, "constants": {}},
-    ]
+    ]  # fmt: skip
     for torque in wrong:
         assert not is_documented(record | {"torque": torque})
 
@@ -209,13 +205,11 @@ def test_terms_in_the_documents_are_read() -> None:
     """The reference names every kind and key, and its example and that of the guide are read."""
     text = (ROOT / "docs/reference/scene-files.md").read_text().partition("## Ready terms")[2]
     (example,) = re.findall(r"```\n(\[\[torque.terms\]\].*?)```", text, re.DOTALL)
-    scene = scene_of(BODY | tomllib.loads(example), "reference")
-    assert isinstance(scene.torque, StateTorque)
+    assert isinstance(scene_of(BODY | tomllib.loads(example), "reference").torque, StateTorque)
     rows = dict(re.findall(r"^\| `(\w+)` \| (.*?) \|", text, re.MULTILINE))
     assert rows.pop("kind") == "keys"
     keys = {kind: set(re.findall(r"`(\w+)`", row)) for kind, row in rows.items()}
     assert keys == {kind: set(signature(x.function).parameters) for kind, x in KINDS.items()}
     satellite = read_scene(ROOT / "docs/satellite.toml")
     assert isinstance(satellite.torque, StateTorque)
-    found = satellite.torque.at(0.0, satellite.omega, (1.0, 0.0, 0.0, 0.0))
-    assert np.isfinite(found).all()
+    assert np.isfinite(satellite.torque.at(0.0, satellite.omega, (1.0, 0.0, 0.0, 0.0))).all()

@@ -87,8 +87,7 @@ def test_the_restored_scene_has_the_same_solution(tmp_path: Path) -> None:
 
 
 def test_law_that_cancels_is_not_written(tmp_path: Path) -> None:
-    push = TorqueLaw((1.0, 2.0, 3.0))
-    torque = push + torques.damping(0.3) + TorqueLaw((-1.0, -2.0, -3.0))
+    torque = TorqueLaw((1.0, 2.0, 3.0)) + torques.damping(0.3) + TorqueLaw((-1.0, -2.0, -3.0))
     assert torque == torques.damping(0.3)
     check_restored(scene_with(torque), tmp_path)
 

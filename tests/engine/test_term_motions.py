@@ -46,11 +46,9 @@ def test_a_rod_along_the_vertical_librates_and_across_it_leaves() -> None:
     angle = 1e-6
     for first, grows in ((angle, False), (np.pi / 2.0 + angle, True)):
         scene = scene_with(
-            gravity_gradient(moments, ORBIT),
-            moments=moments,
-            omega=(0.0, 0.0, ORBIT),
+            gravity_gradient(moments, ORBIT), moments=moments, omega=(0.0, 0.0, ORBIT),
             attitude=(np.cos(first / 2.0), 0.0, 0.0, np.sin(first / 2.0)),
-        )
+        )  # fmt: skip
         times, found = integrated(scene, 3.0)
         turned = 2.0 * np.unwrap(np.arctan2(found[:, 6], found[:, 3])) - ORBIT * times
         wanted = np.cosh(rate * times) if grows else np.cos(rate * times)
@@ -58,8 +56,7 @@ def test_a_rod_along_the_vertical_librates_and_across_it_leaves() -> None:
 
 
 def test_the_spring_of_attitude_control_has_its_potential() -> None:
-    scene = scene_with(attitude_control(3.0, 0.0, TARGET))
-    _, found = integrated(scene, 5.0)
+    _, found = integrated(scene_with(attitude_control(3.0, 0.0, TARGET)), 5.0)
     cosine = [(np.trace(matrix(TARGET).T @ matrix(q)) - 1.0) / 2.0 for q in found[:, 3:]]
     energy = 0.5 * (found[:, :3] ** 2 @ MOMENTS)
     total = energy + 3.0 * (1.0 - np.array(cosine))

@@ -98,8 +98,7 @@ def coils(t: float, omega: Array, r: Array, gain: float, field: Any) -> Array:
     step = 1e-5
 
     def about_body(dt: float) -> Array:
-        turn = Rotation.from_rotvec(omega * dt).as_matrix()
-        found: Array = (r @ turn).T @ vector(t + dt, field)
+        found: Array = (r @ Rotation.from_rotvec(omega * dt).as_matrix()).T @ vector(t + dt, field)
         return found
 
     rate = (about_body(step) - about_body(-step)) / (2.0 * step)
@@ -160,12 +159,10 @@ def forms(argument: Argument, form: Any) -> list[Any]:
     if argument.is_of_body:
         return [MOMENTS, INERTIA.tolist()]
     found: dict[str, list[Any]] = {
-        str(VECTOR): [V.tolist()],
-        str(MATRIX): [0.3, V.tolist(), D.tolist()],
+        str(VECTOR): [V.tolist()], str(MATRIX): [0.3, V.tolist(), D.tolist()],
         str(LAW_FORM): [V.tolist(), LAW_IN_SPACE if argument.frame == "space" else LAW],
-        str(QUATERNION): [TARGET],
-        "boolean": [True],
-    }
+        str(QUATERNION): [TARGET], "boolean": [True],
+    }  # fmt: skip
     return found.get(form.get("type", str(form)), [])
 
 
@@ -230,8 +227,7 @@ def test_wheels_with_a_slow_motor_have_no_cancellation() -> None:
 
 def test_gravity_gradient_is_the_torque_of_newtons_law() -> None:
     """The torque on six masses, far from the centre, differs in the order of size/distance."""
-    source = np.random.default_rng(62)
-    masses, distance = source.uniform(1, 2, 3), 1e4
+    masses, distance = np.random.default_rng(62).uniform(1, 2, 3), 1e4
     points = np.concatenate([np.diag([1.0, 1.5, 0.7]), -np.diag([1.0, 1.5, 0.7])])
     weights = np.concatenate([masses, masses])
     inertia = sum(

@@ -179,17 +179,12 @@ ENTRIES: dict[str, tuple[Entry, tuple[str, ...], tuple[bool, ...]]] = {
 # Kinds of which an entry point takes no scene.
 _NONE = {
     "Gauss collocation": {
-        "changing inertia",
-        "ready torques",
-        "steady",
-        "sudden",
-        "torque in space",
-        "turning",
+        "changing inertia", "ready torques", "steady", "sudden", "torque in space", "turning",
     },
     "Stepper": {"cancelling", "changing inertia"},
     "methods of SciPy": {"torque in space"},
     "solve_ivp": {"cancelling", "changing inertia"},
-}
+}  # fmt: skip
 
 
 def is_for(entry: str, kind: str, scene: Scene) -> bool:

@@ -134,8 +134,7 @@ def test_steady_wheels_do_no_work_and_motors_do() -> None:
 def test_momentum_of_body_and_wheels_is_constant_in_space(
     full: bool, motor: TorqueLaw | None
 ) -> None:
-    scene = scene_with(wheels(H, motor), full)
-    found: Any = solve(scene, TIMES, attitude=True)
+    found: Any = solve(scene_with(wheels(H, motor), full), TIMES, attitude=True)
     momenta = [H if motor is None else stored(t) for t in TIMES]
     wheel = [matrix(q) @ h for q, h in zip(found.attitude, momenta, strict=True)]
     total = found.angular_momentum("space") + np.array(wheel)

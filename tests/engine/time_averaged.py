@@ -13,8 +13,7 @@ from random import Random
 
 import numpy as np
 
-from pyharness import Scene, TorqueLaw, solve
-from pyharness.model.errors import InputError
+from pyharness import InputError, Scene, TorqueLaw, solve
 
 _TOLERANCE = 1e-9
 _EFFORT = 1000.0

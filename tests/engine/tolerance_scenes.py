@@ -43,8 +43,7 @@ _SEEDS_SUDDEN = _seeds(state_scenes.SUDDEN, friction=1, switch=1)
 
 
 def _free(kind: str) -> Timed:
-    source = Random(f"within {kind}")
-    moments, omega, attitude, time = draw_free(source, kind, 0.7)
+    moments, omega, attitude, time = draw_free(Random(f"within {kind}"), kind, 0.7)
     return _cut(Scene("", omega, moments, attitude=attitude), time, 15.0)
 
 
@@ -94,13 +93,11 @@ def draw_changing(source: Random, full: bool = False) -> Timed:
     for axis, moment in enumerate(moments):
         # The sum of the changes is at most 0.7 of the moment.
         degree = source.randint(int(axis == 0), 4)
-        parts = [source.uniform(-0.7, 0.7) / degree for _ in range(degree)]
-        powers = enumerate(parts, 1)
+        powers = enumerate([source.uniform(-0.7, 0.7) / degree for _ in range(degree)], 1)
         polynomials.append([moment, *(moment * each / abs(time) ** n for n, each in powers)])
     omega = [source.uniform(-2.0, 2.0) for _ in range(3)]
     if not full:
-        changing = ChangingMoments(polynomials)
-        return Scene("random", omega, moments=changing, attitude=IDENTITY), time
+        return Scene("random", omega, moments=ChangingMoments(polynomials), attitude=IDENTITY), time
     axes = np.linalg.qr(np.random.default_rng(source.randrange(1000)).normal(size=(3, 3)))[0]
     matrices = [axes @ np.diag(moments) @ axes.T]
     degree = source.randint(1, 4)
@@ -109,8 +106,7 @@ def draw_changing(source: Random, full: bool = False) -> Timed:
         # The norm of a matrix is at most three times its largest element.
         a, b, c, d, e, f = (source.uniform(-size, size) / 3.0 for _ in range(6))
         matrices.append(np.array([[a, f, e], [f, b, d], [e, d, c]]))
-    inertia = ChangingInertia(matrices)
-    return Scene("random", omega, inertia=inertia, attitude=IDENTITY), time
+    return Scene("random", omega, inertia=ChangingInertia(matrices), attitude=IDENTITY), time
 
 
 def _changing(full: bool, kind: int) -> Timed:

@@ -6,14 +6,7 @@ import json
 import numpy as np
 
 from pyharness import case_scene, run_program
-from pyharness.history.ablation import (
-    CaseEffects,
-    case_truth,
-    effects_of,
-    entries,
-    lattice,
-    lattice_report,
-)
+from pyharness.history import ablation
 from pyharness.model.listing import flagged, names_of
 from pyharness.views.render import render
 from tests.conftest import Printed
@@ -26,7 +19,7 @@ CERTAINTIES = {"certain", "probable", "conjecture", "undecidable"}
 
 
 def test_every_entry_is_complete() -> None:
-    found = entries()
+    found = ablation.entries()
     assert len({each["id"] for each in found}) == len(found) > 35
     assert {each["kind"] for each in found} == KINDS
     assert {each["id"] for each in found if "flag" in each} == {each["id"] for each in flagged()}
@@ -44,8 +37,8 @@ def test_every_entry_is_complete() -> None:
 def test_effects_show_what_each_entry_says() -> None:
     """Compare an entry that is alone corrected or alone kept, in the case that shows it best."""
 
-    def at(name: str, case: int) -> CaseEffects:
-        (first, *_) = (each for each in effects_of(name) if each.case == case)
+    def at(name: str, case: int) -> ablation.CaseEffects:
+        (first, *_) = (each for each in ablation.effects_of(name) if each.case == case)
         return first
 
     points = at("dt-accumulates", 5)
@@ -60,16 +53,16 @@ def test_effects_show_what_each_entry_says() -> None:
 
 def test_lattice_is_whole_and_sorted() -> None:
     scene = case_scene(2)
-    found = lattice(scene, "runge-kutta")
+    found = ablation.lattice(scene, "runge-kutta")
     assert len({each.listing.defects for each in found}) == 64
     # With a torque that varies, the conjecture counts too.
-    assert len(lattice(case_scene(7), "four-term")) == 8
+    assert len(ablation.lattice(case_scene(7), "four-term")) == 8
     # All are compared at the steps that the shortest run has, so that none gains by an early end.
     shortest = min(each.steps for each in found)
     assert shortest == 13
     for each in found:
         run = run_program(scene, each.listing)
-        errors = np.abs(run.omega[:shortest] - case_truth(2).omega[:shortest])
+        errors = np.abs(run.omega[:shortest] - ablation.case_truth(2).omega[:shortest])
         assert each.common[0] == errors.max() <= each.omega
     sizes = [float(f"{each.common[0]:.2e}") for each in found]
     assert sizes == sorted(sizes, reverse=True)
@@ -80,7 +73,7 @@ def test_lattice_is_whole_and_sorted() -> None:
     stopped = [each.listing.defects for each in found if each.stop and each.steps == 25]
     needed = {*bases, "lipschitz-tests-velocity", "lipschitz-per-component"}
     assert needed <= frozenset.intersection(*stopped)
-    text = render(lattice_report(scene, {"runge-kutta": found}), "table")
+    text = render(ablation.lattice_report(scene, {"runge-kutta": found}), "table")
     assert max(map(len, text.splitlines())) <= 100
 
 
@@ -89,10 +82,10 @@ def test_defects_on_the_command_line(printed: Printed) -> None:
     assert [line.split()[0] for line in brief.splitlines() if line[:1].islower()] == [
         "name", *names_of("defect")
     ]  # fmt: skip
-    assert f"\n{len(entries()) - len(names_of('defect'))} more entries: " in brief
-    pages = {each["id"]: printed(f"defects {each['id']}") for each in entries()}
+    assert f"\n{len(ablation.entries()) - len(names_of('defect'))} more entries: " in brief
+    pages = {each["id"]: printed(f"defects {each['id']}") for each in ablation.entries()}
     assert max(len(line) for page in (listed, *pages.values()) for line in page.splitlines()) <= 100
-    for each in entries():
+    for each in ablation.entries():
         assert f"\n{each['id']} " in listed
         assert ("Effect, measured now" in pages[each["id"]]) == ("flag" in each)
     rows = [line.split()[0] for line in pages["stage-base"].splitlines() if line[:1].isdigit()]
@@ -107,8 +100,7 @@ def test_defects_on_the_command_line(printed: Printed) -> None:
 def test_ablate_in_every_form(printed: Printed) -> None:
     command = "compare --case 4 --ablate"
     assert "every subset" in printed(command)
-    rows = printed(f"{command} --format csv").splitlines()
-    assert len(rows) == 1 + 8 + 4 + 64
+    assert len(printed(f"{command} --format csv").splitlines()) == 1 + 8 + 4 + 64
     record = json.loads(printed(f"{command} --format json --program two-term"))
     assert [len(each) for each in record["lattice"].values()] == [8]
     assert printed(f"{command} --program runge-kutta --reading do-variable")

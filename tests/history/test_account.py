@@ -22,6 +22,7 @@ from pyharness.thesis.cells import subsets
 from pyharness.thesis.printer import page
 from pyharness.thesis.programs import PROGRAM_REGISTRY, run_program
 from pyharness.truth.reference import reference
+from tests.tables import tables
 
 ROOT = Path(__file__).parents[2]
 ARTICLE = "docs/article/article.md"
@@ -154,23 +155,7 @@ def test_article_has_the_error_of_case_6_and_the_distance_from_the_limit() -> No
 
 
 # What no text may say, by what it would claim.
-_NOT_SAID = {
-    "the author's thoughts": (
-        r"(?:thesis|Jacobs|author|V\.\d) "
-        r"(?:took|takes|trusted|did not trust|believed|thought|wanted)\b"
-        r"|(?:thesis|Jacobs|author|V\.\d)\b[^.]{0,40}\b(?:only because|first with Case)"
-        r"|nobody saw"
-    ),
-    "a switch for every defect": (
-        r"(?i)(?:each|every) (?:fault|defect) (?:has|as|with) a switch"
-        r"|switch for (?:each|every) (?:fault|defect)\b(?! that changes a number)"
-    ),
-    "a date of the work other than that of its publication, March 1982": (
-        r"(?<!seed )(?<!thesis )\b(?:[Ii]n|[Oo]f|[Tt]he|[Tt]hree) (?:1979|198[0-2])\b.{20}"
-    ),
-    "a known machine": ("thesis ran on a CDC|arithmetic of the machine is not emulated|dot-matrix"),
-    "a single cause": "(?i)it was not rounding|it was the defects",
-}
+_NOT_SAID = tables(__file__)["not_said"]
 
 
 @pytest.mark.parametrize("claim", _NOT_SAID)

@@ -89,8 +89,7 @@ def test_torque_of_case_7_falls_and_is_sampled_once_a_radian() -> None:
     law = np.array([scene.normalized_torque(t) for t in scene.times()]) * moments
     assert np.abs(law).max() <= 1.0 + 1e-12
     assert max(f for _, f in scene.law.sines + scene.law.cosines) * scene.step_size == 1.0
-    gained = np.abs(np.cumsum(law / moments * scene.step_size, axis=0)).max()
-    assert gained < 0.05
+    assert np.abs(np.cumsum(law / moments * scene.step_size, axis=0)).max() < 0.05
 
 
 def test_what_is_redundant_or_unread_is_so_on_the_cards() -> None:

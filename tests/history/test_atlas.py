@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pyharness import InputError
+from pyharness import InputError, case_scene
 from pyharness.checks.compare.batch import Batch, Solver
 from pyharness.cli.main import main
 from pyharness.history.claims.atlas import atlas_of, bits, shares, sum_of_points
@@ -16,7 +16,6 @@ from pyharness.history.claims.evidence import POINTS
 from pyharness.history.claims.laboratory import Assumptions, Laboratory, starts
 from pyharness.history.claims.ledger import claim, outcome
 from pyharness.history.claims.over_starts import FAILS, FUNCTIONS, HOLDS, IN_PART, JUDGED, SILENT
-from pyharness.model.scene_file import case_scene
 from pyharness.sweep.batches import solve_chunk
 from pyharness.sweep.sweep_file import read_sweep
 from tests.conftest import Printed

@@ -158,8 +158,7 @@ def test_ratio_to_runge_kutta_is_that_of_the_worse_collocation_program() -> None
     lab, found = Laboratory(False), judgement("abstract-superior")
     for case in range(2, 8):
         two, four, third = (lab.error(program, case) for program in PROGRAMS)
-        ratio = found.corrected.numbers[f"case {case}: {_LARGER}"]
-        assert ratio == max(two, four) / third
+        assert found.corrected.numbers[f"case {case}: {_LARGER}"] == max(two, four) / third
     assert two / third > 80.0 > 3.0 > four / third
     for identity in ("abstract-superior", "vi-superior"):
         assert "the larger" in claim(identity)["truth"]
@@ -249,8 +248,7 @@ def test_claims_of_theory_hang_on_no_program(identity: str, judged: Judged) -> N
 
 def test_theory_is_judged_by_its_numbers() -> None:
     lab = Laboratory(True)
-    bodies = theory.possible_bodies(lab, [5, 6])
-    assert list(bodies.numbers.values()) == [40.0 / 50.0, 200.0 / 30.0]
+    assert list(theory.possible_bodies(lab, [5, 6]).numbers.values()) == [40.0 / 50.0, 200.0 / 30.0]
     assert theory.possible_bodies(lab, [1, 2, 3, 4, 5, 7]).verdict == REPRODUCED
     assert theory.bounded_not_lipschitz(lab, 2, 1e6).verdict == REPRODUCED
     found = theory.bounded_not_lipschitz(lab, 8, 1e6).numbers["largest quotient"]
@@ -260,8 +258,7 @@ def test_theory_is_judged_by_its_numbers() -> None:
     assert theory.step_on_cards(lab, 0.001).verdict == NOT_REPRODUCED
     assert theory.rates_tell_growth(lab, [4], 1e-9).verdict == FALSE
     assert theory.trial_form_solves(lab, [3, 4], 1e-13).verdict == NOT_REPRODUCED
-    shares = theory.points_inside(lab, [4]).numbers
-    assert set(shares.values()) == {0.01}
+    assert set(theory.points_inside(lab, [4]).numbers.values()) == {0.01}
     assert theory.points_inside(Laboratory(False), [4]).verdict == REPRODUCED
 
 

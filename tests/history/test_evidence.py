@@ -76,8 +76,7 @@ def test_300_steps_change_verdicts_of_runs_that_stop_later(
 def test_evidence_is_told(printed: Printed) -> None:
     missing = next(evidence()).choices().keys() - scored._SHORT.keys()
     assert not missing, f"add {sorted(missing)} to _SHORT of history/claims/evidence.py"
-    text = printed("claims --evidence")
-    assert max(map(len, text.splitlines())) <= 100
+    assert max(map(len, printed("claims --evidence").splitlines())) <= 100
     record: dict[str, Any] = json.loads(printed("claims --evidence --format json"))
     scores = [each["score"] for each in record["combinations"]]
     assert scores == sorted(scores, reverse=True)

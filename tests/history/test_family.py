@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import Scene, TorqueLaw, case_scene
+from pyharness import Listing, Scene, TorqueLaw, case_scene
 from pyharness.checks.theory.tableau import tableau
 from pyharness.cli.main import main
 from pyharness.history.family import (
@@ -23,7 +23,6 @@ from pyharness.history.family import (
     predicted_order,
     run,
 )
-from pyharness.model.listing import Listing
 from pyharness.model.report import short
 from pyharness.model.trajectory import Array
 from pyharness.thesis import compiled
@@ -81,12 +80,10 @@ def test_orders_as_derived(case: int, result_of: ResultOf, monkeypatch: Patch) -
 def test_derived_orders() -> None:
     """Orders for n = 1 ... 5, after as many corrections as necessary; methods.md has the same."""
     wanted = {
-        ("collocation", "thesis"): [2, 2, 4, 4, 6],
-        ("collocation", "gauss"): [2, 4, 6, 8, 10],
-        ("subdomain", None): [2, 4, 4, 6, 6],
-        ("galerkin", None): [1, 2, 3, 4, 5],
+        ("collocation", "thesis"): [2, 2, 4, 4, 6], ("collocation", "gauss"): [2, 4, 6, 8, 10],
+        ("subdomain", None): [2, 4, 4, 6, 6], ("galerkin", None): [1, 2, 3, 4, 5],
         ("least-squares", None): [2, 4, 6, 8, 10],
-    }
+    }  # fmt: skip
     for weighting, points in SCHEMES:
         found = [predicted_order(Member(weighting, n, points, 99)) for n in range(1, 6)]
         assert found == wanted[weighting, points]
@@ -239,8 +236,7 @@ def test_side_by_side_is_as_alone() -> None:
 @pytest.mark.parametrize("case", range(1, 7))
 def test_three_four_and_five_terms_are_one_method_after_one_correction(case: int) -> None:
     """Under constant torque f is a parabola after one estimate, which three terms can represent."""
-    members = [Member(w, n, p) for w, p in SCHEMES for n in (3, 4, 5)]
-    omega = integrate(case_scene(case), members)
+    omega = integrate(case_scene(case), [Member(w, n, p) for w, p in SCHEMES for n in (3, 4, 5)])
     assert np.ptp(omega, axis=0).max() < ROUNDING * np.abs(omega).max()
 
 

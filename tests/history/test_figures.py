@@ -12,14 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import case_scene
+from pyharness import case_scene, run_program
 from pyharness.cli.main import main
 from pyharness.history import figures
 from pyharness.history.claims.rules import share_of_range
 from pyharness.history.figures import Curve, FigureFinding, curve_numbers
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.thesis import collocation, compiled
-from pyharness.thesis.programs import run_program
 from pyharness.truth.reference import reference
 from pyharness.views import pictures
 from pyharness.views.pictures import saved
@@ -159,8 +158,7 @@ def test_curve_that_diverges_leaves_the_picture(found: dict[str, FigureFinding])
         low, high = figures._frame(beside, row)
         assert low <= bottom < top <= high < low + 3.0 * (top - bottom)
     assert len(_rows(beside, "two-term")) == 57
-    content = saved(figures.figure_picture(beside), "figure-11.svg")
-    assert b"e+1" not in content["figure-11.svg"]
+    assert b"e+1" not in saved(figures.figure_picture(beside), "figure-11.svg")["figure-11.svg"]
     assert wild.ending == "overflow after step 56"
 
 

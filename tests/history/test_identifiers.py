@@ -115,5 +115,4 @@ def test_identifier_of_a_card_leads_to_its_line(program: str) -> None:
     for number, card in found.cards.items():
         identifier, _, line = identifiers.card_identifier(card).partition(";lines=")
         assert identifier == content_identifier(path.read_bytes())
-        row = tomllib.loads(lines[int(line) - 1])
-        assert row[str(number)]["text"] == card.text
+        assert tomllib.loads(lines[int(line) - 1])[str(number)]["text"] == card.text

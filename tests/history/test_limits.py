@@ -38,8 +38,7 @@ def test_two_term_in_case_6_follows_its_limit_into_the_blow_up() -> None:
     assert _tends_elsewhere(limit("two-term", replace(case_scene(6), steps=30)))
     found = limit("two-term", case_scene(6), 2)
     assert math.isinf(found.halvings[0].from_limit)
-    coarse = limit("two-term", replace(case_scene(6), step_size=0.07, steps=14), 2)
-    for each in (found, coarse):
+    for each in (found, limit("two-term", replace(case_scene(6), step_size=0.07, steps=14), 2)):
         assert each.blow_up == pytest.approx(0.4929, abs=1e-4)
         assert "grows without bound at t = 0.493 s" in each.approach
 
@@ -75,8 +74,7 @@ def test_limits_in_every_form(printed: Printed) -> None:
     assert "2 y(t/2) - y(0)" in text
     assert all(len(line) <= 100 and not line.endswith("-") for line in text.splitlines())
     record = json.loads(printed(f"{command} --program two-term --format json"))
-    distances = [each["from_limit"] for each in record["limits"][0]["halvings"]]
-    assert np.all(np.diff(distances) < 0)
+    assert np.all(np.diff([each["from_limit"] for each in record["limits"][0]["halvings"]]) < 0)
     assert printed(f"{command} --format csv").count("\n") == 1 + 3 * 3
 
 

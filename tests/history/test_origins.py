@@ -13,12 +13,11 @@ import numpy as np
 import pytest
 
 from docs.text.page import shared_statements, statements, text_page
-from pyharness import run_program
+from pyharness import case_scene, run_program
 from pyharness.history import origins
 from pyharness.history.origins import disagreements, mistakes, unexplained_defects
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing
-from pyharness.model.scene_file import case_scene
 from pyharness.thesis.cards import deck
 from tests.conftest import Printed
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pyharness import Listing, case_scene, subset
 from pyharness.checks.compare.batch import Batch, Solver
 from pyharness.history.claims import over_starts
 from pyharness.history.claims.laboratory import Assumptions, Laboratory, starts
@@ -14,9 +15,7 @@ from pyharness.history.claims.ledger import claim, outcome
 from pyharness.history.claims.over_starts import FAILS, HOLDS, IN_PART, JUDGED, SILENT
 from pyharness.history.claims.verdicts import IN_PART as PARTLY
 from pyharness.history.claims.verdicts import REPRODUCED
-from pyharness.model.listing import Listing, subset
 from pyharness.model.scene import Triple
-from pyharness.model.scene_file import case_scene
 from pyharness.sweep.batches import solve_chunk
 from pyharness.sweep.sweep_file import read_sweep
 
@@ -39,8 +38,7 @@ FEWER = [STARTS[k] for k in (0, 5, 9)]
 def _solved(omega0: list[Triple], listing: Listing | None, steps: int = 100, **more: Any) -> Batch:
     """Return a batch as a sweep passes it to a claim."""
     scene, ones = replace(case_scene(4), steps=steps), np.full(len(omega0), 1.0)
-    batch = Batch(scene, Solver(), listing, ones, {"omega": np.array(omega0)})
-    return replace(batch, **more)
+    return replace(Batch(scene, Solver(), listing, ones, {"omega": np.array(omega0)}), **more)
 
 
 def _codes(identity: str, laboratory: Laboratory, omega0: list[Triple]) -> list[int]:
@@ -60,8 +58,7 @@ def test_claims_of_section_v_that_hang_on_starts_are_there() -> None:
 @pytest.mark.parametrize("identity", JUDGED)
 def test_verdicts_are_those_of_the_ledger(identity: str) -> None:
     few = FEWER if identity.startswith("v3") else FEW
-    solved = _solved(few, Listing.original("two-term"))
-    found = over_starts.FUNCTIONS[identity](solved)
+    found = over_starts.FUNCTIONS[identity](_solved(few, Listing.original("two-term")))
     assert found.dtype == np.int8
     assert found.tolist() == _codes(identity, Laboratory(True), few)
 

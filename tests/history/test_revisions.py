@@ -42,8 +42,7 @@ def test_entries_and_cards_of_all_revisions_are_those_of_the_tables() -> None:
             assert [deck(program).cards[number].number for number in numbers(cards)] == numbers(
                 cards
             )
-    first = [each for each in revisions() if each.digest][-1]
-    for program, cards in first.cards.items():
+    for program, cards in [each for each in revisions() if each.digest][-1].cards.items():
         assert numbers(cards) == [int(number) for number in facts(f"cards/{program}")["cards"]]
 
 
@@ -66,8 +65,7 @@ def test_header_of_tei_has_every_revision() -> None:
 def test_page_has_the_newest_revision() -> None:
     page = " ".join(text_page().split())
     newest, *earlier = revisions()
-    told = f"- **{newest.date}**, digest `{newest.digest}`. {newest.what}"
-    assert " ".join(told.split()) in page
+    assert " ".join(f"- **{newest.date}**, digest `{newest.digest}`. {newest.what}".split()) in page
     for name, heading in CHANGES.items():
         if entries := getattr(newest, name):
             listed = ", ".join(f"`{id}`" for id in entries)

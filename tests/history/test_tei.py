@@ -38,8 +38,7 @@ def schema() -> Any:
     """Return the schema without the elements that are not used: the whole takes 16 s to read."""
     text = lzma.decompress((HERE / "tei_all.rng.xz").read_bytes())
     assert sha256(text).hexdigest() == SOURCE["sha256"]
-    begin = " ".join(text[:1000].decode().split())
-    assert f"TEI Edition: P5 Version {SOURCE['version']}." in begin
+    assert f"TEI Edition: P5 Version {SOURCE['version']}." in " ".join(text[:1000].decode().split())
     whole, relax = etree.fromstring(text), "{http://relaxng.org/ns/structure/1.0}"
     used = {each.tag.removeprefix(TEI) for each in xml.fromstring(TEXT).iter()}
     for each in list(whole.iter(relax + "element")):
@@ -86,14 +85,11 @@ def test_document_is_valid(schema: Any) -> None:
 
 
 @pytest.mark.sampled
-@pytest.mark.parametrize(
-    ("ours", "other"),
-    [
-        ("lem", "lemma"), (' locus="value"', ""), ('<lem cert="high">', '<lem cert="certain">'),
-        ("<listWit>", "<listWit><p>none</p>"), ('method="parallel-segmentation" ', ""),
-        ('unit="line"', 'line="line"'),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("ours", "other"), [
+    ("lem", "lemma"), (' locus="value"', ""), ('<lem cert="high">', '<lem cert="certain">'),
+    ("<listWit>", "<listWit><p>none</p>"), ('method="parallel-segmentation" ', ""),
+    ('unit="line"', 'line="line"'),
+])  # fmt: skip
 def test_document_with_a_mistake_is_refused(ours: str, other: str, schema: Any) -> None:
     assert ours in TEXT
     assert not schema.validate(etree.fromstring(TEXT.replace(ours, other).encode()))
@@ -102,8 +98,7 @@ def test_document_with_a_mistake_is_refused(ours: str, other: str, schema: Any) 
 def test_every_card_stands_there_once_in_the_order_of_the_decks(root: xml.Element) -> None:
     found = [(each.get(ID), each.get("n")) for each in _blocks(root)]
     assert found == [(f"{c.program}.{c.number}", str(c.number)) for c in chosen(())]
-    ids = Counter(each.get(ID) for each in root.iter() if each.get(ID))
-    assert ids.most_common(1)[0][1] == 1
+    assert Counter(each.get(ID) for each in root.iter() if each.get(ID)).most_common(1)[0][1] == 1
     decks = [each.get(ID) for each in root.iter(TEI + "div") if each.get("type") == "deck"]
     assert decks == list(PROGRAMS)
 

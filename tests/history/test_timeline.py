@@ -29,8 +29,7 @@ def test_every_event_has_a_source_and_a_date_that_agrees_with_its_certainty(even
         assert named
         assert all(each in event.quote for each in (*named, event.first[:4]))
     if event.why.startswith("part of the work"):
-        foreword = (EVENTS["work-begins"].first, EVENTS["work-ends"].last)
-        assert (event.first, event.last) == foreword
+        assert (event.first, event.last) == (EVENTS["work-begins"].first, EVENTS["work-ends"].last)
 
 
 @pytest.mark.skipif(not THESIS.exists(), reason="the text of the thesis is not beside the project")

@@ -11,6 +11,7 @@ from unittest.mock import patch
 import pytest
 from jsonschema import Draft202012Validator
 
+from pyharness import Listing, case_scene, run_program
 from pyharness.cli import options
 from pyharness.history.words import (
     WordCell,
@@ -20,10 +21,7 @@ from pyharness.history.words import (
     machine_report,
     words_report,
 )
-from pyharness.model.listing import Listing
-from pyharness.model.scene_file import case_scene
 from pyharness.thesis.printer import page
-from pyharness.thesis.programs import run_program
 from pyharness.thesis.vectors import OURS
 from pyharness.thesis.word import RULES
 from pyharness.views.render import csv_text, render
@@ -113,8 +111,7 @@ def test_report_has_every_run(found: Found) -> None:
     assert str(report.text[-1][0]).startswith("* assumed: 100 steps")
     # Without 48 bits the report has no section on the machine's own words.
     assert len(report.text) == 4
-    short = [*cells([2], ["runge-kutta"], (24,))]
-    assert len(words_report(short).text) == 3
+    assert len(words_report([*cells([2], ["runge-kutta"], (24,))]).text) == 3
 
 
 def test_verdict_on_the_machine_has_four_lines(printed: Printed) -> None:

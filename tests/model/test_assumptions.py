@@ -80,16 +80,13 @@ def test_values_that_the_thesis_or_the_user_gives_have_no_mark() -> None:
 
 
 @pytest.mark.sampled
-@pytest.mark.parametrize(
-    "command",
-    [
-        "compare --case 3 --program runge-kutta", "compare --case 3 --method taylor",
-        "compare --case 3 --program two-term --ablate", "run --case 3 --program runge-kutta",
-        "run --case 3 --method taylor", "plan --case 3", "limits --case 3", "prove --case 3",
-        "family --case 3 --terms 1 --weighting galerkin", "rotations --case 3",
-        "words --case 3 --program runge-kutta --lengths",
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize("command", [
+    "compare --case 3 --program runge-kutta", "compare --case 3 --method taylor",
+    "compare --case 3 --program two-term --ablate", "run --case 3 --program runge-kutta",
+    "run --case 3 --method taylor", "plan --case 3", "limits --case 3", "prove --case 3",
+    "family --case 3 --terms 1 --weighting galerkin", "rotations --case 3",
+    "words --case 3 --program runge-kutta --lengths",
+])  # fmt: skip
 def test_json_lists_what_the_marks_stand_for(command: str, printed: Printed) -> None:
     shown = " ".join(printed(command).split())
     record = json.loads(printed(f"{command} --format json"))

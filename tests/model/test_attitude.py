@@ -71,14 +71,12 @@ def test_attitude_is_divided_by_its_length(tmp_path: Path) -> None:
 
 def test_inertia_near_the_end_of_numbers_has_its_moments() -> None:
     inertia = (1.0, 0.1, 0.0), (0.1, 1.0, 0.0), (0.0, 0.0, 1e308)
-    scene = Scene("", (1.0, 2.0, 3.0), inertia=inertia)
-    assert principal(scene)[0].moments == (0.9, 1.1, 1e308)
+    assert principal(Scene("", (1.0, 2.0, 3.0), inertia=inertia))[0].moments == (0.9, 1.1, 1e308)
 
 
 def test_full_inertia_is_solved_about_the_bodys_own_axes() -> None:
     law = TorqueLaw((1.0, 2.0, 1.5), sines=(((0.5, 0.0, 1.0), 3.0),))
-    attitude = (0.5, -0.1, 0.7, 0.5)
-    scene = Scene("", (0.3, 1.0, -1.0), inertia=TILTED, torque=law, attitude=attitude)
+    scene = Scene("", (0.3, 1.0, -1.0), inertia=TILTED, torque=law, attitude=(0.5, -0.1, 0.7, 0.5))
     inertia, times = np.array(TILTED), [1.0, 3.0]
 
     def rates(t: float, y: Array) -> Array:

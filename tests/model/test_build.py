@@ -41,8 +41,7 @@ def _run(*command: str | Path, **more: Any) -> "subprocess.CompletedProcess[str]
 def test_extension_needs_no_fortran_library_at_run_time() -> None:
     on_mac = sys.platform == "darwin"
     command = ("otool", "-L") if on_mac else ("readelf", "-d")
-    done = _run(*command, extension.extension().__file__ or "")
-    lines = done.stdout.splitlines()[1:]
+    lines = _run(*command, extension.extension().__file__ or "").stdout.splitlines()[1:]
     needed = "\n".join(line for line in lines if on_mac or "NEEDED" in line)
     assert "lib" in needed
     for library in LIBRARIES:

@@ -40,8 +40,7 @@ def test_a_body_is_impossible_if_it_is_at_time_0(sign: float) -> None:
     matrices = [np.diag(each) for each in zip(*[[*m, 0.0][:2] for m in moments], strict=True)]
     both: list[Any] = [ChangingMoments(moments), ChangingInertia(matrices)]
     for changing in both:
-        scene = Scene("", (1.0, 2.0, 3.0), changing=changing)
-        assert scene.is_impossible is (sign > 0.0)
+        assert Scene("", (1.0, 2.0, 3.0), changing=changing).is_impossible is (sign > 0.0)
 
 
 def test_further_coefficient_distinguishes_polynomials_from_a_matrix() -> None:
@@ -71,12 +70,10 @@ def test_span_ends_at_the_first_zeros(polynomial: list[float], span: tuple[float
 def test_span_of_a_random_polynomial_agrees_with_its_computed_zeros(seed: int) -> None:
     source = Random(f"zeros {seed}")
     polynomial = [1.0, *(source.gauss(0.0, 1.0) for _ in range(source.randint(1, 9)))]
-    zeros = np.roots(polynomial[::-1])
-    real = [float(z.real) for z in zeros if abs(z.imag) < 1e-9 * abs(z)]
+    real = [float(z.real) for z in np.roots(polynomial[::-1]) if abs(z.imag) < 1e-9 * abs(z)]
     before, after = [z for z in real if z < 0.0], [z for z in real if z > 0.0]
     expected = max(before, default=-math.inf), min(after, default=math.inf)
-    found = ChangingMoments([polynomial, [5.0], [5.0]]).span
-    assert found == pytest.approx(expected, rel=1e-9)
+    assert ChangingMoments([polynomial, [5.0], [5.0]]).span == pytest.approx(expected, rel=1e-9)
 
 
 def test_times_up_to_a_zero_are_checked() -> None:

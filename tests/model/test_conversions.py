@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pyharness import InputError, Scene, case_scene, run_program, solve, subset
-from pyharness.model.trajectory import Trajectory
+from pyharness import InputError, Scene, Trajectory, case_scene, run_program, solve, subset
 
 TIMES = [0.5, 1.0, 2.0]
 

@@ -50,8 +50,7 @@ def test_each_eigenvalue_is_good_to_its_own_size(matrix: Matrix) -> None:
             # For a symmetric matrix, `value` is at most this far from an eigenvalue.
             assert abs(rest) <= _ACCURATE * least
     for i, j in itertools.product(range(3), repeat=2):
-        pairs = zip(vectors[i], vectors[j], strict=True)
-        product = sum((x * y for x, y in pairs), Fraction(0))
+        product = sum((x * y for x, y in zip(vectors[i], vectors[j], strict=True)), Fraction(0))
         assert abs(product - (i == j)) <= _ACCURATE
 
 
@@ -63,8 +62,7 @@ def test_a_diagonal_matrix_is_returned_as_it_is() -> None:
 
 def test_the_moments_are_rounded_to_nearest_and_the_axes_are_a_frame() -> None:
     for k in range(40):
-        matrix = _drawn(random.Random(f"frame/{k}"))
-        frame = principal_frame(matrix)
+        frame = principal_frame(_drawn(random.Random(f"frame/{k}")))
         parts = frame.exact_moments, frame.moments, frame.moments_low
         for exact, high, low in zip(*parts, strict=True):
             assert high == float(exact)
@@ -89,6 +87,5 @@ def test_a_flat_body_about_tilted_axes_is_possible() -> None:
 
 
 def test_moments_beyond_the_range_of_numbers_are_infinite() -> None:
-    matrix = _symmetric(1.7e308, 1e308, 0.0, 1.7e308, 0.0, 1.0)
-    moments = principal_frame(matrix).moments
+    moments = principal_frame(_symmetric(1.7e308, 1e308, 0.0, 1.7e308, 0.0, 1.0)).moments
     assert sorted(moments)[2] == math.inf

@@ -10,17 +10,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pyharness import Listing, Scene, Trajectory, prepare, run_program, solve
 from pyharness.cli.main import main
 from pyharness.engine.plan.registry import FIXED_STEP, PREPARED
-from pyharness.engine.prepared.solver import prepare
-from pyharness.engine.solve import solve
 from pyharness.model.effort import ProofWork, suggested
 from pyharness.model.errors import InputError, TimedError
-from pyharness.model.listing import Listing
-from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw, Wave
-from pyharness.model.trajectory import Trajectory
-from pyharness.thesis.programs import run_program
 from pyharness.truth.reference import reference
 from tests.refused import refused
 

@@ -13,15 +13,14 @@ import mpmath
 import numpy as np
 import pytest
 
-from pyharness import Scene, opaque, solve, solve_many
-from pyharness.engine.steps.taylor_ivp import recorded_equation
+from pyharness import InputError, Scene, opaque, solve, solve_many
 from pyharness.engine.system import leaf_cache
 from pyharness.engine.system.leaf_text import structure
 from pyharness.engine.system.recorded import kernel_tape, listing, outputs_at, taylor_step
+from pyharness.engine.steps.taylor_ivp import recorded_equation
 from pyharness.model.codes import Operations
 from pyharness.model.dual import with_derivatives
 from pyharness.model.elementary import WITH_DERIVATIVE
-from pyharness.model.errors import InputError
 from pyharness.model.numpy_calls import OF_MATH
 from pyharness.model.numpy_protocol import ELEMENTS
 from pyharness.model.recurrences import OPERATIONS
@@ -46,14 +45,11 @@ def signed(*values: float) -> list[float]:
 REAL = signed(*TINY, *UNIT, *WHOLE, *LARGE, *HUGE)
 BEYOND_1 = [1 + 1e-12, 1 + 1e-6, 1.01, *WHOLE, *LARGE, *HUGE]
 EXPONENTS = signed(*TINY, *UNIT, *WHOLE, 300.0, 700.0)
-ARGUMENTS: dict[str, list[float]] = dict.fromkeys(
-    (
-        "rint", "floor", "ceil", "trunc", "sign", "fabs", "tanh", "arctan", "arcsinh", "cbrt",
-        "sin", "cos", "tan", "radians", "degrees", "deg2rad", "rad2deg", "conjugate", "negative",
-        "positive", "absolute",
-    ),
-    REAL,
-) | {
+ARGUMENTS: dict[str, list[float]] = dict.fromkeys((
+    "rint", "floor", "ceil", "trunc", "sign", "fabs", "tanh", "arctan", "arcsinh", "cbrt",
+    "sin", "cos", "tan", "radians", "degrees", "deg2rad", "rad2deg", "conjugate", "negative",
+    "positive", "absolute",
+), REAL) | {
     "square": signed(*TINY, *UNIT, *WHOLE, *LARGE),
     "sqrt": [*TINY, *UNIT, *WHOLE, *LARGE, *HUGE],
     "reciprocal": signed(*TINY[3:], *UNIT, *WHOLE, *LARGE),
@@ -138,8 +134,7 @@ def test_value_is_that_of_numpy(name: str) -> None:
             continue
         inputs = [0.0, *given, *[0.0] * (7 - count)]
         state = np.array([inputs[1:]])
-        values = float_outputs(tape, inputs)[0], outputs_at(tape, np.zeros(1), state)[0, 0]
-        for value in values:
+        for value in (float_outputs(tape, inputs)[0], outputs_at(tape, np.zeros(1), state)[0, 0]):
             close = abs(value - wanted) <= allowed(name, given, wanted)
             assert value == wanted or close, (given, value, wanted)
         checked += 1
@@ -208,20 +203,14 @@ def test_value_in_the_kernel_is_that_of_numpy(
 
 # An argument of each function, and others near its singularities or where formulas lose digits.
 SERIES: dict[str, tuple[float, ...]] = {
-    "log": (0.7, 1.0 + 1e-9, 30.0),
-    "log1p": (0.7, 1e-9, -1e-9, -0.9),
-    "log2": (0.7, 1.0 + 1e-9, 1024.0),
-    "log10": (0.7, 1.0 + 1e-9, 1000.0),
-    "atan": (0.7, 1e-9, -20.0),
-    "asin": (0.7, 1e-9, -0.7, 1.0 - 1e-9),
-    "acos": (0.7, 1e-9, -0.7, 1.0 - 1e-9),
-    "asinh": (0.7, 1e-9, -1e5, 1e5),
-    "acosh": (1.7, 1.0 + 1e-9, 1e5),
-    "atanh": (0.7, 1e-9, -0.7, 1.0 - 1e-9),
-    "cbrt": (0.7, 1e-9, 1e9),
-    "expm1": (0.7, 1e-9, -1e-9, -40.0, 50.0),
+    "log": (0.7, 1.0 + 1e-9, 30.0), "log1p": (0.7, 1e-9, -1e-9, -0.9),
+    "log2": (0.7, 1.0 + 1e-9, 1024.0), "log10": (0.7, 1.0 + 1e-9, 1000.0),
+    "atan": (0.7, 1e-9, -20.0), "asin": (0.7, 1e-9, -0.7, 1.0 - 1e-9),
+    "acos": (0.7, 1e-9, -0.7, 1.0 - 1e-9), "asinh": (0.7, 1e-9, -1e5, 1e5),
+    "acosh": (1.7, 1.0 + 1e-9, 1e5), "atanh": (0.7, 1e-9, -0.7, 1.0 - 1e-9),
+    "cbrt": (0.7, 1e-9, 1e9), "expm1": (0.7, 1e-9, -1e-9, -40.0, 50.0),
     "exp2": (0.7, 1e-9, -40.5, 500.5),
-}
+}  # fmt: skip
 POINTS = [(kind, x) for kind, each in SERIES.items() for x in each]
 
 
@@ -246,8 +235,7 @@ def test_series_and_derivative_are_those_of_mpmath(kind: str, x: float) -> None:
         nothing = [[Decimal(0)] * 8 for _ in range(7)]
         series.begin(Decimal(x), nothing[:3], nothing[3:])
         for term in wanted:
-            found = mpmath.mpf(str(series.next()[0]))
-            assert abs(found - term) <= 1e-25 * abs(term)
+            assert abs(mpmath.mpf(str(series.next()[0])) - term) <= 1e-25 * abs(term)
     # The derivative in floats.
     value, slope = evaluate(with_derivatives(tape, [TIME]), [x, *[0.0] * 7], FLOATS)[::3]
     assert value == pytest.approx(float(wanted[0]), rel=1e-15)

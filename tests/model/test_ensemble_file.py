@@ -119,10 +119,8 @@ def test_plots_show_distributions_and_bands() -> None:
     found = ensembles()["times"]
     axes = found.plot()
     middle = np.median(found.omega[found.has_result.all(axis=1)], axis=0)
-    drawn = np.array([np.asarray(line.get_ydata()) for line in axes.lines])
-    assert np.array_equal(drawn, middle.T)
+    assert np.array_equal(np.array([np.asarray(line.get_ydata()) for line in axes.lines]), middle.T)
     assert len(axes.collections) == 3
     for wrong in (object(), "ax"):
         refused("Axes", found.plot, wrong)
-    nothing = solve_many(SCENE, 2.0, omega=STARTS[3:])
-    refused("no body has a result", nothing.plot)
+    refused("no body has a result", solve_many(SCENE, 2.0, omega=STARTS[3:]).plot)

@@ -11,19 +11,9 @@ from hypothesis import strategies as st
 
 from pyharness import InputError, Scene, StateTorque, TorqueLaw
 from pyharness.model.expressions import FUNCTIONS, INPUTS, parsed
+from tests.tables import tables
 
-VALUES = (
-    "-0.1*w1", "2*sin(3*t)*q0", "w1*w2 - w2*w3", "-w1**2", "(-w1)**3", "w2**-2", "2*w3**0.5",
-    "k*w1 + wheel*w2", "1/w1/w2", "w1/(w2/w3)", "w1 - w2 - w3", "w1 - (w2 - w3)", "--w1", "+w3",
-    "2**3**2*w1", "-2**2*w1", "sqrt(1 + w1**2)", "sqrt(w1*w1 + w2*w2)", "tan(q1)", "sinh(w1 - w2)",
-    "cosh(k*t)", "tanh(w3)", "exp(-k*t)*cos(w2*t)", "pi*w1", "1_000*w1", "1e-3*w1", ".5*w2 + 1.",
-    "0x10*w1", "sin(t)**2", "sin(3*t + 1)", "t*w1", "t**2", "cos(cos(t))", "1/(2 + sin(t))",
-    "q0*q0 + q1*q1 - q2*q2 - q3*q3", "w1\n + w2", "\tw1 ", "7*k/3*w2", "exp(sin(w1)*cos(w2))",
-    "log(1 + w1)", "w1**1.5", "w2**-0.3", "2**w1", "w1**w2", "asin(w1/2)", "acos(w2/2)", "atan(w1)",
-    "atan2(w1 - 1, w2 - 1)", "cbrt(w2)", "abs(w1 - w2)", "sign(w1 - w2)", "floor(3*t)", "t % 0.4",
-    "heaviside(t - 1)", "min(w1, t)", "max(w1, 1)", "clip(w1, 0.8, q0)", "(w1 > w2)*t",
-    "where(w1 < w2 and not t >= 1, w1, -w2)", "where(w1 <= w2 or t > 1, 2, q1)",
-)  # fmt: skip
+VALUES = tables(__file__)["values"]
 CONSTANTS = {"k": 0.25, "wheel": 3, "_unused": -1.5}
 
 
@@ -202,8 +192,7 @@ def test_any_arithmetic_is_a_torque_or_one_line(text: str) -> None:
 def test_names_are_time_omega_and_the_attitude_with_the_scalar_first() -> None:
     torque = parsed(["t + 10*w1 + 100*w2 + 1000*w3", "q0 + 10*q1 + 100*q2 + 1000*q3", "0"], {})
     assert isinstance(torque, StateTorque)
-    found = torque.at(1.0, (2.0, 3.0, 4.0), (5.0, 6.0, 7.0, 8.0))
-    assert found == (4321.0, 8765.0, 0.0)
+    assert torque.at(1.0, (2.0, 3.0, 4.0), (5.0, 6.0, 7.0, 8.0)) == (4321.0, 8765.0, 0.0)
 
 
 def test_powers_of_small_quotients_do_not_underflow() -> None:
@@ -214,20 +203,16 @@ def test_powers_of_small_quotients_do_not_underflow() -> None:
         assert found[2] == pytest.approx(1.0, rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "(w3 + 1e200)*1e-170*1e-170", "w3/1e250/1e90", "1e-200*(w1/1e140 - w3/1e140)",
-        "1e-170*w2*1e-170*(1e-10*w1)", "1e300*(1e-170*w2*1e-170)", "sin(1e-170*w2*1e-170*1e100)",
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize("text", [
+    "(w3 + 1e200)*1e-170*1e-170", "w3/1e250/1e90", "1e-200*(w1/1e140 - w3/1e140)",
+    "1e-170*w2*1e-170*(1e-10*w1)", "1e300*(1e-170*w2*1e-170)", "sin(1e-170*w2*1e-170*1e100)",
+])  # fmt: skip
 def test_coefficients_that_would_underflow_are_not_folded(text: str) -> None:
     """The product of two numbers is 0 or subnormal, but not their products with an omega."""
     omega = (3e200, 1e200, 5e200)
     torque = parsed([text, "0", "0"], {})
     assert isinstance(torque, StateTorque)
-    names = dict(zip(("w1", "w2", "w3"), omega, strict=True))
-    wanted = eval(text, {"sin": math.sin}, names)
+    wanted = eval(text, {"sin": math.sin}, dict(zip(("w1", "w2", "w3"), omega, strict=True)))
     assert wanted
     assert torque.at(0.0, omega, (1.0, 0.0, 0.0, 0.0))[0] == pytest.approx(wanted, rel=1e-12)
     # Turned by a third of a turn about (1, 1, 1), the torque is recorded anew.

@@ -17,6 +17,7 @@ from pyharness.engine.system.recorded import kernel_tape, taylor_step
 from pyharness.model.dual import with_derivatives
 from pyharness.model.state_torque import recorded
 from pyharness.model.tape import FLOATS, evaluate
+from tests.conftest import Patch
 from tests.model.test_elementary import ARGUMENTS, JUMPS, SINGULAR
 
 SLOPES: dict[str, Callable[[Any], Any]] = {
@@ -85,9 +86,7 @@ def test_slope_by_dual_numbers(name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "compiled"), [(name, each) for name in SLOPES for each in (False, True)]
 )
-def test_slope_in_the_kernel(
-    name: str, compiled: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_slope_in_the_kernel(name: str, compiled: bool, tmp_path: Path, monkeypatch: Patch) -> None:
     """Unknown 0 grows with the time; the function is the rate of unknown 1."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     tape = recorded_equation(lambda t, y: [0.0 * y[0] + 1.0, getattr(np, name)(y[0])], 2)

@@ -62,8 +62,7 @@ def test_plates_in_decimals_are_possible_as_moments_and_as_inertia() -> None:
             for factor, is_impossible in ((1.0, False), (1.0 + 3e-15, True)):
                 moments = first, middle, last * factor
                 for given in ({"moments": moments}, {"inertia": np.diag(moments)}):
-                    scene = Scene("", (1.0, 2.0, 3.0), **given)
-                    assert scene.is_impossible is is_impossible, given
+                    assert Scene("", (1.0, 2.0, 3.0), **given).is_impossible is is_impossible, given
 
 
 def test_the_command_line_says_it_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

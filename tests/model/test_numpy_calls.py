@@ -10,6 +10,7 @@ import pytest
 from pyharness import InputError, Scene, opaque, solve
 from pyharness.model.state_torque import recorded
 from pyharness.model.tape import float_outputs
+from tests.tables import tables
 
 # Without quotients of arguments that are whole, where a rounding error decides.
 POINTS = [
@@ -54,28 +55,7 @@ np.trapezoid(w * w, dx=.1); np.diff(w, prepend=0); np.convolve(w, [1, 2]); np.ro
 np.tile(w, 2); np.repeat(w, 2); np.triu(np.outer(w, w)); np.diag(w); np.full_like(w, w[0])
 np.vectorize(lambda x: x * x)(w); np.apply_along_axis(lambda x: 2 * x, 0, w); np.meshgrid(w, w)
 """
-REFUSED = {
-    # Functions of numbers that are not conditions, and conditions that are numbers.
-    "np.where(w, 1, 2)": "a number as a condition",
-    "(w[0] > .2) & w[1]": "a number as a condition",
-    "w[1] | (w[0] > .2)": "a number as a condition",
-    "(w[0] > .2) ^ 2": "a number as a condition",
-    "3 & (w[0] > .2)": "a number as a condition",
-    "np.logical_or(w[0] > .2, w[1])": "a number as a condition",
-    "np.logical_and(w[0], w > .2)": "a number as a condition",
-    # Other rounding.
-    "np.sqrt(w + 3, dtype=np.float32)": "the argument dtype=float32",
-    "np.sum(w, dtype=np.float32)": "the argument dtype=float32",
-    "np.maximum(w, .2, dtype=np.float16)": "the argument dtype=float16",
-    "w.astype(np.float32)": "a conversion",
-    # A second argument of the function of `math`, which would be NumPy's argument out.
-    "math.log(2, w[0] + 3)": "log with these arguments",
-    "math.log(w[0] + 3, 2)": "log with these arguments",
-    "np.maximum(w, 0.2, out=np.array(w))": "the argument out",
-    "math.hypot(w[0], w[1], w[2])": "hypot with these arguments",
-    "np.interp(w, [0, 1], [1, 5], period=2)": "interp with these arguments",
-    "np.linalg.norm(w, 1)": "the norm of order 1",
-}  # fmt: skip
+REFUSED = tables(__file__)["refused"]
 EXPRESSIONS = [each.strip() for each in RECORDED.replace("\n", ";").split(";") if each.strip()]
 
 

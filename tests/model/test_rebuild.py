@@ -208,12 +208,9 @@ def test_loops_over_bodies_are_vector_code(tmp_path: Path) -> None:
     command[command.index("-c") + 1] = str(tmp_path / name)
     wide = ["-march=x86-64-v4", "-mprefer-vector-width=512", f"-J{tmp_path}"]
     done = subprocess.run(
-        [*command, *wide, "-fopt-info-vec-optimized"],
-        cwd=build,
-        capture_output=True,
-        text=True,
+        [*command, *wide, "-fopt-info-vec-optimized"], cwd=build, capture_output=True, text=True,
         check=True,
-    )
+    )  # fmt: skip
     there = {int(n) for n in re.findall(rf"{name}:(\d+):\d+: optimized: loop vec", done.stderr)}
     scalar, loops, place = set(), 0, ""
     for number, line in enumerate((tmp_path / name).read_text().splitlines(), 1):

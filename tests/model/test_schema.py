@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pyharness import Ensemble, load, solve, solve_many
+from pyharness import Ensemble, InputError, Listing, load, read_scene, solve, solve_many
 from pyharness.checks.external_file import read_problem
 from pyharness.checks.golden import read_record
 from pyharness.checks.integrators import protocol
@@ -20,9 +20,6 @@ from pyharness.checks.scenes.random_scenes import draw_moderate
 from pyharness.cli.output import check_tree
 from pyharness.edition.citation import PACKAGE_MARK
 from pyharness.edition.report import MARK
-from pyharness.engine.torques.scene_reader import read_scene
-from pyharness.model.errors import InputError
-from pyharness.model.listing import Listing
 from pyharness.model.scene_file import case_scene, scene_text
 from pyharness.model.schema import SCHEMAS, check_schema
 from pyharness.sweep.sweep_file import read_sweep

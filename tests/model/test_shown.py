@@ -17,8 +17,7 @@ def _lines(result: object) -> list[str]:
 
 @pytest.mark.parametrize("rows", [1, 3, 100_000])
 def test_a_trajectory_of_any_size(rows: int) -> None:
-    times = np.linspace(0.5, 1.0, rows)
-    (first, *_) = lines = _lines(solve(case_scene(5), times, attitude=True))
+    (first, *_) = lines = _lines(solve(case_scene(5), np.linspace(0.5, 1.0, rows), attitude=True))
     assert first.startswith("Trajectory(time=<float64 ")
     text = " ".join(lines)
     assert f"omega=<float64 ({rows}, 3)>" in text
@@ -50,5 +49,4 @@ def test_durations_have_a_unit_in_which_they_are_short() -> None:
 
 def test_a_field_of_any_length_is_cut() -> None:
     rows = np.zeros((2, 3))
-    long = Trajectory(rows[:, 0], rows[:, 0], rows, None, 1, 1, ended="x" * 10_000)
-    assert len(repr(long)) < 400
+    assert len(repr(Trajectory(rows[:, 0], rows[:, 0], rows, None, 1, 1, ended="x" * 10_000))) < 400

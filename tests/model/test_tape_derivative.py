@@ -99,8 +99,7 @@ def test_derivatives_of_the_equations_of_motion() -> None:
     tape = system_of(scene, True)
     slots = (*OMEGA, *ATTITUDE)
     at = [0.3, 0.5, -0.2, 0.9, 0.5, -0.5, 0.5, 0.5]
-    found = evaluate(with_derivatives(tape, slots), at, FLOATS)
-    slopes = np.array(found[7:]).reshape(7, 7)
+    slopes = np.array(evaluate(with_derivatives(tape, slots), at, FLOATS)[7:]).reshape(7, 7)
     for column, slot in enumerate(slots):
         moved = [[*at], [*at]]
         for sign, each in zip((1.0, -1.0), moved, strict=True):

@@ -32,8 +32,7 @@ TEXTS = ["-k*w1 + sin(2*t)*q0", "-k*w2", "0"]
 def test_scene_with_expressions_is_restored_from_its_text(
     constants: dict[str, float], tmp_path: Path
 ) -> None:
-    table = {"expression": TEXTS, "constants": constants}
-    scene = scene_of(BODY | {"torque": table}, "damped")
+    scene = scene_of(BODY | {"torque": {"expression": TEXTS, "constants": constants}}, "damped")
     again = restored(scene, tmp_path)
     assert again == scene
     assert repr(again) == repr(scene)
@@ -65,18 +64,15 @@ def test_expression_may_have_several_lines(tmp_path: Path) -> None:
     assert "N = (-0.5*w1 - 0.25*w1**3, 0, 0) rad/s2; omega(0)" in heading(scene)[1]
 
 
-@pytest.mark.parametrize(
-    ("torque", "record", "shown"),
-    [
-        (lambda t, omega: -0.1 * omega, {"recorded": 0}, "N is a recorded function of omega, in"),
-        (lambda t, omega, q: t * q[0] * omega, {"recorded": 4},
-         "N is a recorded function of t, omega and attitude, in N m"),
-        (opaque(lambda t, omega: omega), {"opaque": True},
-         "N is an opaque function of t and omega, in N m"),
-        (opaque(lambda t, omega, q: omega), {"opaque": True},
-         "N is an opaque function of t, omega and attitude, in N m"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("torque", "record", "shown"), [
+    (lambda t, omega: -0.1 * omega, {"recorded": 0}, "N is a recorded function of omega, in"),
+    (lambda t, omega, q: t * q[0] * omega, {"recorded": 4},
+     "N is a recorded function of t, omega and attitude, in N m"),
+    (opaque(lambda t, omega: omega), {"opaque": True},
+     "N is an opaque function of t and omega, in N m"),
+    (opaque(lambda t, omega, q: omega), {"opaque": True},
+     "N is an opaque function of t, omega and attitude, in N m"),
+])  # fmt: skip
 def test_torque_that_is_a_function_is_shown(
     torque: StateTorque | Callable[..., Any], record: dict[str, Any], shown: str
 ) -> None:
@@ -122,8 +118,7 @@ def test_schema_of_the_record_has_one_form_of_torque() -> None:
 def test_expressions_in_the_documents_are_read() -> None:
     reference = (ROOT / "docs/reference/scene-files.md").read_text()
     table, with_states = re.findall(r"```\n(\[torque\].*?)```", reference, re.DOTALL)
-    own = scene_of(BODY | tomllib.loads(with_states), "reference")
-    assert own.states[0].start == 1.5
+    assert scene_of(BODY | tomllib.loads(with_states), "reference").states[0].start == 1.5
     scene = scene_of(BODY | tomllib.loads(table), "reference")
     assert isinstance(scene.torque, StateTorque)
     assert scene.torque.constants == (("k", 0.1),)

@@ -55,8 +55,7 @@ def test_every_form_of_numbers_makes_the_same_scene(form: str) -> None:
     assert repr(scene) == repr(PLAIN)
     assert dataclasses.replace(scene) == PLAIN
     assert json.loads(json_text(scene_record(scene))) == scene_record(PLAIN)
-    fields = [scene.omega, scene.moments, law.constant, law.rate, law.sines[0][0]]
-    for field in fields:
+    for field in [scene.omega, scene.moments, law.constant, law.rate, law.sines[0][0]]:
         assert type(field) is tuple
         assert all(type(x) is float for x in field or ())
     assert [type(x) for x in (scene.step_size, scene.steps, law.sines[0][1])] == [float, int, float]

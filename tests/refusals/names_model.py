@@ -11,11 +11,12 @@ from pyharness.engine.torques.scene_reader import scene_of
 from pyharness.model.expressions import parsed
 from pyharness.model.scene_file import scene_text
 from pyharness.sweep.sweep_file import read_sweep
+from pyharness.torques import wheels
 from tests.sweep.sweeps import BASE, PROGRAM, TILT, text
 
 __all__ = ["BASE", "BODY", "BOOMS", "DAMPED_BASE", "DAMPING", "GAINED", "GRAVITY", "INTEGRAL",
-           "LAW", "PROGRAM", "READINGS", "START", "TILT", "TILTED", "TURNED", "Decimal", "Fraction",
-           "axis", "expression", "in_file", "parsed", "scene", "scene_text", "sweep",
+           "LAW", "PROGRAM", "READINGS", "START", "TILT", "TILTED", "TURNED", "WHEELED", "Decimal",
+           "Fraction", "axis", "expression", "in_file", "parsed", "scene", "scene_text", "sweep",
            "text", "torque"]  # fmt: skip
 
 LAW = TorqueLaw((1.0, 2.0, 3.0), sines=[((1.0, 0.0, 0.5), 4.0)])
@@ -35,6 +36,8 @@ def _gained(t: Any, omega: Any, *, gain: float = 0.5) -> Any:
     return -gain * omega
 
 
+MOTORS = wheels((0.0, 0.0, 0.5), lambda t, omega, attitude, h: 0.5 * omega + 0.3 * attitude[1:])
+WHEELED = Scene("", (0.1, 0.2, -0.1), (4, 3, 2), attitude=(1, 0.2, 0.1, 0), torque=MOTORS)
 GAINED = Scene("gained", (0.0, 0.0, 1.0), (2.0, 3.0, 4.0), torque=_gained)
 # Parts of scene files.
 BODY = "[body]\nmoments = [3, 2, 1]\n"

@@ -19,34 +19,7 @@ steps = 100
 """
 TILT = '[[axis]]\nfield = "tilt"\nfrom = 0.001\nto = 1.0\nspacing = "log"\ncount = 6\n'
 SQUARE = '[[axis]]\nfield = "body.square.1"\nfrom = 0.2\nto = 1.0\ncount = 5\n'
-PROGRAM = """
-chunk = 20
-reductions = ["end", "status", "stop-step", "stop-variable", "overflow-time", "error"]
-[scene]
-case = 3
-[solve]
-program = "runge-kutta"
-[[axis]]
-field = "listing"
-values = ["original", "corrected"]
-[[axis]]
-field = "omega.1"
-draw = "normal"
-mean = 1.0
-deviation = 0.3
-count = 12
-seed = 4
-[[axis]]
-field = "omega.3"
-draw = "uniform"
-from = -10.0
-to = 10.0
-count = 12
-seed = 4
-[[axis]]
-field = "step_size"
-values = [0.01, 0.02]
-"""
+PROGRAM = Path(__file__).with_name("program.toml").read_text()
 
 
 def every(sweep: Sweep) -> list[Any]:

@@ -79,8 +79,7 @@ def test_the_sizes_are_those_of_the_pages() -> None:
 
 
 def test_square_of_all_bodies_is_symmetric_about_its_diagonal(tmp_path: Path) -> None:
-    sweep = _coarse(tmp_path, "stability", 8)
-    found = _whole(sweep)["flip-time"]
+    found = _whole(_coarse(tmp_path, "stability", 8))["flip-time"]
     other = _coarse(tmp_path, "stability", 8).text.replace("0.7853981633974483", f"{np.pi / 2}")
     mirrored = _whole(read_sweep(written(tmp_path, other)))["flip-time"]
     # This exchanges the axes of the least and the largest moment, and with them b/a and c/b.
@@ -195,8 +194,7 @@ def test_corrected_program_stops_where_it_is_predicted(tmp_path: Path) -> None:
         for i in range(3)
     ]
     assert changes[0] > 5 * changes[1] > 0
-    stops = found["stop-variable"][0][stopped[0]]
-    assert 0.5 < np.isin(stops, (4, 5, 6)).mean() < 0.95
+    assert 0.5 < np.isin(found["stop-variable"][0][stopped[0]], (4, 5, 6)).mean() < 0.95
 
 
 @pytest.mark.campaign

@@ -18,8 +18,7 @@ def test_chunks_change_no_bit(axes: tuple[str, ...], method: str, tmp_path: Path
     """Some torques are zero, so that a chunk may have only zeros, or zeros among others."""
     if method == "rk4":
         axes = tuple(each for each in axes if each != TIME)
-    solve = f'[solve]\nmethod = "{method}"'
-    sweep = read_sweep(written(tmp_path, text(*axes, solve)))
+    sweep = read_sweep(written(tmp_path, text(*axes, f'[solve]\nmethod = "{method}"')))
     places = every(sweep)
     whole = solve_points(sweep, places)
     for size in (1, 2, 3, 7, 64):

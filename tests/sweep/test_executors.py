@@ -91,8 +91,7 @@ def test_processes_are_started_once(sweep: Sweep, monkeypatch: Patch) -> None:
 def test_killed_process_costs_its_chunks_and_nothing_else(sweep: Sweep) -> None:
     found = {}
     with engine("processes", 2) as own:
-        results = own.computed(sweep, list(range(sweep.n_chunks)))
-        for chunk, arrays in results:
+        for chunk, arrays in own.computed(sweep, list(range(sweep.n_chunks))):
             assert chunk not in found
             found[chunk] = arrays
             if len(found) == 3:

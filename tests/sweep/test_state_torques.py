@@ -49,8 +49,7 @@ rate = 0.7
 
 def text(*axes: str, scene: str = SCENE, solver: str = "") -> str:
     """Return a sweep file that stores omega at the end and the status."""
-    head = 'reductions = ["end", "status"]\n'
-    return "\n".join([head, scene, f"[solve]\n{solver}", *axes])
+    return "\n".join(['reductions = ["end", "status"]\n', scene, f"[solve]\n{solver}", *axes])
 
 
 def ends(sweep: Sweep) -> Any:
@@ -97,8 +96,7 @@ def test_each_scene_has_its_own_solution(field: str, solver: str, tmp_path: Path
     found = ends(read_sweep(written(tmp_path, text(axis(field, values), solver=solver))))
     for row, value in zip(found, values, strict=True):
         one, time = scene(value)
-        wanted = solve(one, time, attitude=True).omega[0]
-        assert np.abs(row - wanted).max() < 1e-7
+        assert np.abs(row - solve(one, time, attitude=True).omega[0]).max() < 1e-7
     assert np.abs(found[0] - found[1]).max() > 1e-3
 
 
@@ -118,8 +116,7 @@ def test_term_has_the_inertia_of_the_varied_body_by_default(given: Any, tmp_path
     terms = TERMS + (f"inertia = {list(given)}\n" if given else "")
     scene = SCENE.replace("[scene.run]", f"{terms}[scene.run]").replace("m*q0*q1", "0")
     sweep = read_sweep(written(tmp_path, text(axis("body.moments.1", [3.5, 4.5]), scene=scene)))
-    found = ends(sweep)
-    for row, moment in zip(found, (3.5, 4.5), strict=True):
+    for row, moment in zip(ends(sweep), (3.5, 4.5), strict=True):
         moments = (moment, 3.0, 2.0)
         gravity = torques.gravity_gradient(given or moments, 0.7)
         total = torques.damping(0.2) + gravity + torque_of(m=0.0)
@@ -141,10 +138,8 @@ def test_attitudes_are_relative_to_the_start(constant: float, tmp_path: Path) ->
     sweep = read_sweep(written(tmp_path, content))
     ((_, batch),) = batches(sweep, every(sweep))
     start = np.array([[0.5, 0.5, x, 0.5] for x in (0.6, -0.5)])
-    attitudes = replace(batch, attitude=True).attitudes(1)[:, 0]
-    for one, attitude in zip(start, attitudes, strict=True):
-        scene = scene_of(attitude=one, torque=torque_of(m=constant))
-        path: Any = solve(scene, 2.0, attitude=True)
+    for one, attitude in zip(start, replace(batch, attitude=True).attitudes(1)[:, 0], strict=True):
+        path: Any = solve(scene_of(attitude=one, torque=torque_of(m=constant)), 2.0, attitude=True)
         before, after, turned = Rotation.from_quat(
             [one, path.attitude[0], attitude], scalar_first=True
         ).as_matrix()
@@ -265,8 +260,7 @@ def test_elements_of_an_inertia_matrix_vary(terms: str, torque: str, tmp_path: P
             row = f"inertia = [[4, {off}, 0], [{off}, 3, 0.2], [0, 0.2, {last}]]"
             own = scene.replace("inertia = [[4, 0.1, 0], [0.1, 3, 0.2], [0, 0.2, 2]]", row)
             path = written(tmp_path, own.replace("scene.", ""), "own.toml")
-            wanted = solve(read_scene(path), 2.0).omega[0]
-            assert found[i, j] == pytest.approx(wanted, abs=1e-9)
+            assert found[i, j] == pytest.approx(solve(read_scene(path), 2.0).omega[0], abs=1e-9)
 
 
 @pytest.mark.parametrize(("field", "more", "message"), [

@@ -50,8 +50,7 @@ def test_killed_at_half_way_it_resumes_and_does_nothing_twice(
 @pytest.mark.campaign
 def test_xarray_opens_it_without_a_warning(tmp_path: Path) -> None:
     xarray = pytest.importorskip("xarray")
-    sweep = read_sweep(written(tmp_path, PROGRAM))
-    run_sweep(sweep, str(tmp_path / "store"))
+    run_sweep(read_sweep(written(tmp_path, PROGRAM)), str(tmp_path / "store"))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         found = xarray.open_zarr(tmp_path / "store")
@@ -72,8 +71,7 @@ def test_xarray_opens_it_without_a_warning(tmp_path: Path) -> None:
 def test_draws_and_results_do_not_depend_on_the_chunks(tmp_path: Path) -> None:
     found = []
     for chunk in (20, 7, 1000):
-        content = PROGRAM.replace("chunk = 20", f"chunk = {chunk}")
-        sweep = read_sweep(written(tmp_path, content))
+        sweep = read_sweep(written(tmp_path, PROGRAM.replace("chunk = 20", f"chunk = {chunk}")))
         run_sweep(sweep, str(tmp_path / str(chunk)))
         with opened(sweep, str(tmp_path / str(chunk))) as there:
             found.append({name: there.array(name)[...] for name in ("end", "stop-step", "error")})
@@ -108,8 +106,7 @@ def test_disk_that_fills_ends_in_a_line_and_a_store_that_resumes(
         done = found_store.done()
     assert any(done)
     assert not all(done)
-    outcome = run_sweep(sweep, str(tmp_path / "full"))
-    assert outcome.before == sum(done)
+    assert run_sweep(sweep, str(tmp_path / "full")).before == sum(done)
     assert files(tmp_path / "full") == files(tmp_path / "whole")
 
 
@@ -286,8 +283,7 @@ def test_memory_is_refused_where_the_half_of_it_ends(tmp_path: Path, monkeypatch
     monkeypatch.setattr("pyharness.model.scene._BYTES_PER_STEP", 1)  # only the sweep is too large
     # Pages of one byte: exactly half of the memory, and two bytes less.
     for number, is_refused in ((2 * estimate.memory, False), (2 * estimate.memory - 2, True)):
-        sizes = {"SC_PHYS_PAGES": number, "SC_PAGE_SIZE": 1}
-        monkeypatch.setattr(os, "sysconf", sizes.__getitem__)
+        monkeypatch.setattr(os, "sysconf", {"SC_PHYS_PAGES": number, "SC_PAGE_SIZE": 1}.__getitem__)
         if is_refused:
             refused("memory", run_sweep, sweep, str(tmp_path / "refused"))
         else:
@@ -311,8 +307,7 @@ def test_memory_of_the_estimate_is_what_a_chunk_takes(samples: int, tmp_path: Pa
 
 
 def test_what_is_not_computed_yet_is_no_number(tmp_path: Path) -> None:
-    sweep = read_sweep(written(tmp_path, PROGRAM))
-    with opened(sweep, str(tmp_path / "store")) as found_store:
+    with opened(read_sweep(written(tmp_path, PROGRAM)), str(tmp_path / "store")) as found_store:
         assert np.isnan(found_store.array("end")[...]).all()
         assert (found_store.array("status")[...] == -1).all()
         assert not any(found_store.done())

@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pyharness.model.errors import InputError
-from pyharness.model.scene_file import case_scene
+from pyharness import InputError, case_scene
 from pyharness.sweep.axes import axis_of
 from pyharness.sweep.batches import batches
 from pyharness.sweep.sweep import points, spread

@@ -8,11 +8,10 @@ from functools import partial
 
 import numpy as np
 
+from pyharness import case_scene, run_many
 from pyharness.model.extension import extension
 from pyharness.model.listing import PROGRAMS, Listing
-from pyharness.model.scene_file import case_scene
 from pyharness.thesis.compiled import program_arguments
-from pyharness.thesis.many import run_many
 from tests.instruction_sets import LEVELS, levels_here
 
 BODY_STEPS = 2_000_000  # of one measurement of a batch
@@ -26,8 +25,7 @@ def best(task: Callable[[], object], repeats: int = 9) -> float:
 
 def single(listing: Listing, steps: int) -> float:
     """Return the time of one step (ns) of a single run, called in a loop."""
-    scene = replace(case_scene(3), steps=steps)
-    given = program_arguments(scene, listing, AT_REST, True, False)
+    given = program_arguments(replace(case_scene(3), steps=steps), listing, AT_REST, True, False)
     calls = max(1, 100_000 // steps)
     run = extension().run_program
     taken = run(*given)[2]  # the run may overflow before the last step

@@ -5,12 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from pyharness import Listing, ProgramEnsemble, Scene
 from pyharness.model.extension import ENDS
-from pyharness.model.listing import Listing
-from pyharness.model.scene import Scene
 from pyharness.model.trajectory import STOP_VARIABLES
 from pyharness.thesis import compiled
-from pyharness.thesis.many import ProgramEnsemble
 
 Options = dict[str, Any]
 

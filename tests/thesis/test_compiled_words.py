@@ -11,15 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import run_program
+from pyharness import InputError, Scene, TorqueLaw, case_scene, compare_programs, run_program
 from pyharness.checks.compare.agreement import differences
-from pyharness.checks.compare.comparison import compare_programs
-from pyharness.model.errors import InputError
 from pyharness.model.extension import COMPLETE, REFUSED, extension
 from pyharness.model.listing import PROGRAMS, Listing
-from pyharness.model.scene import Scene
-from pyharness.model.scene_file import case_scene
-from pyharness.model.torque_law import TorqueLaw
 from pyharness.thesis import in_word
 from pyharness.thesis.cells import all_listings
 from pyharness.thesis.in_word import compiled_words, from_bytes, to_bytes
@@ -147,8 +142,7 @@ def test_square_root_of_binary128_is_correctly_rounded() -> None:
     for x, (root, _, _) in zip(numbers, functions("binary128", numbers), strict=True):
         # x = m 4**half, and the root of m is computed to 128 binary places.
         m, half = (x.m, x.e // 2) if x.e % 2 == 0 else (2 * x.m, x.e // 2)
-        below = math.isqrt(m << 256)
-        due = WIDE(Fraction(2 * below + 1) * Fraction(2) ** (half - 129))
+        due = WIDE(Fraction(2 * math.isqrt(m << 256) + 1) * Fraction(2) ** (half - 129))
         assert (root.m, root.e) == (due.m, due.e), x
     plain = [WIDE(x) for x in (0.0, -0.0, math.inf, -1.0, -math.inf, math.nan)]
     told = [str(root.e) for root, _, _ in functions("binary128", plain)]
@@ -215,8 +209,7 @@ def test_bytes_of_binary128() -> None:
     }  # fmt: skip
     numbers = [WIDE(each) for each in patterns.values()]
     written = to_bytes(numbers, WIDE, len(numbers))
-    found = [int.from_bytes(each.tobytes(), sys.byteorder) for each in written.T]
-    assert found == list(patterns)
+    assert [int.from_bytes(each.tobytes(), sys.byteorder) for each in written.T] == list(patterns)
     back = from_bytes(written, WIDE)
     assert [(each.m, each.e) for each in back] == [(each.m, each.e) for each in numbers]
     (nan,) = from_bytes(to_bytes([WIDE(math.nan)], WIDE, 1), WIDE)

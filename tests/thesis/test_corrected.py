@@ -79,8 +79,7 @@ def test_languages_agree_bit_for_bit_on_all_of_them() -> None:
     cells = list(itertools.product(ASSUMED, case_numbers()))
     given = b"".join(request(case_scene(case), _listing(each)) + b"\n" for each, case in cells)
     port = [engine(), str(WEB / "port.js")]
-    done = subprocess.run(port, input=given, capture_output=True, check=True)
-    answers = done.stdout.splitlines()
+    answers = subprocess.run(port, input=given, capture_output=True, check=True).stdout.splitlines()
     assert len(answers) == len(cells)
     for (assumed, case), line in zip(cells, answers, strict=True):
         scene, listing = case_scene(case), _listing(assumed)

@@ -6,13 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pyharness import Scene, case_scene, run_many
 from pyharness.checks.scenes.random_scenes import draw
 from pyharness.model.listing import PROGRAMS, Listing, subset
-from pyharness.model.scene import Scene
-from pyharness.model.scene_file import case_scene
 from pyharness.thesis import many
 from pyharness.thesis.cells import all_listings
-from pyharness.thesis.many import run_many
 from tests.thesis.single_runs import Options, assert_alike, assert_same, same_bits
 from tests.thesis.test_programs import NASTY
 
@@ -49,8 +47,7 @@ def random_ensemble(number: int, n: int) -> tuple[Scene, Listing, Options]:
 def test_random_bodies_have_the_bits_of_their_single_runs(level: int) -> None:
     """Each instruction set has its own scenes, plain and nasty."""
     for number in range(240 * level, 240 * level + 240):
-        n = (1, 2, 7, 8, 9, 31, 32, 33)[number % 8]
-        scene, listing, options = random_ensemble(number, n)
+        scene, listing, options = random_ensemble(number, (1, 2, 7, 8, 9, 31, 32, 33)[number % 8])
         assert_alike(run_many(scene, listing, **options), scene, listing, options)
 
 
@@ -86,18 +83,15 @@ def test_threads_change_no_bit(program: str, n: int, monkeypatch: pytest.MonkeyP
     source = np.random.default_rng(n)
     options: Options = {
         "omega": source.normal(size=(n, 3)) * 10.0 ** source.uniform(-1.0, 3.0, (n, 1)),
-        "lipschitz": 10.0 ** source.uniform(0.0, 3.0, n),
-        "velocity": True,
-        "at": [3, 20],
-    }
+        "lipschitz": 10.0 ** source.uniform(0.0, 3.0, n), "velocity": True, "at": [3, 20],
+    }  # fmt: skip
     for listing in (Listing.original(program), Listing.corrected(program)):
         one = run_many(scene, listing, **options)
         assert_alike(one, scene, listing, options)
         for threads in (2, 3):
             assert_same(one, run_many(scene, listing, threads=threads, **options))
         mixed = {**options, "step_size": 0.01 * source.integers(1, 4, n)}
-        apart = run_many(scene, listing, **mixed)
-        assert_same(apart, run_many(scene, listing, threads=3, **mixed))
+        assert_same(run_many(scene, listing, **mixed), run_many(scene, listing, threads=3, **mixed))
         backward = {k: v[::-1] if np.shape(v)[:1] == (n,) else v for k, v in options.items()}
         if n not in (1, 2):
             found = run_many(scene, listing, **backward)

@@ -6,13 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness.model.errors import InputError
-from pyharness.model.listing import Listing
-from pyharness.model.scene import Scene
-from pyharness.model.scene_file import case_scene
-from pyharness.model.torque_law import TorqueLaw
+from pyharness import InputError, Listing, Scene, TorqueLaw, case_scene, run_many
 from pyharness.thesis import compiled
-from pyharness.thesis.many import run_many
 from tests.thesis.single_runs import assert_same, same_bits
 
 

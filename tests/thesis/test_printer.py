@@ -11,12 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pyharness import case_scene
+from pyharness import Scene, Trajectory, case_scene
 from pyharness.cli.main import main
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing
-from pyharness.model.scene import Scene
-from pyharness.model.trajectory import Trajectory
 from pyharness.thesis import compiled
 from pyharness.thesis.printer import formats_of, page, write
 
@@ -78,17 +76,14 @@ def test_long_runs_and_overflow_end_in_asterisks(capsys: Capture) -> None:
     assert page(mine, "four-term", run).splitlines()[0] == "   3.00       0.00"
 
 
-@pytest.mark.parametrize(
-    ("value", "width", "decimals", "wanted"),
-    [
-        (0.00005, 10, 4, "0.0001"),  # binary64 holds a little more than the tie
-        (0.00015, 10, 4, "0.0001"),  # and a little less here
-        (0.03125, 10, 4, "0.0313"),  # an exact tie is rounded away from zero
-        (-0.03125, 10, 4, "-0.0313"), (-0.00001, 10, 4, "0.0000"), (-0.0, 10, 4, "0.0000"),
-        (0.25, 3, 2, ".25"), (-0.25, 4, 2, "-.25"), (2.5, 4, 0, "3."),
-        (1e22, 40, 4, "10000000000000000000000.0000"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("value", "width", "decimals", "wanted"), [
+    (0.00005, 10, 4, "0.0001"),  # binary64 holds a little more than the tie
+    (0.00015, 10, 4, "0.0001"),  # and a little less here
+    (0.03125, 10, 4, "0.0313"),  # an exact tie is rounded away from zero
+    (-0.03125, 10, 4, "-0.0313"), (-0.00001, 10, 4, "0.0000"), (-0.0, 10, 4, "0.0000"),
+    (0.25, 3, 2, ".25"), (-0.25, 4, 2, "-.25"), (2.5, 4, 0, "3."),
+    (1e22, 40, 4, "10000000000000000000000.0000"),
+])  # fmt: skip
 def test_rounding(value: float, width: int, decimals: int, wanted: str) -> None:
     assert write(f"(F{width}.{decimals})", [value]) == [wanted.rjust(width)]
 

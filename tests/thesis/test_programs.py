@@ -11,14 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pyharness import Scene, TorqueLaw, Trajectory, case_scene
 from pyharness.checks.compare.agreement import differences, distance
 from pyharness.checks.compare.orders import measured_order
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset, switchable, switches
-from pyharness.model.scene import Scene
-from pyharness.model.scene_file import case_scene
-from pyharness.model.torque_law import TorqueLaw
-from pyharness.model.trajectory import Trajectory
 from pyharness.thesis import compiled, runge_kutta
 from pyharness.thesis.cells import all_cells, all_listings, cell_name
 from pyharness.thesis.programs import IMPLEMENTATIONS, PROGRAM_REGISTRY, run_program
@@ -212,8 +209,7 @@ def test_overflow_of_one_component_ends_it(program: str, axis: tuple[float, floa
     for listing in (Listing.original(program), Listing.corrected(program)):
         fortran, twin = both(scene, listing, may_stop=False)
         assert differences(fortran, twin) == []
-        alone = compiled.run(scene, listing, may_stop=False, velocity=False)
-        for run in (fortran, alone):
+        for run in (fortran, compiled.run(scene, listing, may_stop=False, velocity=False)):
             assert (run.ended, run.steps) == ("overflow", 0)
 
 

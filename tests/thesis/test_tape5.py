@@ -16,8 +16,7 @@ from pyharness.thesis.printer import tape5
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_tape_is_read_back_bit_for_bit(program: str, tmp_path: Path) -> None:
     out = tmp_path / "tape"
-    command = f"run --case 5 --format tape5 --program {program} --out {out}"
-    assert main(command.split()) == 0
+    assert main(f"run --case 5 --format tape5 --program {program} --out {out}".split()) == 0
     run = compiled.run(case_scene(5), Listing.original(program))
     assert run.velocity is not None
     wanted = np.hstack([run.recorded_time[:, None], run.omega, run.velocity])

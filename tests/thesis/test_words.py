@@ -9,10 +9,9 @@ from random import Random
 import numpy as np
 import pytest
 
-from pyharness import run_program
+from pyharness import case_scene, run_program
 from pyharness.checks.compare.agreement import differences
 from pyharness.model.listing import PROGRAMS, Listing
-from pyharness.model.scene_file import case_scene
 from pyharness.thesis import in_word
 from pyharness.thesis.printer import page
 from pyharness.thesis.programs import WORD_NAMES

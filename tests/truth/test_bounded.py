@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
 
-from pyharness import Scene, case_scene, solve
+from pyharness import Comparison, Scene, case_scene, solve
 from pyharness.bench import measure as bench
 from pyharness.checks import judge
 from pyharness.checks.compare import comparison
-from pyharness.checks.compare.findings import Comparison
 from pyharness.engine.plan import registry
 from pyharness.engine.plan.report import trajectory_bound
 from pyharness.model.attitude import angle_between
@@ -60,8 +59,7 @@ def test_bound_is_the_distance_to_the_farthest_point() -> None:
         for row, balls in zip(known.omega.tolist(), exact, strict=True)
         for x, y in zip(row, balls.middle, strict=True)
     )
-    found = bound_of(scene, known).value
-    assert apart <= Fraction(found) <= apart * Fraction(51, 50)
+    assert apart <= Fraction(bound_of(scene, known).value) <= apart * Fraction(51, 50)
 
 
 def test_attitude_without_torque_is_proved_with_the_library(hide: Hide) -> None:
@@ -72,8 +70,7 @@ def test_attitude_without_torque_is_proved_with_the_library(hide: Hide) -> None:
     assert (found.basis, found.angle_basis) == (PROVED, PROVED)
     assert 0.0 < found.angle <= known.angle_error
     hide()
-    without = bound_of(scene, known)
-    assert without == found._replace(angle=known.angle_error, angle_basis=ESTIMATED)
+    assert bound_of(scene, known) == found._replace(angle=known.angle_error, angle_basis=ESTIMATED)
 
 
 def test_any_torque_is_proved_if_it_is_requested(hide: Hide) -> None:
@@ -91,8 +88,7 @@ def test_any_torque_is_proved_if_it_is_requested(hide: Hide) -> None:
 @pytest.mark.parametrize("times", [[k / 4000 for k in range(1, 40)], [30.0]])
 def test_a_proof_that_costs_too_much_is_not_made(times: Sequence[float]) -> None:
     pytest.importorskip("flint")
-    known = reference(DAMPED, times)
-    assert bound_of(DAMPED, known, any_torque=True).basis == ESTIMATED
+    assert bound_of(DAMPED, reference(DAMPED, times), any_torque=True).basis == ESTIMATED
     long = case_scene(5)
     assert bound_of(long, reference(long, [1.0]), effort=1e-3).basis == ESTIMATED
 
@@ -109,8 +105,7 @@ def _wrong_by(change: float) -> Callable[..., Reference]:
 
 def test_a_wrong_value_has_a_large_bound_and_a_warning() -> None:
     scene = case_scene(3)
-    known = _wrong(reference(scene, [0.5, 1.0]), 1e-9)
-    found = bound_of(scene, known)
+    found = bound_of(scene, _wrong(reference(scene, [0.5, 1.0]), 1e-9))
     assert found.basis == PROVED
     assert found.value == pytest.approx(1e-9, rel=1e-5)
     assert found.warning.startswith("the estimate of the reference (1.2e-15 rad/s) is below its ")
@@ -258,8 +253,7 @@ def test_verbs_warn_of_a_wrong_reference(
 
 def test_benchmark_states_the_relative_bound(monkeypatch: pytest.MonkeyPatch) -> None:
     load = bench.workloads(3, 1.0)[0]
-    found = bench.measure([load], [])
-    bound = found.bounds[load.label]
+    bound = bench.measure([load], []).bounds[load.label]
     assert bound.basis == PROVED
     assert bound.value < 1e-31
     assert bound.warning == ""

@@ -104,8 +104,7 @@ def test_work_limit_is_on_all_attempts() -> None:
 def test_waves_count_as_work() -> None:
     counts = []
     for n in (0, 6):
-        waves = [((0.1, 0.0, 0.0), 1.0 + k) for k in range(n)]
-        law = TorqueLaw((0.1, 0.0, 0.0), sines=waves)
+        law = TorqueLaw((0.1, 0.0, 0.0), sines=[((0.1, 0.0, 0.0), 1.0 + k) for k in range(n)])
         scene = Scene(omega=(1.0, 2.0, 3.0), moments=(3.0, 2.0, 1.5), torque=law)
         with pytest.raises(InputError, match=r"steps; .*effort") as caught:
             prove(scene, [1e3], 25, effort=0.01)

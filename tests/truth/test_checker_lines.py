@@ -97,8 +97,7 @@ def forged(
         stated = 2.0 * float(size / unit) + 1e-300
         away = Fraction(stated) * unit - size + miss * size
         texts = [decimal((x + away) / unit) for x in middle]
-        seconds = row(number, h / 2**clock)
-        rows.append({"time": seconds, "omega": texts, "radius": stated})
+        rows.append({"time": row(number, h / 2**clock), "omega": texts, "radius": stated})
         ends = end(expansion[0])
         omega = [x + moved for x in ends[:3]]
         radius += system.norm([0, 0, 0])

@@ -27,8 +27,7 @@ def _away(scene: Scene, time: float) -> float:
 def test_agrees_with_the_series(turn: int, time: float) -> None:
     """Take the signs of the start in turn: each order of axes sees four, each time all eight."""
     moments = list(itertools.permutations(_MOMENTS))[turn]
-    every = list(itertools.product((1.0, -1.0), repeat=3))
-    for signs in every[(turn + (time < 0.0)) % 4 :: 4]:
+    for signs in list(itertools.product((1.0, -1.0), repeat=3))[(turn + (time < 0.0)) % 4 :: 4]:
         first, second, third = (w * s for w, s in zip(_START, signs, strict=True))
         assert _away(Scene("", (first, second, third), moments=moments), time) < 1e-27
 
@@ -86,8 +85,7 @@ def test_coefficients_as_binary64_holds_them() -> None:
     """The two solutions differ by the effect of one rounding of A, B and C; they are not equal."""
     scene = Scene("", _START, moments=(3.0, 0.7, 2.9))
     exact, held = torque_free(scene, 50.0), torque_free(scene, 50.0, rounded=True)
-    away = max(float(abs(x - y)) for x, y in zip(exact, held, strict=True))
-    assert 1e-18 < away < 1e-13
+    assert 1e-18 < max(float(abs(x - y)) for x, y in zip(exact, held, strict=True)) < 1e-13
     powers = Scene("", _START, coefficients=scene.euler_coefficients)
     assert [*map(float, torque_free(powers, 50.0))] == [*map(float, held)]
 

@@ -148,10 +148,8 @@ def test_balls_contain_the_reference(name: str) -> None:
 ])  # fmt: skip
 def test_balls_contain_the_reference_of_a_state_torque(draw: Any, names: tuple[str, ...]) -> None:
     scene, end = draw(Random(f"enclosure {names[0]}"), names)
-    speed = max(map(abs, scene.omega))
-    times = [math.copysign(min(abs(end), 0.3 / speed), end)]
-    found = enclose(scene, times, 24)
-    assert outside(found.omega, scene, times) <= 0.0
+    times = [math.copysign(min(abs(end), 0.3 / max(map(abs, scene.omega))), end)]
+    assert outside(enclose(scene, times, 24).omega, scene, times) <= 0.0
 
 
 @pytest.mark.sampled
@@ -227,8 +225,7 @@ def test_requested_digits_are_reached(digits: int) -> None:
         found = enclose(scene, [0.2], digits)
         largest = max(Fraction(1), *map(abs, found.omega[0].middle))
         assert found.omega[0].radius <= largest / 10**digits
-        finer = enclose(scene, [0.2], digits + 5)
-        assert separation(found.omega[0], finer.omega[0]) <= 1
+        assert separation(found.omega[0], enclose(scene, [0.2], digits + 5).omega[0]) <= 1
 
 
 @pytest.mark.parametrize("digits", [1, 2, 5])
@@ -242,15 +239,13 @@ def test_first_balls_contain_omega(digits: int) -> None:
 
 def test_an_attempt_ends_when_the_radius_exceeds_omega() -> None:
     scene = Scene(coefficients=(-1.0, 2.8, 1.8), omega=(-2.0, -2.3, 1.9))
-    found = enclose_steps(scene, [7.0], 1, effort=0.12)
-    assert found.omega[0].radius < 0.1
+    assert enclose_steps(scene, [7.0], 1, effort=0.12).omega[0].radius < 0.1
 
 
 def test_an_omega_that_is_large_or_0_needs_one_attempt() -> None:
     fast = Scene("", (1e20, 2e20, 1e20), moments=(1.0, 2.0, 3.0))
     assert 1.0 < enclose_steps(fast, [1e-20], 8).omega[0].radius < 1e12
-    torque = TorqueLaw((-1.0, 0.0, 0.0))
-    braked = Scene("", (1.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=torque)
+    braked = Scene("", (1.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=TorqueLaw((-1.0, 0.0, 0.0)))
     first, second = enclose_steps(braked, [1.0, 2.0], 8).omega
     assert (first.middle[0], second.middle[0]) == (0, -1)
 
@@ -283,8 +278,7 @@ def test_progress_is_reported() -> None:
 
 
 def _proof(scene: Scene, digits: int = 20) -> Any:
-    equations = enclosure_steps.Equations(scene, False, False)
-    return enclosure_steps._Proof(equations, digits, True)
+    return enclosure_steps._Proof(enclosure_steps.Equations(scene, False, False), digits, True)
 
 
 def test_rest_of_a_series_is_bounded() -> None:
@@ -293,8 +287,7 @@ def test_rest_of_a_series_is_bounded() -> None:
     count, h = 10, Fraction(1, 4)
     proof = _proof(scene)
     rates = proof.equations.at(Fraction(0), True)
-    ball = enclosure_steps.ball
-    bounds = proof._rests(rates, [[ball(Fraction(0))]] * 3, h, count)
+    bounds = proof._rests(rates, [[enclosure_steps.ball(Fraction(0))]] * 3, h, count)
     true = float(sum(h**k * Fraction(1, 2 ** (k + 1)) for k in range(count, 60)))
     assert true < float(bounds[0]) < 1e6 * true
 

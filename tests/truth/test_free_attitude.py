@@ -59,6 +59,5 @@ def test_a_settled_motion_on_the_separatrix_is_a_steady_rotation(end: float) -> 
         turn = product(conjugate(early), late)
     with mpmath.workdps(DIGITS):
         angle = -mpmath.sqrt(1 + 8 * mpmath.mpf(1e-3) ** 2 / 5) * abs(end) / 4
-        wanted = [mpmath.cos(angle), 0, mpmath.sin(angle), 0]
-        pairs = zip(turn, wanted, strict=True)
+        pairs = zip(turn, [mpmath.cos(angle), 0, mpmath.sin(angle), 0], strict=True)
         assert max(abs(mpmath.mpf(str(x)) - y) for x, y in pairs) < mpmath.mpf("1e-30")

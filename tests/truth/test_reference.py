@@ -11,10 +11,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from pyharness import solve
-from pyharness.model.scene import Scene
-from pyharness.model.scene_file import case_scene
-from pyharness.model.torque_law import TorqueLaw
+from pyharness import Scene, TorqueLaw, case_scene, solve
 from pyharness.torques import recorded
 from pyharness.truth import reference as room
 from pyharness.truth.decimal_functions import sine_cosine
@@ -69,14 +66,12 @@ def test_series_agrees_with_the_known_solution(
 @pytest.mark.parametrize("third", [10.0, 10.1, -1e30, 1e-200])
 def test_a_symmetric_body_after_any_time(time: float, third: float) -> None:
     """The phase has as many digits before the point, and needs 40 after it."""
-    scene = Scene("", (0.3, 1.0, third), moments=(40.0, 40.0, 20.0))
-    found = reference(scene, [time])
+    found = reference(Scene("", (0.3, 1.0, third), moments=(40.0, 40.0, 20.0)), [time])
     with mpmath.workdps(700):
         phase = mpmath.mpf(third) / 2 * mpmath.mpf(time)
         sine, cosine = mpmath.sin(phase), mpmath.cos(phase)
         wanted = [mpmath.mpf(0.3) * cosine + sine, cosine - mpmath.mpf(0.3) * sine]
-        off = [abs(x - y) for x, y in zip(_whole(found, 0)[:2], wanted, strict=True)]
-        assert max(off) < 1e-31
+        assert max(abs(x - y) for x, y in zip(_whole(found, 0)[:2], wanted, strict=True)) < 1e-31
     assert np.abs(found.omega[0, :2] - [float(x) for x in wanted]).max() <= found.error
 
 
@@ -152,8 +147,7 @@ def test_sine_and_cosine_have_all_their_digits() -> None:
 @pytest.mark.parametrize("number", [1, 2])
 def test_series_for_the_velocity_is_estimated_where_omega_is_known(number: int) -> None:
     # With this mass no acceleration is a short decimal; in Case 1 nothing would be rounded.
-    scene = replace(case_scene(number), masses=(110.0,) * 3)
-    found = reference(scene, [1.0], velocity=True)
+    found = reference(replace(case_scene(number), masses=(110.0,) * 3), [1.0], velocity=True)
     assert found.source == "known solution"
     assert 0.0 < found.estimate < 1e-18
 

@@ -9,9 +9,8 @@ import mpmath
 import numpy as np
 import pytest
 
-from pyharness.model.scene import Scene
+from pyharness import Scene, TorqueLaw
 from pyharness.model.state_torque import StateTorque, recorded, replayed
-from pyharness.model.torque_law import TorqueLaw
 from pyharness.truth.reference import Reference, reference
 from pyharness.truth.tape_series import series_products
 from tests.refused import refused
@@ -138,8 +137,7 @@ def test_the_less_precise_series_states_its_error() -> None:
     with mpmath.workdps(40):
         for row in range(2):
             pairs = zip(_omega(quick, row), _omega(precise, row), strict=True)
-            error = max(abs(x - y) for x, y in pairs)
-            assert error <= 2.0 * quick.estimate
+            assert max(abs(x - y) for x, y in pairs) <= 2.0 * quick.estimate
     assert precise.estimate < 1e-22 < quick.estimate < 1e-16
 
 
@@ -215,8 +213,7 @@ def _one(component: Any) -> list[Any]:
     (lambda t, w, q: _one(np.sqrt((t - 1.5) * (t - 1.5))), 2),
 ])  # fmt: skip
 def test_the_rows_end_at_a_singularity(function: Callable[..., Any], rows: int) -> None:
-    scene = Scene("", _OMEGA, _MOMENTS, torque=replayed(function))
-    found = reference(scene, [0.5, 1.0, 3.0])
+    found = reference(Scene("", _OMEGA, _MOMENTS, torque=replayed(function)), [0.5, 1.0, 3.0])
     assert found.time.tolist() == [0.5, 1.0, 3.0][:rows]
     assert found.omega.shape == (rows, 3)
     assert np.isfinite(found.omega).all()

@@ -18,11 +18,9 @@ def test_a_table_has_heads_and_cells_as_people_read_them() -> None:
 
 def test_sections_keep_lines_and_fields_together() -> None:
     text: list[Section] = [
-        ["one <i>", Line("  a  b"), Line("c"), "two"],
-        [],
-        [Field("says  ", "x > y"), Field("rule  ", "z"), TABLE],
-        [Line("last")],
-    ]
+        ["one <i>", Line("  a  b"), Line("c"), "two"], [],
+        [Field("says  ", "x > y"), Field("rule  ", "z"), TABLE], [Line("last")],
+    ]  # fmt: skip
     report = Report("t", text, record=dict)
     assert render(report, "html").split("\n<div")[0] == (
         "<p>one &lt;i&gt;</p>\n<pre>  a  b\nc</pre>\n<p>two</p>\n"

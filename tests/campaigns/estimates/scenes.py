@@ -29,11 +29,8 @@ _WAYS = (
     "slow",
 )  # fmt: skip
 ATTITUDE, INERTIA, IN_SPACE, SEVERAL = (
-    "attitude",
-    "full inertia",
-    "torque in space",
-    "several times",
-)
+    "attitude", "full inertia", "torque in space", "several times",
+)  # fmt: skip
 KINDS = (
     "all", *LAWS, *SPEEDS, *BODIES, *dict.fromkeys(_WAYS[:4] + _WAYS[5:]),
     *(f"rough: {name}" for name in _ROUGH), ATTITUDE, INERTIA, IN_SPACE, SEVERAL,
@@ -148,8 +145,7 @@ def _by_kind(source: Random, law: str, way: str) -> tuple[Scene, float, tuple[st
         faint = start * 10.0 ** -source.uniform(1.0, 12.0)
         omega = np.array([faint * source.uniform(-1.0, 1.0) for _ in range(3)])
         omega[middle] += source.choice((-1.0, 1.0)) * start
-        pushed = _pushed(scene, 10.0 ** -source.uniform(0.0, 10.0))
-        scene = replace(pushed, omega=triple(omega))
+        scene = replace(_pushed(scene, 10.0 ** -source.uniform(0.0, 10.0)), omega=triple(omega))
     elif way == "strong torque" and law != "no torque":
         factor = 10.0 ** source.uniform(0.0, 2.0)
         scene, time = _pushed(scene, factor), time * factor ** -source.random()

@@ -66,8 +66,7 @@ def truth_of(scene: Scene, until: float | Sequence[float], attitude: bool = Fals
             break
         count = math.ceil(wanted)
     largest = float(np.abs(path.omega).max())
-    speed = np.linalg.norm(path.omega, axis=1)
-    turns = float(np.abs(np.trapezoid(speed, nodes))) / (2.0 * math.pi)
+    turns = float(np.abs(np.trapezoid(np.linalg.norm(path.omega, axis=1), nodes))) / (2.0 * math.pi)
     units = np.array([largest or 1.0] * 3 + [1.0] * 3)[: slopes.shape[1]]
     slopes = slopes * units / units[:, None]
     growth = 1.0

@@ -129,8 +129,7 @@ def reduction(known: dict[str, Any]) -> Reduction:
     quarters, first, second = known["QUARTERS"], known["HALF_PI"], known["HALF_PI_LOW"]
     scaled = LIMIT * quarters
     most = math.ceil(scaled) + 1  # turns
-    bits = first.numerator.bit_length()
-    if bits + most.bit_length() > DIGITS or first.denominator > 2**DIGITS:
+    if first.numerator.bit_length() + most.bit_length() > DIGITS or first.denominator > 2**DIGITS:
         raise ValueError("the product of turns and HALF_PI is not exact")
     if known["ROUNDS"] != 3 * Fraction(2) ** (DIGITS - 2) or scaled >= 2 ** (DIGITS - 3):
         raise ValueError("ROUNDS does not round to an integer")

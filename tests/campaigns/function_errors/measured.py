@@ -135,8 +135,7 @@ def operation_error(operation: Operation, count: int, seed: int = 1) -> float:
     given = [_drawn(kind, count, source) for kind in operation.operands]
     result, worst = function(*given), Fraction(0)
     for n in range(count):
-        each = [_exact(_at(x, n)) for x in (result, *given)]
-        error, size = operation.residual(*each)
+        error, size = operation.residual(*[_exact(_at(x, n)) for x in (result, *given)])
         if size:
             worst = max(worst, abs(error / size))
     return float(worst * 2**106)
@@ -174,8 +173,7 @@ def reduction_error(method: Method, angle: Fraction) -> Fraction:
             part = own["product_of"](mpmath.mpf(turns), _binary128(each))
             rest = own["sum_of_pairs"](rest, Pair(-part.high, -part.low))
     true = angle - turns * half_pi()[0]
-    found = sum(Fraction(*libmp.to_rational(x._mpf_)) for x in (rest.high, rest.low))
-    return abs(found / true - 1)
+    return abs(sum(Fraction(*libmp.to_rational(x._mpf_)) for x in (rest.high, rest.low)) / true - 1)
 
 
 def _binary128(x: Fraction) -> Any:

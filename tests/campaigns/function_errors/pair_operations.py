@@ -321,8 +321,7 @@ def worst(operation: Operation, function: Any, digits: int, binades: int) -> flo
     """
     found = 0.0
     for given in operands(operation.operands, digits, binades):
-        result = function(*given)
-        error, size = operation.residual(_plain(result), *map(_plain, given))
+        error, size = operation.residual(_plain(function(*given)), *map(_plain, given))
         some = size != 0
         assert not np.any(error[~some])
         found = max(found, float(np.max(np.abs(error[some] / size[some]), initial=0.0)))

@@ -9,21 +9,17 @@ import numpy as np
 import pytest
 
 from pyharness.model.codes import Waves
-from tests.campaigns.function_errors import lane_circular, measured, pair_circular, pair_operations
+from tests.campaigns.function_errors import (
+    lane_circular,
+    measured,
+    pair_circular,
+    pair_operations,
+    sources,
+)
 from tests.campaigns.function_errors.nearness import half_pi, hard_angle, least_distance
 from tests.campaigns.function_errors.pair_operations import OPERATIONS, Operation
-from tests.campaigns.function_errors.sources import (
-    JAVASCRIPT,
-    LANES,
-    ROOT,
-    TWO_WORDS,
-    WIDE,
-    WORD_PAIRS,
-    fortran_numbers,
-    rounded,
-)
 
-PAGE = (ROOT / "docs/contributing/function-errors.md").read_text()
+PAGE = (sources.ROOT / "docs/contributing/function-errors.md").read_text()
 U = Fraction(1, 2**53)
 SINE, COSINE = 1.24e-16, 1.9e-16  # as the page states them
 WIDE_BITS, JAVASCRIPT_BITS = 53, 19
@@ -34,8 +30,7 @@ def changed_digit(text: str, literal: str, place: int) -> str:
     """Return the text with one significant digit of a literal changed."""
     assert text.count(literal) == 1
     digits = [n for n, letter in enumerate(literal) if letter.isdigit()]
-    first = next(n for n in digits if literal[n] != "0")
-    where = digits[digits.index(first) + place]
+    where = digits[digits.index(next(n for n in digits if literal[n] != "0")) + place]
     other = str((int(literal[where]) + 3) % 10)
     return text.replace(literal, literal[:where] + other + literal[where + 1 :])
 
@@ -49,12 +44,12 @@ def lanes_keep_their_bounds(text: str) -> bool:
 
 
 def test_sine_and_cosine_of_many_angles_keep_their_bounds() -> None:
-    found = lane_circular.bound(LANES.read_text())
+    found = lane_circular.bound(sources.LANES.read_text())
     assert 0.9 * SINE < found.sine <= SINE
     assert 0.9 * COSINE < found.cosine <= COSINE
     assert found.worst <= 2e-16
     given = measured.angles(4000)
-    own = measured.circular_error(lane_circular.compute(LANES.read_text(), given), given)
+    own = measured.circular_error(lane_circular.compute(sources.LANES.read_text(), given), given)
     assert float(found.worst) / SLACK < max(own) <= float(found.worst)
     assert "1.24e-16" in PAGE
     assert "1.90e-16" in PAGE
@@ -62,15 +57,15 @@ def test_sine_and_cosine_of_many_angles_keep_their_bounds() -> None:
     assert f"{float(found.reduction.nearest):.1e}" in PAGE
 
 
-_LITERALS = re.findall(r"\d\.\d+(?:e-\d+)?(?=_dp)", LANES.read_text().split("contains")[0])
+_LITERALS = re.findall(r"\d\.\d+(?:e-\d+)?(?=_dp)", sources.LANES.read_text().split("contains")[0])
 
 
 @pytest.mark.sampled
 @pytest.mark.parametrize("literal", [each for each in _LITERALS if each not in {"1.5", "2.0"}])
 def test_a_changed_digit_of_a_constant_exceeds_the_bounds(literal: str) -> None:
     assert len(_LITERALS) == 17
-    assert lanes_keep_their_bounds(LANES.read_text())
-    assert not lanes_keep_their_bounds(changed_digit(LANES.read_text(), literal, 2))
+    assert lanes_keep_their_bounds(sources.LANES.read_text())
+    assert not lanes_keep_their_bounds(changed_digit(sources.LANES.read_text(), literal, 2))
 
 
 @pytest.mark.parametrize(("old", "new"), [
@@ -81,7 +76,7 @@ def test_a_changed_digit_of_a_constant_exceeds_the_bounds(literal: str) -> None:
     ("x = (angle(i) - turns*HALF_PI) - turns", "x = angle(i) - turns*HALF_PI - 2.0_dp*turns"),
 ])  # fmt: skip
 def test_other_statements_exceed_the_bounds(old: str, new: str) -> None:
-    text = LANES.read_text()
+    text = sources.LANES.read_text()
     assert text.count(old) == 1
     assert not lanes_keep_their_bounds(text.replace(old, new))
 
@@ -104,16 +99,14 @@ def test_distances_from_multiples_of_a_right_angle() -> None:
 
 
 def test_wide_sine_and_cosine_keep_their_bound() -> None:
-    text = WIDE.read_text()
+    text = sources.WIDE.read_text()
     method = pair_circular.of_fortran(text, Waves.ANGLE_BITS)
     found = pair_circular.bound(method)
     assert found.decided == WIDE_BITS
     assert f"next\n  !! {WIDE_BITS} bits decide the rounding" in text
     hard = [hard_angle(113, n) for n in (3, 30, 45, 59, 60)]
-    error = max(measured.reduction_error(method, angle) for angle in hard)
-    assert 0 < error <= found.reduced
-    near = pair_circular.bound(pair_circular.of_fortran(text, 33))
-    assert near.decided >= 80
+    assert 0 < max(measured.reduction_error(method, angle) for angle in hard) <= found.reduced
+    assert pair_circular.bound(pair_circular.of_fortran(text, 33)).decided >= 80
     for old, new in (
         ("1.57079632679489661923132", "1.57079632679489661923133"),
         ("4.3359050650618905123985", "4.3359050650618905123986"),
@@ -128,7 +121,7 @@ def test_wide_sine_and_cosine_keep_their_bound() -> None:
 
 
 def test_sine_and_cosine_of_javascript_keep_their_bound() -> None:
-    text = JAVASCRIPT.read_text()
+    text = sources.JAVASCRIPT.read_text()
     found = pair_circular.bound(pair_circular.of_javascript(text))
     assert found.decided == JAVASCRIPT_BITS
     assert float(found.ulps) < 0.5000013
@@ -156,7 +149,7 @@ def test_operations_keep_their_bounds_for_all_operands_of_few_bits(operation: Op
 
 
 @pytest.mark.parametrize(
-    "operation", [o for o in OPERATIONS if o.source == WORD_PAIRS], ids=lambda o: o.name
+    "operation", [o for o in OPERATIONS if o.source == sources.WORD_PAIRS], ids=lambda o: o.name
 )
 def test_operations_of_binary64_keep_their_bounds(operation: Operation) -> None:
     limit = float(operation.bound(U) / U**2)
@@ -172,17 +165,17 @@ def test_longer_product_keeps_its_bound() -> None:
 
 @pytest.mark.sampled
 @pytest.mark.parametrize(("path", "old", "new", "name"), [
-    (TWO_WORDS, "+ xl*yh) + xl*yl", "+ xl*yh)", "product_of"),
-    (TWO_WORDS, "y_low + x_low*factor", "y_low - x_low*factor", "multiple_of_pair"),
-    (TWO_WORDS, "(y - part)", "(part - y)", "sum_of_pairs"),
-    (WORD_PAIRS, "rest + (x%low + y%low)", "rest + x%low", "sum_of_pairs"),
-    (WORD_PAIRS, "- found%high*y%low)", "+ found%high*y%low)", "quotient_of_pairs"),
+    (sources.TWO_WORDS, "+ xl*yh) + xl*yl", "+ xl*yh)", "product_of"),
+    (sources.TWO_WORDS, "y_low + x_low*factor", "y_low - x_low*factor", "multiple_of_pair"),
+    (sources.TWO_WORDS, "(y - part)", "(part - y)", "sum_of_pairs"),
+    (sources.WORD_PAIRS, "rest + (x%low + y%low)", "rest + x%low", "sum_of_pairs"),
+    (sources.WORD_PAIRS, "- found%high*y%low)", "+ found%high*y%low)", "quotient_of_pairs"),
 ])  # fmt: skip
 def test_a_changed_operation_exceeds_its_bound(path: Path, old: str, new: str, name: str) -> None:
     text = path.read_text()
     assert old in text
-    function = pair_operations.routines(5, {path: text.replace(old, new)})[WORD_PAIRS][name]
-    operation = next(o for o in OPERATIONS if o.source == WORD_PAIRS and o.name == name)
+    function = pair_operations.routines(5, {path: text.replace(old, new)})[sources.WORD_PAIRS][name]
+    operation = next(o for o in OPERATIONS if o.source == sources.WORD_PAIRS and o.name == name)
     limit = float(operation.bound(Fraction(1, 2**5)) * 4**5)
     assert pair_operations.worst(operation, function, 5, 1) > limit
 
@@ -193,8 +186,8 @@ def test_sums_and_differences_of_two_numbers_are_exact() -> None:
         for given in pair_operations.operands("ns", digits, 1):
             x, y = given[0], given[1].high
             for found, true in (
-                (known[WORD_PAIRS]["difference_of"](x, y), x.values - y.values),
-                (known[WIDE]["sum_of"](x, y), x.values + y.values),
+                (known[sources.WORD_PAIRS]["difference_of"](x, y), x.values - y.values),
+                (known[sources.WIDE]["sum_of"](x, y), x.values + y.values),
             ):
                 np.testing.assert_array_equal(found.high.values + found.low.values, true)
 
@@ -202,22 +195,21 @@ def test_sums_and_differences_of_two_numbers_are_exact() -> None:
 def test_products_with_halves_to_nearest_are_exact() -> None:
     known = pair_operations.routines(5)
     for x, y in pair_operations.operands("nn", 5, 1):
-        product, rest = known[WORD_PAIRS]["exact_product"](x, y)
+        product, rest = known[sources.WORD_PAIRS]["exact_product"](x, y)
         np.testing.assert_array_equal(product.values + rest.values, x.values * y.values)
-        found = known[WIDE]["product_of"](x, y)
+        found = known[sources.WIDE]["product_of"](x, y)
         np.testing.assert_array_equal(found.high.values + found.low.values, x.values * y.values)
 
 
 def test_the_splitters_are_those_of_the_translation() -> None:
-    assert fortran_numbers(WORD_PAIRS.read_text(), "SPLITTER", 53) == [2**27 + 1]
-    assert "SPLITTER = 2.0_wp**57 + 1.0_wp" in WIDE.read_text()
-    assert "UPPER_BITS = -134217728_i8" in TWO_WORDS.read_text()
+    assert sources.fortran_numbers(sources.WORD_PAIRS.read_text(), "SPLITTER", 53) == [2**27 + 1]
+    assert "SPLITTER = 2.0_wp**57 + 1.0_wp" in sources.WIDE.read_text()
+    assert "UPPER_BITS = -134217728_i8" in sources.TWO_WORDS.read_text()
 
 
 def test_numbers_are_rounded_to_nearest_and_to_even() -> None:
     for numerator in range(1, 2000):
-        x = Fraction(numerator, 7)
-        assert rounded(x, 53) == Fraction(numerator / 7)
-    assert rounded(Fraction(17), 4) == 16
-    assert rounded(Fraction(19), 4) == 20
-    assert rounded(Fraction(-31), 4) == -32
+        assert sources.rounded(Fraction(numerator, 7), 53) == Fraction(numerator / 7)
+    assert sources.rounded(Fraction(17), 4) == 16
+    assert sources.rounded(Fraction(19), 4) == 20
+    assert sources.rounded(Fraction(-31), 4) == -32

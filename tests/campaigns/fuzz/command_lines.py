@@ -84,11 +84,9 @@ def furnish(folder: Path, content: bytes) -> None:
 def _usual(random: Random, verb: str) -> list[str]:
     """Return the options that a verb needs to do anything."""
     usual = {
-        "run": ["--scene", "--program"],
-        "plan": ["--scene"],
-        "rotations": ["--scene"],
+        "run": ["--scene", "--program"], "plan": ["--scene"], "rotations": ["--scene"],
         "compare": ["--case"],
-    }
+    }  # fmt: skip
     options = usual.get(verb, [])
     if random.random() < 0.4:
         options = [each.replace("--scene", "--case") for each in options]
@@ -98,8 +96,7 @@ def _usual(random: Random, verb: str) -> list[str]:
 
 
 def _given(random: Random, parser: Parser, option: str) -> list[str]:
-    action = parser._option_string_actions[option]
-    if action.nargs == 0:
+    if parser._option_string_actions[option].nargs == 0:
         return [option]
     value = _plausible(random, option)
     kind = random.random()

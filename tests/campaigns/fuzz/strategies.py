@@ -223,12 +223,9 @@ def listing_input(random: Random) -> ListingInput:
 
     kind = random.choice(("defect", "defect", "defect", "any"))
     return ListingInput(
-        one(PROGRAMS, 0.05),
-        random.choice((None, None, "original", "corrected", "", "corrected")),
-        several(kind),
-        several(kind),
-        several("reading" if kind == "defect" else kind),
-    )
+        one(PROGRAMS, 0.05), random.choice((None, None, "original", "corrected", "", "corrected")),
+        several(kind), several(kind), several("reading" if kind == "defect" else kind),
+    )  # fmt: skip
 
 
 def mutated_word(random: Random, word: str) -> str:
@@ -262,11 +259,8 @@ def scene_text(random: Random) -> str:
         law = found.law
         frame = ['frame = "space"'] * (random.random() < 0.1)
         lines += [
-            "[torque]",
-            *frame,
-            f"constant = {_list(law.constant)}",
-            f"rate = {_list(law.rate)}",
-        ]
+            "[torque]", *frame, f"constant = {_list(law.constant)}", f"rate = {_list(law.rate)}",
+        ]  # fmt: skip
         for kind, waves in (("sines", law.sines), ("cosines", law.cosines)):
             entries = [f"{{ amplitude = {_list(a)}, frequency = {f!r} }}" for a, f in waves]
             lines.append(f"{kind} = [{', '.join(entries)}]")

@@ -11,8 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from pyharness import Scene
-from pyharness.model.trajectory import Trajectory
+from pyharness import Scene, Trajectory
 from tests.campaigns.fuzz import campaign as fuzz
 from tests.campaigns.fuzz.checks import KINDS, tried
 

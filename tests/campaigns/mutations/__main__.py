@@ -102,8 +102,7 @@ def _all(options: argparse.Namespace, processes: Processes, verdicts: list[Verdi
             else:
                 found = record.of(mutation) or attempt(mutation, tree, unchanged, checks)
             if not found.seconds:
-                seconds = round(time.perf_counter() - begin, 1)
-                found = replace(found, seconds=seconds)
+                found = replace(found, seconds=round(time.perf_counter() - begin, 1))
             with lock:
                 running.discard(mutation.file + mutation.id)
                 verdicts.append(found)

@@ -178,8 +178,7 @@ def functions_in(file: str) -> set[str]:
 
 
 def _other_function(text: str, line: int, language: str) -> str | None:
-    plain = text_source.blanked(text, language).split("\n")
-    for before in reversed(plain[:line]):
+    for before in reversed(text_source.blanked(text, language).split("\n")[:line]):
         if found := _BEGIN[language].match(before):
             return str(found[1]).lower()
     return None

@@ -31,39 +31,36 @@ def _of_text(text: str, language: str) -> dict[str, list[str]]:
     return found
 
 
-@pytest.mark.parametrize(
-    ("language", "line", "operator", "wanted"),
-    [
-        (FORTRAN, "x = a - b", "sign", ["x = a + b"]),
-        (FORTRAN, "x = -a", "sign", ["x = a"]),
-        (FORTRAN, "x = a - b", "order of operands", ["x = b - a"]),
-        (FORTRAN, "x = s%a(i, 1)/b(2)", "order of operands", ["x = b(2)/s%a(i, 1)"]),
-        (FORTRAN, "x = a*b**c", "product", ["x = a/b**c"]),
-        (FORTRAN, "if (a < b) x = c", "bound", ["if (a <= b) x = c"]),
-        (FORTRAN, "if (a >= b) x = c", "bound", ["if (a > b) x = c"]),
-        (FORTRAN, "if (a /= b) x = c", "equality", ["if (a == b) x = c"]),
-        (FORTRAN, "if (a < b) x = c", "condition", ["if (.not. (a < b)) x = c"]),
-        (FORTRAN, "if (a < b) x = c", "dropped statement", ["continue"]),
-        (FORTRAN, "y = a .and. .not. b", "logical", ["y = a .or. .not. b", "y = a .and. b"]),
-        (FORTRAN, "x = 1e-3_dp*y", "constant", ["x = 0.01_dp*y"]),
-        (FORTRAN, "real(dp), parameter :: P = 2.0_dp", "constant", [
-            "real(dp), parameter :: P = 2.02_dp"
-        ]),
-        (FORTRAN, "x = y(3)", "constant", ["x = y(4)"]),
-        (FORTRAN, "x = max(y, z)", "min/max", ["x = min(y, z)"]),
-        (FORTRAN, "call f(a, b(1, 2), c)", "swapped arguments", [
-            "call f(b(1, 2), a, c)", "call f(a, c, b(1, 2))", "call f(a, b(2, 1), c)"
-        ]),
-        (FORTRAN, "do i = 1, n", "index", ["do i = 1, n - 1"]),
-        (FORTRAN, "x = y + &\n  z", "dropped statement", ["continue\n"]),
-        (C, "  if (!a && b != c) d = e - 1;", "logical", [
-            "  if (!a || b != c) d = e - 1;", "  if (a && b != c) d = e - 1;"
-        ]),
-        (C, "  f(a, b);", "dropped statement", ["  ;"]),
-        (JAVASCRIPT, "  if (a === b) return;", "equality", ["  if (a !== b) return;"]),
-        (JAVASCRIPT, "  x[i] = Math.floor(y);", "min/max", ["  x[i] = Math.ceil(y);"]),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("language", "line", "operator", "wanted"), [
+    (FORTRAN, "x = a - b", "sign", ["x = a + b"]),
+    (FORTRAN, "x = -a", "sign", ["x = a"]),
+    (FORTRAN, "x = a - b", "order of operands", ["x = b - a"]),
+    (FORTRAN, "x = s%a(i, 1)/b(2)", "order of operands", ["x = b(2)/s%a(i, 1)"]),
+    (FORTRAN, "x = a*b**c", "product", ["x = a/b**c"]),
+    (FORTRAN, "if (a < b) x = c", "bound", ["if (a <= b) x = c"]),
+    (FORTRAN, "if (a >= b) x = c", "bound", ["if (a > b) x = c"]),
+    (FORTRAN, "if (a /= b) x = c", "equality", ["if (a == b) x = c"]),
+    (FORTRAN, "if (a < b) x = c", "condition", ["if (.not. (a < b)) x = c"]),
+    (FORTRAN, "if (a < b) x = c", "dropped statement", ["continue"]),
+    (FORTRAN, "y = a .and. .not. b", "logical", ["y = a .or. .not. b", "y = a .and. b"]),
+    (FORTRAN, "x = 1e-3_dp*y", "constant", ["x = 0.01_dp*y"]),
+    (FORTRAN, "real(dp), parameter :: P = 2.0_dp", "constant", [
+        "real(dp), parameter :: P = 2.02_dp"
+    ]),
+    (FORTRAN, "x = y(3)", "constant", ["x = y(4)"]),
+    (FORTRAN, "x = max(y, z)", "min/max", ["x = min(y, z)"]),
+    (FORTRAN, "call f(a, b(1, 2), c)", "swapped arguments", [
+        "call f(b(1, 2), a, c)", "call f(a, c, b(1, 2))", "call f(a, b(2, 1), c)"
+    ]),
+    (FORTRAN, "do i = 1, n", "index", ["do i = 1, n - 1"]),
+    (FORTRAN, "x = y + &\n  z", "dropped statement", ["continue\n"]),
+    (C, "  if (!a && b != c) d = e - 1;", "logical", [
+        "  if (!a || b != c) d = e - 1;", "  if (a && b != c) d = e - 1;"
+    ]),
+    (C, "  f(a, b);", "dropped statement", ["  ;"]),
+    (JAVASCRIPT, "  if (a === b) return;", "equality", ["  if (a !== b) return;"]),
+    (JAVASCRIPT, "  x[i] = Math.floor(y);", "min/max", ["  x[i] = Math.ceil(y);"]),
+])  # fmt: skip
 def test_operators_on_text(language: str, line: str, operator: str, wanted: list[str]) -> None:
     assert sorted(_of_text(line, language)[operator]) == sorted(wanted)
 

@@ -145,8 +145,7 @@ def _of_line(line: str, language: str) -> Iterator[Piece]:
     for each in _DIFFERENCE.finditer(line):
         yield "order of operands", each.start(1), each.end(3), each[3] + each[2] + each[1]
     for begin, end in _calls(line):
-        inside = _split(line, begin, end)
-        for (a, b), (c, d) in pairwise(inside):
+        for (a, b), (c, d) in pairwise(_split(line, begin, end)):
             if "=" not in line[a:b] + line[c:d] and line[a:b] != line[c:d]:
                 yield "swapped arguments", a, d, line[c:d] + line[b:c] + line[a:b]
     if (found := _IF.match(line)) and (last := _closing(line, found.end())):

@@ -103,8 +103,7 @@ class Server:
         assert self._process.stdin is not None
         with self._one_at_a_time:
             self._processes.check()
-            request = json.dumps([arguments, str(self._place)])
-            print(request, file=self._process.stdin, flush=True)
+            print(json.dumps([arguments, str(self._place)]), file=self._process.stdin, flush=True)
             copy = self._answer()
             self._processes.enter(copy)
             timer = Timer(limit, kill, [copy])

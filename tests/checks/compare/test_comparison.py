@@ -11,19 +11,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import case_scene
+from pyharness import Comparison, Listing, case_scene
 from pyharness.checks.compare import candidates
 from pyharness.checks.compare import comparison as room
 from pyharness.checks.compare import report as report_module
 from pyharness.checks.compare.agreement import accuracy, differences, distance, ulps
 from pyharness.checks.compare.comparison import compare_programs, listings_for
-from pyharness.checks.compare.findings import Comparison
 from pyharness.checks.compare.picture import comparison_picture
 from pyharness.checks.compare.report import comparison_report, verdict
 from pyharness.engine.plan.registry import SCIPY_METHODS
 from pyharness.engine.plan.report import trajectory_report
 from pyharness.model.attitude import product
-from pyharness.model.listing import Listing
 from pyharness.model.trajectory import Trajectory, turned_to_space
 from pyharness.thesis.programs import PROGRAM_REGISTRY, Program
 from pyharness.truth.reference import reference
@@ -53,8 +51,7 @@ def test_all_is_as_expected_in_every_case() -> None:
             files = saved(comparison_picture(found), "x.png")
             assert len(files) == 2
             assert files["x.png"].startswith(b"\x89PNG")
-        torque_free = found.scene.torque.is_zero
-        assert (found.programs[0].accuracy.momentum is not None) == torque_free
+        assert (found.programs[0].accuracy.momentum is not None) == found.scene.torque.is_zero
 
 
 def test_methods_run_only_where_they_are_shown(
@@ -213,12 +210,10 @@ def test_compare_shows_attitudes_where_they_are_asked_for() -> None:
         assert method.accuracy is not None
         assert 0.0 < method.accuracy.angle < found.tolerance  # type: ignore[operator]
         assert 0.0 < method.accuracy.momentum_in_space < found.tolerance  # type: ignore[operator]
-    text = _text(found)
-    assert max(map(len, text.splitlines())) <= 100
+    assert max(map(len, _text(found).splitlines())) <= 100
     record = json.loads(render(comparison_report(found), "json"))
     rows = list(csv.DictReader(io.StringIO(render(comparison_report(found), "csv"))))
-    told = [*record["programs"], *record["methods"]]
-    for each, row in zip(told, rows, strict=True):
+    for each, row in zip([*record["programs"], *record["methods"]], rows, strict=True):
         assert float(row["angle_error"]) == each["angle_error"]
         assert float(row["momentum_in_space"]) == each["momentum_in_space"]
     assert record["reference"]["angle_error"] < 1e-15
@@ -319,8 +314,7 @@ def test_bits_of_all_that_a_program_returns_are_held() -> None:
     ):
         assert differences(run, changed) == [name]
         assert distance(run, changed) == ulp
-    shorter = _trajectory(np.ones((3, 3)))
-    assert distance(shorter, _trajectory(np.ones((2, 3)))) == math.inf
+    assert distance(_trajectory(np.ones((3, 3))), _trajectory(np.ones((2, 3)))) == math.inf
     printed: Any = PROGRAM_REGISTRY["two-term"].run(case_scene(2), Listing.corrected("two-term"))
     assert differences(printed, replace(printed, ier=printed.ier + 129)) == ["IER"]
 
@@ -328,6 +322,5 @@ def test_bits_of_all_that_a_program_returns_are_held() -> None:
 def test_record_of_a_run_has_the_time_that_the_program_recorded() -> None:
     listing = Listing.original("two-term")
     run = PROGRAM_REGISTRY["two-term"].run(case_scene(5), listing)
-    report = trajectory_report(case_scene(5), "two-term", listing, "", run)
-    found = report.record()["trajectory"]
+    found = trajectory_report(case_scene(5), "two-term", listing, "", run).record()["trajectory"]
     assert found["recorded_time"] == run.recorded_time.tolist() != run.time.tolist()

@@ -12,9 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pyharness import Scene, case_scene, compare_methods, read_scene, solve, torques
+from pyharness import Comparison, Scene, case_scene, compare_methods, read_scene, solve, torques
 from pyharness.checks.compare.agreement import accuracy
-from pyharness.checks.compare.findings import Comparison
 from pyharness.checks.compare.picture import comparison_picture
 from pyharness.checks.compare.report import comparison_report, verdict
 from pyharness.cli.main import main
@@ -119,8 +118,7 @@ def test_verb_compares_methods(result_of: ResultOf, tmp_path: Path) -> None:
     assert "as expected: no error exceeds the limit" in result_of(shlex.split(command)).out
     out = tmp_path / "x.json"
     assert main(shlex.split(f"{command} --format json --out {out}")) == 0
-    methods = json.loads(out.read_text())["methods"]
-    assert [each["method"] for each in methods] == ["auto", "dop853"]
+    assert [each["method"] for each in json.loads(out.read_text())["methods"]] == ["auto", "dop853"]
 
 
 def test_fixed_step_has_no_tolerance() -> None:

@@ -8,17 +8,13 @@ from typing import Any, Never
 import numpy as np
 import pytest
 
+from pyharness import InputError, Scene, TorqueLaw, case_scene, compare_programs
 from pyharness.checks.compare import orders
-from pyharness.checks.compare.comparison import compare_programs
 from pyharness.checks.compare.orders import Order, measured_order, order_of
 from pyharness.checks.compare.report import comparison_report
 from pyharness.checks.theory.conditioning import ROUNDING
 from pyharness.engine.problem.rescaled import scaled
-from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing
-from pyharness.model.scene import Scene
-from pyharness.model.scene_file import case_scene
-from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.thesis.programs import PROGRAM_REGISTRY, Program
 from pyharness.truth.reference import Reference, reference

@@ -9,17 +9,9 @@ Motion = tuple[list[float], list[float], list[float], float]
 """Moments (kg m2), omega (rad/s), attitude (not normalised) and a time (s)."""
 
 KINDS = (
-    "generic",
-    "near symmetry",
-    "near separatrix",
-    "middle axis",
-    "any axis",
-    "flat",
-    "needle",
-    "symmetric",
-    "steady",
-    "sphere",
-)
+    "generic", "near symmetry", "near separatrix", "middle axis", "any axis", "flat", "needle",
+    "symmetric", "steady", "sphere",
+)  # fmt: skip
 
 
 def draw(source: Random, kind: str, longest: float = 6.0) -> Motion:

@@ -6,11 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import Scene, solve, torques
+from pyharness import Scene, StateTorque, solve, torques
 from pyharness.checks.scenes.state_scenes import READY, STEADY, TURNING, draw, ready
 from pyharness.engine.problem.rotated import axes_of, later, restarted_at, rotated
 from pyharness.model.scene import Triple
-from pyharness.model.state_torque import StateTorque
 
 MOMENTS = [4.0, 3.0, 2.0]
 

@@ -182,16 +182,10 @@ def _spin(generator: Generator, kind: str) -> tuple[Scene, float]:
 
 
 NASTY: dict[str, Callable[[Generator], tuple[Scene, float]]] = {
-    "nearly symmetric": _nearly_symmetric,
-    "near the separatrix": _near_the_separatrix,
-    "violent torque": _violent,
-    "resonant": _resonant,
-    "fast waves": _fast,
-    "no body": _no_body,
-    "other units": _other_units,
-    "long": _long,
-    "from rest": _from_rest,
-}
+    "nearly symmetric": _nearly_symmetric, "near the separatrix": _near_the_separatrix,
+    "violent torque": _violent, "resonant": _resonant, "fast waves": _fast, "no body": _no_body,
+    "other units": _other_units, "long": _long, "from rest": _from_rest,
+}  # fmt: skip
 """The functions that return random scenes which are difficult for numerical methods, by kind."""
 
 SPINS = ("steady", "constant", "ramp", "wave", "ramp from rest", "slow")

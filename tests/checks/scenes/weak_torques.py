@@ -36,11 +36,9 @@ def draw_weak(seed: str, number: int, rotations: float) -> tuple[Scene, float]:
     )
     first, second, third = omega
     scene = Scene(
-        f"{motion}, {kind}",
-        omega=(first, second, third),
-        moments=(moments[0], moments[1], moments[2]),
-        torque=law,
-    )
+        f"{motion}, {kind}", omega=(first, second, third),
+        moments=(moments[0], moments[1], moments[2]), torque=law,
+    )  # fmt: skip
     return scene, time
 
 

@@ -11,11 +11,9 @@ from functools import cache
 import numpy as np
 import pytest
 
+from pyharness import Scene, TorqueLaw, case_scene
 from pyharness.checks.theory.conditioning import ROUNDING, Conditioning, conditioning
 from pyharness.engine.methods import linearised
-from pyharness.model.scene import Scene
-from pyharness.model.scene_file import case_scene
-from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
 from pyharness.truth.reference import reference
 
@@ -81,8 +79,7 @@ def test_rounding_and_storing_are_sums_over_neighbouring_solutions(name: str) ->
 def test_torque_that_varies_counts_with_its_angle() -> None:
     """The rounding of frequency times t is proportional to this angle."""
     law = TorqueLaw(sines=(((1.0, 0.0, 0.0), 1000.0),))
-    scene = Scene("", (1.0, 1.0, 1.0), moments=(2.0, 2.0, 2.0), torque=law)
-    found = conditioning(scene, 4.0)
+    found = conditioning(Scene("", (1.0, 1.0, 1.0), moments=(2.0, 2.0, 2.0), torque=law), 4.0)
     # On a sphere errors just add up: 1000 t over the moment, integrated.
     wanted = 8.0 * ROUNDING * (0.5 * 1000.0 * 4.0**2 / 2.0 + 0.5 * 4.0 + 2.0)
     assert found.rounding == pytest.approx(wanted, rel=0.01, abs=0.0)

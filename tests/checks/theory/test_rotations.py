@@ -282,8 +282,7 @@ def test_phase_about_a_stable_axis_is_a_tenth_off_when_it_says(axis: int, toward
     )
     turned = (abs(phase) - rate * each.linear_until) % (2.0 * np.pi)
     back = (-abs(phase) - rate * each.linear_until) % (2.0 * np.pi)
-    apart = min(min(x, 2.0 * np.pi - x) for x in (turned, back))
-    assert apart == pytest.approx(0.1, abs=0.01)
+    assert min(min(x, 2.0 * np.pi - x) for x in (turned, back)) == pytest.approx(0.1, abs=0.01)
 
 
 @pytest.mark.parametrize("moments", [BODY, (2.0, 3.5, 4.1), (3.0, 2.0, 2.7)])
@@ -316,8 +315,7 @@ def test_flips_come_when_they_are_said_to(moments: Triple, tilt: float) -> None:
 
 
 def test_bodies_without_a_middle_axis_never_flip() -> None:
-    scene = Scene("", (0.0, 1.0, 1.0), coefficients=(0.5, 0.25, 0.3))
-    for each in _rotations(scene):
+    for each in _rotations(Scene("", (0.0, 1.0, 1.0), coefficients=(0.5, 0.25, 0.3))):
         assert not each.stable
         assert each.flip_interval is None
 
@@ -341,13 +339,11 @@ def test_growth_of_bodies_is_that_of_their_middle_axes() -> None:
     draws = np.random.default_rng(4)
     for _ in range(50):
         x, y = draws.uniform(1.0, 2.0, 2).tolist()
-        z = draws.uniform(abs(x - y), x + y)
-        scene = _scene((0.0, 0.0, 0.0), (x, y, z), (0.0, 0.0, 1.0))
+        scene = _scene((0.0, 0.0, 0.0), (x, y, draws.uniform(abs(x - y), x + y)), (0.0, 0.0, 1.0))
         a, _, c = scene.euler_coefficients
         wanted = max(each.rates[0].real for each in _rotations(scene))
         assert float(growth_of_bodies(np.array(a), np.array(-c))) == pytest.approx(wanted)
-    corners = growth_of_bodies(np.array([1.0, -1.0]), np.array([1.0, -1.0]))
-    assert np.isfinite(corners).all()
+    assert np.isfinite(growth_of_bodies(np.array([1.0, -1.0]), np.array([1.0, -1.0]))).all()
 
 
 def test_json_and_csv_tell_what_was_found(printed: Printed) -> None:

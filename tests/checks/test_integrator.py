@@ -29,12 +29,12 @@ from tests.checks.integrators import (
     FOLDER,
     RK4,
     ROOT,
-    Capture,
     command_of,
     edited,
     json_of,
     written,
 )  # fmt: skip
+from tests.conftest import Capture
 from tests.ports import documented_command
 from tests.tables import tables
 

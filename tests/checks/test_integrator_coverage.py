@@ -16,7 +16,8 @@ from pyharness.checks.integrators.problem import problems
 from pyharness.cli.main import main
 from tests.campaigns import integrator_campaign as campaign
 from tests.campaigns.integrator_campaign import Drawn, right
-from tests.checks.integrators import RK4, Capture, command_of, edited, json_of
+from tests.checks.integrators import RK4, command_of, edited, json_of
+from tests.conftest import Capture
 
 # Writes each request and the states that it answers, also that at time 0, to a file.
 LOGGING = """

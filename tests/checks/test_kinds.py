@@ -31,8 +31,8 @@ from pyharness.checks.plants.plants import PLANTS
 from pyharness.checks.random_methods import may_refuse, truth_of
 from pyharness.checks.scenes.random_scenes import draw, weekly_seed
 from pyharness.cli.main import main
-from pyharness.engine.system import kernel_input as problem
 from pyharness.engine.plan.registry import METHODS
+from pyharness.engine.system import kernel_input as problem
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.thesis import compiled

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from pyharness import ChangingMoments, InputError, Scene, TorqueLaw, Trajectory, solve, torques
-from pyharness.engine.steps import dense
 from pyharness.engine.methods import taylor
 from pyharness.engine.plan.registry import FIXED_STEP
+from pyharness.engine.steps import dense
 from pyharness.events import crosses
 from pyharness.model.dense_output import DenseOutput, Pieces
 from tests.campaigns import dense_campaign

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, case_scene, solve
-from pyharness.engine.system.kernel_input import normalized
 from pyharness.engine.plan.registry import GAUSS, METHODS
+from pyharness.engine.system.kernel_input import normalized
 from pyharness.model.extension import extension
 from pyharness.model.trajectory import Array
 from pyharness.truth.reference import reference

@@ -21,7 +21,7 @@ from pyharness import InputError, Scene, Solver, TorqueLaw, case_scene, prepare,
 from pyharness.bench.growth import growth
 from pyharness.bench.savings import measured_saving
 from pyharness.engine.plan.plan import RK4_OR_TAYLOR, plan
-from pyharness.engine.problem import closed_form
+from pyharness.engine.system.kernel_input import closed_form
 from pyharness.model.trajectory import Array
 from pyharness.torques import damping
 from pyharness.truth.reference import reference

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, StateTorque, opaque, solve
-from pyharness.engine.plan.registry import SCIPY_METHODS
 from pyharness.engine.methods.scipy_run import series_beside
+from pyharness.engine.plan.registry import SCIPY_METHODS
 from pyharness.engine.problem.sides import joined
 from pyharness.torques import table
 

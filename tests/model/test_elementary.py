@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, opaque, solve, solve_many
+from pyharness.engine.steps.taylor_ivp import recorded_equation
 from pyharness.engine.system import leaf_cache
 from pyharness.engine.system.leaf_text import structure
 from pyharness.engine.system.recorded import kernel_tape, listing, outputs_at, taylor_step
-from pyharness.engine.steps.taylor_ivp import recorded_equation
 from pyharness.model.codes import Operations
 from pyharness.model.dual import with_derivatives
 from pyharness.model.elementary import WITH_DERIVATIVE

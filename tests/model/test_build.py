@@ -178,7 +178,7 @@ def test_flags_that_keep_the_arithmetic_are_accepted(language: str, flags: str) 
 def test_an_editable_installation_is_one_that_loads_from_the_build(
     installer: str | None, files: list[str], expected: str, tmp_path: Path, monkeypatch: Patch
 ) -> None:
-    """Whatever installed it, and whether from the checkout or from what was built there."""
+    """The installer may be any, and the files those of the checkout or of what was built there."""
     facts = tmp_path / "x.dist-info"
     facts.mkdir()
     for each in files:

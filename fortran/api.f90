@@ -147,7 +147,7 @@ subroutine torque_free_growth(coefficients, omega0, t_end, growth, enough)
   real(8), intent(in) :: enough           ! if positive, only whether growth is larger matters
   !f2py real(8), optional, intent(in) :: enough = 0.0
 
-  if (enough > 0.0_8) then
+  if (enough > 0) then
     growth = torque_free_growth_of(coefficients, omega0, t_end, enough)
   else
     growth = torque_free_growth_of(coefficients, omega0, t_end)

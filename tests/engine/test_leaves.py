@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from ctypes import CDLL, c_double, c_void_p
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -21,9 +22,10 @@ from pyharness.checks.scenes.state_scenes import READY, draw, draw_ready
 from pyharness.engine.system import leaf_cache
 from pyharness.engine.system.lane_leaves import whole_source
 from pyharness.engine.system.leaf_text import rule_of, structure
+from pyharness.engine.system.leaves import HEADER
 from pyharness.engine.system.recorded import kernel_tape, listing, system_of, taylor_step
 from pyharness.engine.torques.term_file import KINDS
-from pyharness.model.arithmetic import REFUSED
+from pyharness.model.arithmetic import PROBE, REFUSED
 from pyharness.model.codes import Statuses
 from pyharness.model.constant_body import with_constant_body
 from pyharness.model.extension import extension
@@ -109,6 +111,31 @@ def test_terms_are_those_of_the_interpreter(number: int) -> None:
     # Rounding errors of earlier terms are larger, relative to a late term.
     assert (difference <= 200.0 * np.spacing(sizes.max(axis=1, keepdims=True))).all()
     assert (compiled != 0.0).sum() > 10
+
+
+ROW = """
+void set(double *to, int nodes, double h, const abreast *v)
+{
+  put(to, nodes, h, v[0], v[1], v[2], v[3]);
+}
+int apart(void) { return SIZE; }
+"""
+
+
+@pytest.mark.external
+@pytest.mark.parametrize("nodes", [2, 4])
+@pytest.mark.parametrize("h", [0.5, -0.1, np.inf])
+def test_a_row_of_the_jacobian_is_stored_at_each_node(nodes: int, h: float, folder: Path) -> None:
+    library = CDLL(str(leaf_cache.compiled_file(folder, HEADER + ROW + PROBE)))
+    memory = np.full(library.apart() * 4 + 24, 7.0)
+    memory = memory[-memory.ctypes.data // 8 % 4 :]  # begins with a register
+    columns, to = memory[:16].reshape(4, 4), memory[16:]
+    columns[:] = np.random.default_rng(nodes).normal(size=(4, 4))
+    library.set(to.ctypes.data_as(c_void_p), nodes, c_double(h), columns.ctypes.data_as(c_void_p))
+    for node in range(4):
+        stored = to[node * library.apart() :][:4].tolist()
+        assert stored == ((h * columns[:, node]).tolist() if node < nodes else [7.0] * 4)
+    assert (to != 7.0).sum() == 4 * nodes
 
 
 def test_every_operation_is_compared() -> None:

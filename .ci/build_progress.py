@@ -15,7 +15,7 @@ from pathlib import Path
 # that is found counts, and of the seconds only the ratios.
 COSTS = {
     "ready_leaves": 10.0, "taylor_terms_": 8.0, "tape_lanes": 2.5, "tape_perturbations": 2.5,
-    "tape_variations": 1.5, "tape_terms": 1.0, "_kernelsmodule": 2.5, "tapes_": 18.0,
+    "tape_variations": 1.5, "tape_terms": 1.0, "_kernelsmodule": 3.5, "tapes_": 18.0,
     "bodies_": 16.0, "hot_": 7.0, "many_": 1.5,
 }  # fmt: skip
 OTHERS = 0.4

@@ -183,7 +183,8 @@ def solve_many(
             raise InputError(f"parameters: {found}; allowed: a dict of names and arrays")
         check_values(scene, parameters)
         # A torque that depends on time alone is a law without parameter names.
-        scene = replace(scene, torque=getattr(scene.torque, "named", None) or scene.torque)
+        if (named := getattr(scene.torque, "named", None)) is not None:
+            scene = replace(scene, torque=named)
         arrays |= {f"{PARAMETER}{name}": value for name, value in parameters.items()}
     settings: Any = {"method": method, "tolerance": tolerance, "effort": effort}
     compiled = boolean("compiled", compiled)

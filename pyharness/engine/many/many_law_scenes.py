@@ -22,10 +22,10 @@ from pyharness.engine.prepared.many_scenes import (
 )
 from pyharness.engine.prepared.solver import CODES
 from pyharness.model.arrays import rows_of
-from pyharness.model.attitude import rotated, turned_back
 from pyharness.model.codes import Methods
 from pyharness.model.ensemble import Ensemble
 from pyharness.model.errors import InputError
+from pyharness.model.extension import extension
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import ROUNDING, Array
 from pyharness.model.values import Number, checked_effort, finite
@@ -38,7 +38,8 @@ def solve_laws(
     own = {name: value for name, value in arrays.items() if value is not None}
     method = settings["method"]
     ready: dict[str, Any] = {}
-    axes = turns = None
+    axes: Any = None
+    turns: Any = None
     if isinstance(scene, Scene):
         step_size = scene.step_size
         is_moments = "moments" in own or "coefficients" in own
@@ -75,21 +76,18 @@ def solve_laws(
 
 
 def _turn_back(
-    found: Ensemble, axes: Array, turns: Array | None, own: Mapping[str, Any], t_end: Any
+    found: Ensemble, axes: Array, turns: Array, own: Mapping[str, Any], t_end: Any
 ) -> None:
-    """Transform results from principal `axes` (columns) to the body axes."""
-    if found.times is not None:
-        axes, turns = axes[:, None], None if turns is None else turns[:, None]
-    found.omega[:] = rotated(found.omega, axes)
-    if found.attitude is not None and turns is not None:
-        found.attitude[:] = turned_back(found.attitude, turns)
-        if found.error is not None:
-            # The initial omega was rounded after the rotation to principal axes.
-            sizes = np.max(np.abs(own["omega"]), axis=1)
-            ends = rows_of("t_end", t_end) if found.times is None else found.times
-            found.error[:] += (
-                ROUNDING * (sizes if found.times is None else sizes[:, None]) * abs(ends)
-            )
+    """Transform results from principal `axes` (columns, with quaternions `turns`) to body axes."""
+    m = 1 if found.times is None else len(found.times)
+    omega = found.omega.reshape(-1, m, 3)
+    attitude = np.empty((0, m, 4)) if found.attitude is None else found.attitude.reshape(-1, m, 4)
+    extension().turn_back_rows(axes.transpose(1, 2, 0), turns.T, omega.T, attitude.T)
+    if found.attitude is not None and found.error is not None:
+        # The initial omega was rounded after the rotation to principal axes.
+        sizes = np.max(np.abs(own["omega"]), axis=1)
+        ends = rows_of("t_end", t_end) if found.times is None else found.times
+        found.error[:] += ROUNDING * (sizes if found.times is None else sizes[:, None]) * abs(ends)
 
 
 def choose_kernel(method: str, tolerance: Number | None) -> tuple[int, float]:

@@ -6,6 +6,7 @@ of the equations, so that a batch is one set of equations with rows of data.
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -133,7 +134,8 @@ def solve_recorded(
         leaves += f"; {sum(left)} of {n} bodies one by one, because of {why}"
     if scene.states:
         # `solve` takes omegas and states of any size, and tells endings apart.
-        has_result = np.isin(result.status, (Statuses.COMPLETE, Statuses.SENSITIVE)).all(axis=1)
+        is_result = (result.status == Statuses.COMPLETE) | (result.status == Statuses.SENSITIVE)
+        has_result = is_result.all(axis=1)
         options = {"method": method, "tolerance": tolerance, "effort": effort}
         for i in np.flatnonzero(~has_result).tolist():
             _solve_alone(scene, {**counted, **rows}, i, times, result, options)
@@ -257,15 +259,21 @@ def _equations(
     data = np.empty((0, 0))
     if columns:
         data = np.column_stack([spread(each, max(map(len, columns))) for each in columns])
-    tape, bound = tape_of_bodies(
+    tape, bound, extra_work = _tapes_of_bodies(
         scene.torque, body, tuple(names), attitude, tuple(each.name for each in scene.states)
     )
     address, leaves = leaves_of(tape) if compiled else (0, "interpreter")
     packed = packed_tape(tape, scene.step_size, tolerance, effort, address)
     alone = packed
     if bound is not tape:
-        alone = packed_tape(bound, scene.step_size, tolerance, effort * _extra_work(bound))
+        alone = packed_tape(bound, scene.step_size, tolerance, effort * extra_work)
     return Equations(packed, alone, data), leaves_of_many(packed, leaves)
+
+
+@lru_cache(maxsize=16)
+def _tapes_of_bodies(*given: Any) -> tuple[Tape, Tape, float]:
+    tape, bound = tape_of_bodies(*given)
+    return tape, bound, _extra_work(bound)
 
 
 def _extra_work(bound: Tape) -> float:

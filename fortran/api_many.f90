@@ -265,37 +265,38 @@ subroutine inertia_frames(n, matrices, symmetric, m, vectors, numbers, axes, com
   end do
 end subroutine inertia_frames
 
-subroutine turn_back_rows(n, m, n_axes, axes, turns, omega, n_attitudes, attitude)
-  ! Transform m results of each of n bodies from principal to body axes.
+subroutine turn_rows(m, n_axes, axes, turns, n, omega, n_attitudes, attitude)
+  ! Transform m states of each body from a frame to the axes in which the frame is specified.
   !f2py threadsafe
   implicit none
-  integer(4), intent(in) :: n, m
-  integer(4), intent(in) :: n_axes              ! 1 or n
+  integer(4), intent(in) :: m
+  integer(4), intent(in) :: n_axes              ! 1, or one for each body
   real(8), intent(in) :: axes(3, 3, n_axes)     ! in columns
   real(8), intent(in) :: turns(4, n_axes)       ! their quaternions
+  integer(4), intent(in) :: n                   ! number of bodies, or 0 without omega
   real(8), intent(inout) :: omega(3, m, n)
-  integer(4), intent(in) :: n_attitudes         ! n, or 0
+  integer(4), intent(in) :: n_attitudes         ! the same of attitudes
   real(8), intent(inout) :: attitude(4, m, n_attitudes)
   real(8) :: a(3, 3), v(3), p(4), q(4)
-  integer(4) :: i, k, row
+  integer(4) :: i, k
 
   do i = 1, n
-    k = min(i, n_axes)
-    a = axes(:, :, k)
-    q = turns(:, k)
-    do row = 1, m
-      v = omega(:, row, i)
-      omega(1, row, i) = (v(1)*a(1, 1) + v(2)*a(1, 2)) + v(3)*a(1, 3)
-      omega(2, row, i) = (v(1)*a(2, 1) + v(2)*a(2, 2)) + v(3)*a(2, 3)
-      omega(3, row, i) = (v(1)*a(3, 1) + v(2)*a(3, 2)) + v(3)*a(3, 3)
-    end do
-    if (n_attitudes == 0) cycle
-    do row = 1, m
-      p = attitude(:, row, i)
-      attitude(1, row, i) = p(1)*q(1) + p(2)*q(2) + p(3)*q(3) + p(4)*q(4)
-      attitude(2, row, i) = p(2)*q(1) - p(1)*q(2) - p(3)*q(4) + p(4)*q(3)
-      attitude(3, row, i) = p(2)*q(4) - p(1)*q(3) + p(3)*q(1) - p(4)*q(2)
-      attitude(4, row, i) = -(p(1)*q(4)) - p(2)*q(3) + p(3)*q(2) + p(4)*q(1)
+    a = axes(:, :, min(i, n_axes))
+    do k = 1, m
+      v = omega(:, k, i)
+      omega(1, k, i) = (v(1)*a(1, 1) + v(2)*a(1, 2)) + v(3)*a(1, 3)
+      omega(2, k, i) = (v(1)*a(2, 1) + v(2)*a(2, 2)) + v(3)*a(2, 3)
+      omega(3, k, i) = (v(1)*a(3, 1) + v(2)*a(3, 2)) + v(3)*a(3, 3)
     end do
   end do
-end subroutine turn_back_rows
+  do i = 1, n_attitudes
+    q = turns(:, min(i, n_axes))
+    do k = 1, m
+      p = attitude(:, k, i)
+      attitude(1, k, i) = p(1)*q(1) + p(2)*q(2) + p(3)*q(3) + p(4)*q(4)
+      attitude(2, k, i) = p(2)*q(1) - p(1)*q(2) - p(3)*q(4) + p(4)*q(3)
+      attitude(3, k, i) = p(2)*q(4) - p(1)*q(3) + p(3)*q(1) - p(4)*q(2)
+      attitude(4, k, i) = -(p(1)*q(4)) - p(2)*q(3) + p(3)*q(2) + p(4)*q(1)
+    end do
+  end do
+end subroutine turn_rows

@@ -82,7 +82,7 @@ def _turn_back(
     m = 1 if found.times is None else len(found.times)
     omega = found.omega.reshape(-1, m, 3)
     attitude = np.empty((0, m, 4)) if found.attitude is None else found.attitude.reshape(-1, m, 4)
-    extension().turn_back_rows(axes.transpose(1, 2, 0), turns.T, omega.T, attitude.T)
+    extension().turn_rows(axes.transpose(1, 2, 0), turns.T, omega.T, attitude.T)
     if found.attitude is not None and found.error is not None:
         # The initial omega was rounded after the rotation to principal axes.
         sizes = np.max(np.abs(own["omega"]), axis=1)

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.engine.plan.registry import PREPARED_WITH_ATTITUDE, check_attitude
-from pyharness.engine.prepared.many_scenes import MERGED, PRINCIPAL, checked_copies, checked_rows
+from pyharness.engine.prepared.many_scenes import MERGED, PRINCIPAL, checked_rows
 from pyharness.engine.prepared.many_tape import sides_of
+from pyharness.engine.plan.registry import PREPARED_WITH_ATTITUDE, check_attitude
 from pyharness.model.arrays import count_bodies, spread, threads_of
 from pyharness.model.codes import Methods, Statuses
 from pyharness.model.ensemble import Ensemble, place_for
@@ -114,13 +114,13 @@ def solve_at(
     **options: Any,
 ) -> Ensemble:  # fmt: skip
     """Return the states of bodies at `times` (s)."""
-    # Normalised twice, a quaternion may have another last bit.
-    rows: Any = checked_copies({"omega": None, "attitude": None, **own}, as_given=True)
     found, left = None, np.arange(0)
     if settings[0] in _WITH_ROWS:
-        found, left = _solve_rows(ready, rows, times, settings[:2], threads, with_estimates)
+        found, left = _solve_rows(ready, own, times, settings[:2], threads, with_estimates)
         if not left.size:
             return found
+    rows = checked_rows(own)
+    if found is not None:
         rows = {name: each if len(each) == 1 else each[left] for name, each in rows.items()}
     # A copy of each body for each time.
     n, m = count_bodies(rows), len(times)
@@ -156,6 +156,7 @@ def _solve_rows(
         None if attitude is None else np.empty((*shape, 4)),
         np.empty((*shape, 2)) if with_estimates else None, times=times,
     )  # fmt: skip
+    is_left = np.zeros(n, bool)
     places = np.arange(1, len(times) + 1, dtype=np.int32)
     sides = [(times[side], places[side], side) for side in sides_of(times)]
 
@@ -174,6 +175,7 @@ def _solve_rows(
                 found.omega[piece].T, results[0], status, results[1],
             )  # fmt: skip
             found.status[piece, side] = status[:, None]
+            is_left[piece] |= status != Statuses.COMPLETE
 
     for_each_piece(enter, n, threads_of(threads))
-    return found, np.flatnonzero((found.status != Statuses.COMPLETE).any(axis=1))
+    return found, np.flatnonzero(is_left)

@@ -17,7 +17,7 @@ from pyharness.model.arrays import (
     spread,
     unit_quaternions,
 )
-from pyharness.model.attitude import quaternion_of_axes, rotated, turned_back
+from pyharness.model.attitude import quaternion_of_axes
 from pyharness.model.codes import Statuses
 from pyharness.model.errors import InputError
 from pyharness.model.extension import extension
@@ -86,12 +86,18 @@ def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Array, Ar
 
 def rows_about(rows: Mapping[str, Any], axes: Array, turns: Array) -> dict[str, Any]:
     """Return omegas and attitudes of `rows` about `axes` (columns) with quaternions `turns`."""
-    found = {}
-    if "omega" in rows:
-        found["omega"] = rotated(rows["omega"], axes.transpose(0, 2, 1))
-    if "attitude" in rows:
-        conjugate = turns * np.array([1.0, -1.0, -1.0, -1.0])
-        found["attitude"] = turned_back(unit_quaternions(rows["attitude"]), conjugate)
+    found = {name: rows[name] for name in ("omega", "attitude") if name in rows}
+    if "attitude" in found:
+        found["attitude"] = unit_quaternions(found["attitude"])
+    n = max([len(axes), *map(len, found.values())])
+    found = {name: np.array(spread(each, n)) for name, each in found.items()}
+    omega, attitude = (
+        found.get(name, np.empty((0, width)))[:, None].T
+        for name, width in (("omega", 3), ("attitude", 4))
+    )
+    conjugate = turns * np.array([1.0, -1.0, -1.0, -1.0])
+    # Backwards, the axes are transposed.
+    extension().turn_rows(axes.T, conjugate.T, omega, attitude)
     return found
 
 

@@ -36,8 +36,8 @@ _EXTREME = 1e60  # its fifth power overflows, and the fifth power of its inverse
 # choice, and leave uncertain results to a single solution. Answers in other words are bytes; those
 # in binary64 come from the guarded entry.
 _UNGUARDED = (
-    "run_programs", "solve_ensemble", "solve_many_rows", "solve_packed_many", "run_program_in_word",
-    "functions_of_word",
+    "run_programs", "solve_ensemble", "solve_many_rows", "solve_packed_many", "turn_rows",
+    "run_program_in_word", "functions_of_word",
 )  # fmt: skip
 _NAMES = {INVALID: "invalid", DIVIDE: "divide by zero", TOO_LARGE: "overflow"}
 

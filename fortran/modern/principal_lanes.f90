@@ -174,13 +174,14 @@ contains
     real(dp), dimension(SIDE_BY_SIDE), intent(in) :: first, second, off, first_low, second_low
     real(dp), intent(inout) :: turned(SIDE_BY_SIDE)
     real(dp), intent(inout) :: angle(SIDE_BY_SIDE, 3)
-    real(dp) :: t
+    real(dp) :: gap, t
     integer :: i
 
     do i = 1, SIDE_BY_SIDE
-      t = off(i)/((second(i) - first(i)) + (second_low(i) - first_low(i)))
-      if (abs(off(i)) <= 0.0_dp) t = 0.0_dp
-      turned(i) = max(turned(i), abs(t)) + 0.0_dp*t
+      gap = (second(i) - first(i)) + (second_low(i) - first_low(i))
+      ! An angle of 1 is too large.
+      t = off(i)/sign(max(abs(gap), abs(off(i)), tiny(gap)), gap)
+      turned(i) = max(turned(i), abs(t))
       angle(i, 1) = t
       angle(i, 2) = t*off(i)
     end do

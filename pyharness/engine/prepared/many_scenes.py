@@ -64,10 +64,10 @@ def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Array, Ar
     if len(matrices) > 1 and not is_free:
         m = n
     vectors = np.concatenate([spread(each, m) for each in parts], axis=1)
-    given_vectors = vectors[:, : 0 if is_free else None]
-    if len(matrices) == 1:
-        given_vectors = given_vectors.reshape(1, -1, 3)
-    numbers, axes, components = find_frames(matrices, given_vectors)
+    of_matrix = np.empty((len(matrices), 0, 3))
+    if not is_free:
+        of_matrix = vectors.reshape(len(matrices), -1, 3) if len(matrices) else vectors
+    numbers, axes, components = find_frames(matrices, of_matrix)
     if not is_free:
         vectors = components.reshape(vectors.shape)
     last = 2 + sines.shape[1]

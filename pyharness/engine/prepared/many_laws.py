@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyharness.engine.plan.registry import PREPARED_WITH_ATTITUDE, check_attitude
 from pyharness.engine.prepared.many_scenes import MERGED, PRINCIPAL, checked_rows
 from pyharness.engine.prepared.many_tape import sides_of
-from pyharness.engine.plan.registry import PREPARED_WITH_ATTITUDE, check_attitude
 from pyharness.model.arrays import count_bodies, spread, threads_of
 from pyharness.model.codes import Methods, Statuses
 from pyharness.model.ensemble import Ensemble, place_for

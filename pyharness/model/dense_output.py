@@ -191,6 +191,7 @@ class DenseOutput:
         )
 
     def followed_by(self, after: "DenseOutput") -> "DenseOutput":
+        """Return the solution on both sides of the time at which `after` begins."""
         first, second = self.states, after.states
         assert isinstance(first, Pieces)
         assert isinstance(second, Pieces)

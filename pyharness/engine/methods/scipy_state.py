@@ -54,21 +54,19 @@ def solve_state(
     if times[-1] == 0.0:
         return rows_of(times, np.array([run.start]), 1, 0, "complete")
     beside = series_beside(scene, times, tolerance) if run.is_smooth else None
-    run.is_checked = beside is not None
+    run.is_limited = beside is None
     found = _refined(run, times, tolerance)
-    if beside is not None:
-        largest = max(found.largest, _largest_of(beside.rows))
-        first = found._replace(largest=largest)
-        second = StateRows(beside.rows, is_complete=True, largest=largest)
-        is_short = len(found.state) < len(beside.rows)
-        if is_short or not _difference(first, second) <= _AGREEMENT * tolerance:
+    if beside is not None and not _agree(found, beside.rows, tolerance):
+        run.is_limited = True
+        found = _refined(run, times, tolerance)
+        if not _agree(found, beside.rows, tolerance):
             run.spans = beside.spans
             found = _refined(run, times, tolerance)
     if not found.is_complete:
         run.check_undefined()
     count = len(found.state)
     # A recorded torque is unchecked if its Taylor series ends early.
-    is_judged = run.is_checked or not run.is_smooth
+    is_judged = beside is not None or not run.is_smooth
     ended = "overflow" if not found.is_complete else "complete" if is_judged else "unchecked"
     result = rows_of(times[:count], found.state, run.evaluations, len(times), ended)
     return replace(result, sol=run.steps(scene)) if ended == "complete" else result
@@ -121,6 +119,13 @@ def _refined(run: StateRun, times: Sequence[float], tolerance: float) -> StateRo
         # Aim at a quarter of the allowed error.
         ratio = min(_LARGEST_RATIO, max(_RATIO, 4.0 * difference / (ratio * tolerance)))
         before, local = after, finer
+
+
+def _agree(found: StateRows, rows: Array, tolerance: float) -> bool:
+    """Return whether SciPy's states are those of the series."""
+    largest = max(found.largest, _largest_of(rows))
+    both = found._replace(largest=largest), StateRows(rows, is_complete=True, largest=largest)
+    return len(found.state) >= len(rows) and _difference(*both) <= _AGREEMENT * tolerance
 
 
 def _difference(before: StateRows, after: StateRows) -> float:

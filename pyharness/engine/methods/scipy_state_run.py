@@ -60,7 +60,7 @@ class StateRun(Run):
         limit = int(most * _WORK / (_WORK + work))
         start = (*scene.omega, *(scene.attitude or ()))
         self.is_smooth = torque.tape is not None
-        self.is_checked = False  # whether a series shows what SciPy steps over
+        self.is_limited = True  # whether steps are short because no series shows what they pass
         super().__init__(start, self._guarded(slopes), rate, end, name, effort, limit)
         if not self.is_smooth:
             self._check_memory()
@@ -186,7 +186,7 @@ class StateRun(Run):
         self._integrations += 1
         sizes = [local * scale] * 3 + [local] * (len(self.start) - 3)
         parts = _FEWEST_STEPS + _MORE_STEPS * self._integrations
-        longest = math.inf if self.is_checked else abs(self.end) / parts
+        longest = abs(self.end) / parts if self.is_limited else math.inf
         rows = np.empty((0, len(self.start)))
         state, begin, self._largest = self.start, 0.0, 0.0
         self.solutions.clear()

@@ -70,6 +70,11 @@ def guarded(name: str, entry: Callable[..., Any]) -> Callable[..., Any]:
         if not raised:
             return answer
         found = dict(zip(results, answer if isinstance(answer, tuple) else (answer,), strict=True))
+        if np.ndim(found.get("status", 0)):
+            # Bodies in a batch share the flags of a processor; one that is refused may raise them.
+            if np.any(found["status"]):
+                return answer
+            found["status"] = 0
         packed = name in ("solve_packed", "solve_packed_attitude")
         method = args[0][Places.METHOD] if packed else None
         is_tape = name in ("tape_rows", "tape_step", "tape_derivatives") or method == Methods.TAPE

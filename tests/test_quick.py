@@ -15,7 +15,7 @@ from tests.tables import tables
 
 TESTS = {
     "tests/engine/test_taylor.py": "from pyharness import solve",
-    "tests/engine/test_plan.py": "from pyharness.engine import taylor\n",
+    "tests/engine/test_plan.py": "from pyharness.engine.methods import taylor\n",
     "tests/truth/test_other.py": "import numpy\nTEXT = 'taylor_march.f90'",
 }
 

@@ -17,7 +17,7 @@ from pyharness.checks.random_methods import random_torques
 from pyharness.engine import solve
 from pyharness.engine.many import many_recorded
 from pyharness.engine.methods import taylor
-from pyharness.engine.system import parameters, recorded
+from pyharness.engine.system import recorded
 from pyharness.model import arrays
 from pyharness.model.tape import Linear, Tape
 from pyharness.model.trajectory import Trajectory
@@ -55,11 +55,8 @@ def _off(scene: Any, real: Callable[..., Tape] = recorded.system_of) -> Tape:
     return _with_fault(real(scene))
 
 
-def _all_off(
-    *given: Any, real: Callable[..., tuple[Tape, Tape]] = parameters.tape_of_bodies
-) -> tuple[Tape, Tape]:
-    tape, alone = real(*given)
-    return _with_fault(tape), _with_fault(alone)
+def _packed_off(tape: Tape, *more: Any, real: Callable[..., Any] = recorded.packed_tape) -> Any:
+    return real(_with_fault(tape), *more)
 
 
 def _with_fault(tape: Tape) -> Tape:
@@ -81,7 +78,7 @@ def _turned(name: str, rows: Any, *shape: int, real: Callable[..., Any] = arrays
 FAULTS: dict[str, tuple[Any, str, Any, str]] = {
     "equations of motion": (taylor, "system_of", _off, "torque-solve-taylor"),
     "prepared": (recorded, "system_of", _off, "torque-prepare-taylor"),
-    "many": (many_recorded, "tape_of_bodies", _all_off, "torque-solve-many"),
+    "many": (many_recorded, "packed_tape", _packed_off, "torque-solve-many"),
     "solve": (candidates, "solve", partial(_moved, solve.solve), "torque-solve-auto"),
     "initial attitude": (many_recorded, "rows_of", _turned, "torque-solve-many"),
 }

@@ -119,7 +119,7 @@ def test_a_seed_gives_the_same_draw_and_another_seed_another() -> None:
 def test_a_draw_can_be_restricted_to_parts_of_file_names(monkeypatch: pytest.MonkeyPatch) -> None:
     # Few and short files, because each file that is drawn is parsed.
     short = (
-        "engine/steps/steps.py",
+        "engine/steps/step_nodes.py",
         "modern/tape.f90",
         "checks/kinds.py",
         "engine/problem/sides.py",
@@ -153,7 +153,7 @@ def test_every_language_has_its_share() -> None:
     assert lines["Python"] > lines[FORTRAN] > lines[C]
     core = {"pyharness/engine/methods/gauss.py", "pyharness/sweep/store.py", "web/port.js",
             "pyharness/thesis/word.py", "fortran/modern/taylor.f90", "pyharness/model/tape.py",
-            "pyharness/engine/steps/steps.py", "fortran/modern/tape_solve.f90"}  # fmt: skip
+            "pyharness/engine/steps/step_nodes.py", "fortran/modern/tape_solve.f90"}  # fmt: skip
     assert core <= set(files())
     assert not any("report" in file or "picture" in file for file in files())
 

@@ -178,7 +178,7 @@ class DenseOutput:
             q /= np.sqrt(np.vecdot(q, q))[..., None]
         return states
 
-    def transformed(
+    def transform(
         self, states: Callable[[Array], Array], factor: float = 1.0
     ) -> "DenseOutput | None":
         """Return the solution with changed states, and times multiplied by `factor`."""

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy.integrate
 
 from pyharness import ChangingMoments, InputError, Scene, TorqueLaw, Trajectory, solve, torques
 from pyharness.engine.methods import taylor
-from pyharness.engine.plan.registry import FIXED_STEP
+from pyharness.engine.plan.registry import FIXED_STEP, SCIPY_METHODS
 from pyharness.engine.steps import dense
 from pyharness.events import crosses
 from pyharness.model.dense_output import DenseOutput, Pieces
@@ -312,6 +313,35 @@ def test_steps_beyond_those_that_are_kept_are_replaced(monkeypatch: Patch) -> No
     assert counts[1] != kept.steps
     for each in (kept, other):
         assert largest_error(sol_of(each), truth) <= 1e-10
+
+
+@pytest.mark.parametrize("method", SCIPY_METHODS)
+@pytest.mark.parametrize("name", ["free", "law", "damping"])
+def test_scipy_methods_integrate_once_for_dense_output(
+    name: str, method: str, monkeypatch: Patch
+) -> None:
+    monkeypatch.setattr("pyharness.engine.solve.solution_of", None)  # would solve again
+    found = solve(SCENES[name], [-1.5, 4.0], method, 1e-6, dense_output=True)
+    times = np.linspace(-1.5, 4.0, 301)
+    truth = solve(SCENES[name], times, tolerance=1e-12, attitude=found.attitude is not None)
+    assert largest_error(sol_of(found), truth) <= 1e-6
+
+
+def test_scipy_without_dense_output_is_asked_for_rows(monkeypatch: Patch) -> None:
+    """SciPy has none if two steps end at one time, as beside a switch."""
+
+    def without(
+        *given: Any, dense_output: bool, real: Any = scipy.integrate.solve_ivp, **more: Any
+    ) -> Any:
+        if dense_output and more["t_eval"] is not None:
+            raise ValueError("`ts` must be strictly increasing or decreasing.")
+        return real(*given, dense_output=dense_output, **more)
+
+    monkeypatch.setattr("scipy.integrate.solve_ivp", without)
+    for name in ("law", "damping"):
+        found = solve(SCENES[name], 2.0, "dop853", 1e-6, dense_output=True)
+        truth = solve(SCENES[name], np.linspace(0.0, 2.0, 51), tolerance=1e-12)
+        assert largest_error(sol_of(found), truth) <= 1e-6
 
 
 @pytest.mark.parametrize("name", [each for each in SCENES if each != "free"])

@@ -180,6 +180,21 @@ def test_another_kernel_may_stand_in_its_place(monkeypatch: pytest.MonkeyPatch) 
     assert (solver.status, solver.steps) == ("complete", 1)
 
 
+def test_attitude_is_that_of_solve() -> None:
+    """By default it is computed if the scene has one, or the torque needs it."""
+    turning = replace(case_scene(5), attitude=(1.0, 0.0, 0.0, 0.0))
+    in_space = replace(case_scene(5), torque=TorqueLaw((1.0, 0.0, 0.0), frame="space"))
+    for scene in (turning, in_space):
+        omega, attitude = prepare(scene)(scene.omega, 0.5)
+        found = solve(scene, 0.5)
+        assert found.attitude is not None
+        assert omega == pytest.approx(found.omega[0], rel=1e-9)
+        assert attitude == pytest.approx(found.attitude[0], abs=1e-9)
+    assert prepare(turning, attitude=False)(turning.omega, 0.5).shape == (3,)
+    assert prepare(turning, "quick")(turning.omega, 0.5).shape == (3,)
+    assert prepare(case_scene(5))(case_scene(5).omega, 0.5).shape == (3,)
+
+
 def test_quick_call_is_inherited() -> None:
     """Classes inherit the vectorcall; without it a keyword costs as much as an easy solve."""
     assert Solver.__flags__ & 1 << 11

@@ -46,6 +46,7 @@ def _end(problem: Problem, method: str, tolerance: float, effort: float) -> End:
         if problem.with_attitude:
             state, attitude = state[0], state[1][None]
         is_later = kind and not steps and number == COMPLETE
+        # Before `calm`, no kernel needs to be asked.
         if is_later and abs(time) >= calm:
             is_later = is_calm(scene, scene.omega, time, tolerance)
         if not is_later:

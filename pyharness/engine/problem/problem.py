@@ -51,7 +51,7 @@ class Problem:
         self.turned = scene
 
     @cached_property
-    def recorded(self) -> Scene:
+    def constant_body(self) -> Scene:
         """The scene with a constant body and a torque about its axes."""
         return with_constant_body(self.turned)
 
@@ -59,7 +59,7 @@ class Problem:
     def scene(self) -> Scene:
         """The scene that methods integrate."""
         # The reference has equations of its own for an inertia that changes.
-        return self.turned if self.given.changing is None or self.is_exact else self.recorded
+        return self.turned if self.given.changing is None or self.is_exact else self.constant_body
 
     def __reduce__(self) -> tuple[Any, ...]:
         return problem_of, (self.given, self.with_attitude, self.is_exact)
@@ -77,8 +77,8 @@ class Problem:
         if self.turn is not None:
             turned = product(attitude.T, self.turn[1]) if self.with_attitude else []
             inner = np.column_stack([omega @ self.turn[0], *turned, own])
-        if is_opaque(self.recorded.torque):
-            slopes = slopes_of(self.recorded)
+        if is_opaque(self.constant_body.torque):
+            slopes = slopes_of(self.constant_body)
             rows = zip(times.tolist(), inner.tolist(), strict=True)
             found = np.array([slopes(*row)[:3] for row in rows]).reshape(-1, 3)
         else:
@@ -90,7 +90,7 @@ class Problem:
 
     @cached_property
     def _system(self) -> Any:
-        return system_of(self.recorded, self.with_attitude and bool(self.given.states))
+        return system_of(self.constant_body, self.with_attitude and bool(self.given.states))
 
     def in_axes_of_scene(self, found: Trajectory) -> Trajectory:
         """Return a trajectory about the body axes, with the principal axes."""
@@ -105,7 +105,7 @@ class Problem:
             return None
         axes, own = self.axes, 7 if self.with_attitude else 3
         if axes is not None and isinstance(self.turned, PrincipalScene):
-            sol = sol.transformed(lambda states: states_in_scene_axes(states, axes, own))
+            sol = sol.transform(lambda states: states_in_scene_axes(states, axes, own))
         return sol and replace(sol, rates=problem_of(self.given, self.with_attitude).rates)
 
 

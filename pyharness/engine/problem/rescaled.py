@@ -270,7 +270,7 @@ def unscaled(trajectory: Trajectory, times: Sequence[float], factor: float) -> T
         trajectory,
         **{name: each[:count] for name, each in rows.items()}
         | {"time": time, "recorded_time": time},
-        sol=trajectory.sol and trajectory.sol.transformed(
+        sol=trajectory.sol and trajectory.sol.transform(
             lambda x: np.column_stack([x[:, :3] / factor, x[:, 3:]]), factor
         ),
     )  # fmt: skip

@@ -95,6 +95,16 @@ def test_equal_arguments_of_other_types_are_refused_in_every_call() -> None:
                 solve(scene, 2.0, **options)
 
 
+@pytest.mark.parametrize(("body", "calm", "long"), [
+    ({"moments": (4.0, 3.0, 2.0)}, 1e13, 1e14),
+    ({"inertia": ((4.0, 0.3, 0.1), (0.3, 3.0, 0.2), (0.1, 0.2, 2.0))}, 1e5, 1e8),
+])  # fmt: skip
+def test_a_long_free_motion_is_sensitive_in_every_call(body: Any, calm: float, long: float) -> None:
+    scene = Scene("", (1.0, 0.5, 0.2), **body)
+    ended = [solve(scene, time).ended for time in (calm, long) for _ in range(2)]
+    assert ended == ["complete", "complete", "sensitive", "sensitive"]
+
+
 def test_results_are_independent_of_each_other() -> None:
     scene = replace(_TURNED)
     found = [solve(scene, 2.0) for _ in range(3)]

@@ -104,6 +104,45 @@ subroutine tape_step(n_numbers, numbers, n, t, state, tolerances, relative, tria
   status = taken%status
 end subroutine tape_step
 
+subroutine event_roots(n_numbers, numbers, n_pieces, edges, m, n_points, values, n_own, n_nodes, &
+                       constants, n_constants, most, roots, n_roots)
+  ! Find the roots of a recorded function of a solution, if they are simple and distinct.
+  !f2py threadsafe
+  use, intrinsic :: iso_c_binding, only: c_loc, c_null_ptr
+  use levels, only: search_events
+  use problem, only: event_search_t
+  use tape, only: arrays_of, tape_of, tape_t
+  implicit none
+  integer(4), intent(in) :: n_numbers
+  real(8), intent(in), target :: numbers(n_numbers)  ! the tape, as tape.f90 describes it
+  integer(4), intent(in) :: n_pieces
+  real(8), intent(in), target :: edges(n_pieces + 1) ! ascending, s
+  integer(4), intent(in) :: m                        ! unknowns
+  integer(4), intent(in) :: n_points                 ! AT_ONCE + 1
+  real(8), intent(in), target :: values(m, n_points, n_pieces) ! at Chebyshev points
+  integer(4), intent(in) :: n_own                    ! own states
+  integer(4), intent(in) :: n_nodes                  ! of the function's polynomials
+  integer(4), intent(in) :: n_constants
+  ! Points and nodes, four matrices, column by column, and the settings of event_search.c.
+  real(8), intent(in), target :: constants(n_constants)
+  integer(4), intent(in) :: most
+  real(8), intent(out), target :: roots(4, most)     ! time (s), sign, slope and noise
+  integer(4), intent(out) :: n_roots                 ! -1 if other roots are possible
+  type(tape_t) :: recorded
+  type(event_search_t) :: search
+  integer :: at(5)
+
+  recorded = tape_of(numbers)
+  at = 1 + n_points + n_nodes + n_nodes*[0, n_points, n_points + n_nodes, n_points + 2*n_nodes, &
+                                         n_points + 3*n_nodes]
+  search = event_search_t(n_pieces, m, n_own, recorded%n_slots, most, 0, c_loc(edges), &
+                          c_loc(values), c_loc(constants), c_loc(constants(at(1))), &
+                          c_loc(constants(at(2))), c_loc(constants(at(3))), &
+                          c_loc(constants(at(4))), c_loc(constants(at(5))), c_loc(roots))
+  call search_events(arrays_of(recorded, c_null_ptr, c_null_ptr, c_null_ptr), search)
+  n_roots = search%n_roots
+end subroutine event_roots
+
 subroutine tape_derivatives(n_numbers, numbers, n, state, n_columns, starts, forcings, n_times, &
                             times, tolerance, effort, rows, n_rows, status)
   ! Compute the derivatives of the solution of a tape with respect to parameters, the columns, at

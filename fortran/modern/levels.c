@@ -16,6 +16,7 @@ typedef void fixed_solver(const void *bodies, int method, int n, double *omega, 
 typedef void frame_finder(int n, const double *matrices, int m, const double *vectors,
                           double *numbers, double *axes, double *components, int *status);
 typedef void runner(void *ensemble);
+typedef void event_searcher(const void *tape, void *search);
 typedef void reader(int pieces, const double *edges, const double *points, int m, const double *values,
                     int n, const double *times, double *states);
 
@@ -31,6 +32,7 @@ typedef void reader(int pieces, const double *edges, const double *points, int m
   solver solve_tape_##level;                                                                   \
   solver step_tape_##level;                                                                    \
   solver vary_solution_##level;                                                                \
+  event_searcher search_events_##level;                                                        \
   reader read_pieces_##level;                                                                  \
   extern const struct leaves ready_leaves_##level[];
 #define TAKEN(level, number, width)                                                            \
@@ -38,7 +40,7 @@ typedef void reader(int pieces, const double *edges, const double *points, int m
    solve_many_taylor_##level,  solve_many_fixed_##level, run_lanes_##level,                    \
    solve_tape_##level,         step_tape_##level,        vary_solution_##level,                \
    solve_tape_bodies_##level,  read_pieces_##level,      ready_leaves_##level,                 \
-   find_frames_##level,        number, width},
+   find_frames_##level,        search_events_##level,    number, width},
 
 /* The levels that are compiled, and the width of their registers. The build for one processor has
    one of them. */
@@ -79,6 +81,7 @@ static struct {
   reader *pieces;
   const struct leaves *leaves; /* of ready torques, in the order of ready_keys */
   frame_finder *frames;
+  event_searcher *events;
   int level;                   /* 0 plain, 1 AVX2 with FMA, 2 AVX-512 */
   int width;                   /* numbers in a register */
 } chosen, known[] = {EACH_LEVEL(TAKEN)};
@@ -167,6 +170,8 @@ void read_pieces(int pieces, const double *edges, const double *points, int m, c
 {
   chosen.pieces(pieces, edges, points, m, values, n, times, states);
 }
+
+void search_events(const void *tape, void *search) { chosen.events(tape, search); }
 
 enum { LEAST_ADDRESS = 4096 };
 

@@ -8,8 +8,8 @@ module levels
   private
 
   public :: choose_level, find_frames, fits_lanes, many_fixed, many_free, many_taylor, &
-            quick_solve, read_pieces, ready_leaves, run_lanes, tape_bodies, tape_solve, tape_step, &
-            tape_variation, taylor_solve
+            quick_solve, read_pieces, ready_leaves, run_lanes, search_events, tape_bodies, &
+            tape_solve, tape_step, tape_variation, taylor_solve
 
   interface
     integer(c_int) function choose_level(highest) bind(c, name="choose_level")
@@ -31,6 +31,12 @@ module levels
       type(*), intent(in) :: tape, request
       type(*), intent(inout) :: solution
     end subroutine tape_solve
+
+    subroutine search_events(tape, search) bind(c, name="search_events")
+      implicit none(type, external)
+      type(*), intent(in) :: tape
+      type(*), intent(inout) :: search
+    end subroutine search_events
 
     subroutine tape_bodies(bodies) bind(c, name="tape_bodies")
       implicit none(type, external)

@@ -2,6 +2,7 @@ module problem
   !! The equations that the modern methods solve, divided by the moments (equations 16-18):
   !! omega' = M(t) + (A w2 w3, B w1 w3, C w1 w2), M(t) = constant + rate t + sines + cosines.
   !! A wave is one of the sines or cosines.
+  use, intrinsic :: iso_c_binding, only: c_int, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
   implicit none(type, external)
@@ -61,6 +62,12 @@ module problem
     integer, pointer, contiguous :: forcings(:, :)
     real(dp), pointer, contiguous :: times(:)   !! s
   end type variation_request_t
+
+  type, bind(c), public :: event_search_t
+    !! What event_search.c reads, and the roots that it finds.
+    integer(c_int) :: n_pieces, m, n_own, n_slots, most, n_roots
+    type(c_ptr) :: edges, values, points, refining, to_coefficients, left, right, settings, roots
+  end type event_search_t
 
   type, public :: variation_t
     !! The derivatives at the first n_rows times.

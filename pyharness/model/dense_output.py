@@ -59,12 +59,12 @@ class Pieces:
 
     def __call__(self, times: Array) -> Array:
         """Return the values at `times` (s), shape (n, m)."""
-        edges, columns = self._contiguous
+        edges, columns = self.contiguous
         found: Array = extension().states_at(edges, POINTS, columns, times).T
         return found
 
     @cached_property
-    def _contiguous(self) -> tuple[Array, Array]:
+    def contiguous(self) -> tuple[Array, Array]:
         """The edges, and the values as (m, NODES, p), for compiled code."""
         return np.ascontiguousarray(self.edges), np.asfortranarray(self.values.T)
 

@@ -33,15 +33,16 @@ STATE_ROUNDING = 2.0**-46
 _ROUNDED = 6
 _MOST_PIECES = 100_000  # intervals that are divided at the same time
 # Relative changes of an argument for a numerical derivative.
-_SHIFT, LONG_SHIFT = 2.0**-26, 2.0**-13
+SHIFT, LONG_SHIFT = 2.0**-26, 2.0**-13
 ROUNDING = 2.0**-50  # relative rounding error of the arguments of a function
 # Largest relative error of the state in noise; see `Solution.state_error`.
 _COARSEST = 1e-10
+_SAMPLES = np.arange(1, 6)  # nodes at which a function is compared with its tape
 _SOME = slice(5, None, 11)  # three nodes at which noise is computed
 
 
 @cache
-def _refining() -> Array:
+def refining() -> Array:
     """Return the matrix from values at the nodes of the polynomials to values at POINTS."""
     return Pieces(np.array([-1.0, 1.0]), np.eye(dense_output.NODES)[None])(POINTS)
 
@@ -59,9 +60,16 @@ class Solution:
         return self.sol.normalized(self.pieces(times))
 
     @cached_property
+    def samples(self) -> tuple[Array, Array]:
+        """Return a few times (s) and states, not of these times."""
+        values = self.pieces.values
+        which = _SAMPLES * (len(values) - 1) // _SAMPLES[-1]
+        return self.pieces.edges[which], self.sol.normalized(values[which, _SAMPLES])
+
+    @cached_property
     def at_nodes(self) -> tuple[Array, Array]:
         times = nodes(self.pieces.edges[:-1], self.pieces.edges[1:], POINTS)
-        return times, self.sol.normalized(_refining() @ self.pieces.values)
+        return times, self.sol.normalized(refining() @ self.pieces.values)
 
     @cached_property
     def at_ends(self) -> tuple[Array, Array]:
@@ -79,11 +87,11 @@ class Solution:
     def exact_values(self, g: EventFunction, times: Array) -> Array:
         return self.values(g, times, self.sol.normalized(self.sol.states(times)))
 
-    def noise(self, g: EventFunction, times: Array, shift: float = _SHIFT) -> Array:
+    def noise(self, g: EventFunction, times: Array, shift: float = SHIFT) -> Array:
         return self.values_and_noise(g, times, None, shift)[1]
 
     def values_and_noise(
-        self, g: EventFunction, times: Array, states: Array | None = None, shift: float = _SHIFT
+        self, g: EventFunction, times: Array, states: Array | None = None, shift: float = SHIFT
     ) -> tuple[Array, Array, Array]:
         """Return a function's values, their errors (noise), and errors due to rounding alone."""
         states = self.states(times) if states is None else states
@@ -200,7 +208,7 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, list[Fits], Root
 
 
 def noise_of(
-    g: EventFunction, solution: Solution, low: Array, high: Array, shift: float = _SHIFT
+    g: EventFunction, solution: Solution, low: Array, high: Array, shift: float = SHIFT
 ) -> Array:
     times = nodes(low, high, POINTS)[:, _SOME]
     noise = solution.noise(g, times.ravel(), shift).reshape(times.shape)

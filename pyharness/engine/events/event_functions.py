@@ -4,7 +4,6 @@ import inspect
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from types import FunctionType
 from typing import Any
 
@@ -17,8 +16,8 @@ from pyharness.model.called_function import called_once
 from pyharness.model.errors import InputError, kind_of
 from pyharness.model.numpy_protocol import symbol_array
 from pyharness.model.own_states import OwnState
-from pyharness.model.symbols import Recorder, recorded_twice
-from pyharness.model.tape import N_INPUTS, Tape
+from pyharness.model.symbols import Recorder
+from pyharness.model.tape import N_INPUTS, Tape, float_outputs
 from pyharness.model.values import converted
 
 _FUNCTIONS_ALLOWED = (
@@ -27,7 +26,7 @@ _FUNCTIONS_ALLOWED = (
 )
 # Largest relative difference of values for one time and for many, due to rounding.
 _AGREEMENT = 1e-10
-_CHECKED = 9  # values that are compared
+CHECKED = 9  # values that are compared
 
 # Attributes that change the signature of a function.
 _SIGNED = {"__wrapped__", "__signature__"}
@@ -59,6 +58,7 @@ class EventFunction:
     limit: float  # number, from 1, of the event that ends the integration; infinite for none
     is_vectorized: bool | None = None  # whether the function accepts arrays; None: unknown
     _tapes: list[Tape | None] = field(default_factory=list, repr=False)  # at most one
+    _is_checked: bool = False  # whether the tape's values are those of the function
 
     def __call__(self, times: Array, states: Array, rates: Array | None = None) -> Array:
         given = times, states, None if rates is None else rates[:, :3]
@@ -93,44 +93,51 @@ class EventFunction:
             if not self._is_confirmed(found, times, states, rates):
                 return None
             # Agreement at few times does not show that the function accepts arrays.
-            self.is_vectorized = True if len(times) > _CHECKED else None
+            self.is_vectorized = True if len(times) > CHECKED else None
         return found
 
     def _is_confirmed(self, found: Array, times: Array, states: Array, rates: Array | None) -> bool:
-        some = sorted({k * (len(times) - 1) // (_CHECKED - 1) for k in range(_CHECKED)})
+        some = sorted({k * (len(times) - 1) // (CHECKED - 1) for k in range(CHECKED)})
         each = self._of_each(times[some], states[some], None if rates is None else rates[some])
-        scale = _AGREEMENT * max(map(abs, each))
-        # Equal infinite values have no difference.
-        return all(
-            x == y or abs(x - y) <= scale for x, y in zip(found[some].tolist(), each, strict=True)
-        )
+        return _are_alike(found[some].tolist(), each)
 
     def _of_tape(self, times: Array, states: Array, rates: Array | None) -> Array | None:
-        is_new = not self._tapes
-        if is_new:
-            self._tapes.append(self._recorded(states.shape[1]))
-        (tape,) = self._tapes
-        if tape is None:
+        tape = self.tape(states.shape[1])
+        some = slice(None, None, max(1, len(times) // CHECKED))
+        if tape is None or not self.is_tape(times[some], states[some]):
             return None
         found: Array = outputs_at(tape, times, states)[:, 0]
-        if is_new and not self._is_confirmed(found, times, states, rates):
-            self._tapes[0] = None
-            return None
         return found
+
+    def tape(self, width: int) -> Tape | None:
+        """Return the recorded function of `width` unknowns; None if it can't be recorded."""
+        if not self._tapes:
+            self._tapes.append(self._recorded(width))
+        return self._tapes[0]
+
+    def is_tape(self, times: Array, states: Array) -> bool:
+        """Return whether the function's values at n times and states are those of its tape."""
+        (tape,) = self._tapes
+        if tape is not None and not self._is_checked:
+            self._is_checked = True
+            given = np.zeros((len(times), tape.n_inputs))
+            given[:, 0], given[:, 1 : 1 + states.shape[1]] = times, states
+            found = [float_outputs(tape, each)[0] for each in given.tolist()]
+            if not _are_alike(found, self._of_each(times, states, None)):
+                self._tapes[0] = None
+        return self._tapes[0] is not None
 
     def _recorded(self, width: int) -> Tape | None:
         if self.event.needs_rates:
             return None
 
-        def record(recorder: Recorder) -> Tape:
-            time, *state = recorder.inputs()
-            omega, attitude = symbol_array(state[:3]), symbol_array(state[3:width])
-            given = time, omega, attitude, None
+        recorder = Recorder(n_inputs=max(N_INPUTS, 1 + width))
+        time, *state = recorder.inputs()
+        given = time, symbol_array(state[:3]), symbol_array(state[3:width]), None
+        try:
+            # Functions that change from call to call are found by their values.
             (value,) = called_once(lambda *x: [self.event.function(*x)], given, recorder, "")
             return recorder.tape([value])
-
-        try:
-            return recorded_twice(record, partial(Recorder, n_inputs=max(N_INPUTS, 1 + width)))
         except InputError:
             return None
 
@@ -151,6 +158,12 @@ class EventFunction:
                     )
                 values.append(found)
         return values
+
+
+def _are_alike(values: Sequence[float], others: Sequence[float]) -> bool:
+    scale = _AGREEMENT * max(map(abs, others))
+    # Equal infinite values have no difference.
+    return all(x == y or abs(x - y) <= scale for x, y in zip(values, others, strict=True))
 
 
 def event_functions(

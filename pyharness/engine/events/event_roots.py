@@ -25,8 +25,11 @@ TO_COEFFICIENTS = to_coefficients(NODES)
 _MOST_DIVISIONS = 50
 # The first coefficient must exceed the bound by this factor, so that rounding never loses an
 # extremum at the end of an interval.
-_MARGIN = 1.001
-_SHORT = 1e-11  # length of the last Newton step
+MARGIN = 1.001
+SHORT = 1e-11  # length of the last Newton step
+# A time counts as exact if the sign changes within so many of its rounding errors.
+EXACT = 8.0
+WIDER = 16.0  # factor on the half width of an interval, until the sign changes in it
 # Largest error of a polynomial, relative to its largest value on the interval.
 FIT_ERROR = 4e-13
 
@@ -39,7 +42,7 @@ def _transforms() -> tuple[Array, Array, Array]:
     return slope, left, right
 
 
-_DERIVATIVE, _LEFT, _RIGHT = _transforms()
+_DERIVATIVE, LEFT, RIGHT = _transforms()
 _AT_ONCE = 256  # rows; for many more, the linear algebra library would start threads
 _ORDERS = np.arange(NODES)
 
@@ -170,7 +173,7 @@ def isolated(fits: Fits) -> Roots:
         low, high = ends.reshape(-1, 2).T
         values = np.column_stack([first[split], centre, centre, last[split]])
         first, last = values.reshape(-1, 2).T
-        c = np.stack([c[split] @ _LEFT.T, c[split] @ _RIGHT.T], axis=1).reshape(-1, NODES)
+        c = np.stack([c[split] @ LEFT.T, c[split] @ RIGHT.T], axis=1).reshape(-1, NODES)
     if not found:
         return joined([])
     c, low, high, sign, middle, half, number = map(np.concatenate, zip(*brackets, strict=True))
@@ -182,7 +185,7 @@ def isolated(fits: Fits) -> Roots:
 
 def _has_no_root(coefficients: Array) -> Array:
     c = np.abs(coefficients)
-    found: Array = c[:, 0] > _MARGIN * c[:, 1:].sum(axis=1)
+    found: Array = c[:, 0] > MARGIN * c[:, 1:].sum(axis=1)
     return found
 
 
@@ -211,7 +214,7 @@ def _bracketed(c: Array, low: Array, high: Array, sign: Array) -> Array:
         moved = np.abs(following - x)
         x = following
         # The error of a Newton step is much smaller than its length.
-        if not (moved > np.where(is_inside, _SHORT, 2e-16)).any():
+        if not (moved > np.where(is_inside, SHORT, 2e-16)).any():
             break
     return x
 

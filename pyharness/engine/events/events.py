@@ -22,25 +22,35 @@ from pyharness.engine.events.event_fits import (
 )
 from pyharness.engine.events.event_functions import EventFunction
 from pyharness.engine.events.event_roots import (
+    EXACT,
     FIT_ERROR,
+    WIDER,
     Index,
     Roots,
     isolated,
     joined,
     may_vanish,
 )
+from pyharness.engine.events.event_search import distinct_roots
 from pyharness.engine.events.event_zeros import zero_intervals
 from pyharness.engine.events.periodic_events import improved, repeat
 from pyharness.model.array_type import Array
 
 _BLOCK = 4_000  # polynomials whose roots are isolated together
 _POLISHES = 3
-# A time counts as exact if the sign changes within so many of its rounding errors.
-_EXACT = 8.0
-_WIDER = 16.0  # factor on the half width of an interval, until the sign changes in it
 
 
 def event_roots(g: EventFunction, solution: Solution) -> Roots:
+    roots = distinct_roots(g, solution)
+    if roots is None:
+        return _all_roots(g, solution)
+    if solution.sol.states is solution.pieces or not roots.time.size:
+        return roots
+    with np.errstate(all="ignore"):
+        return replace(roots, time=_beyond(g, solution, roots.time, roots.change, roots.noise))
+
+
+def _all_roots(g: EventFunction, solution: Solution) -> Roots:
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         fits, rough, changes = fitted(g, solution)
         kept = may_vanish(fits)
@@ -137,7 +147,7 @@ def _bisect(
     bounds = np.concatenate([ends[:1], 0.5 * times[:-1] + 0.5 * times[1:], ends[1:]])
     piece = np.clip(np.searchsorted(edges, times) - 1, 0, len(edges) - 2)
     rounding = np.spacing(np.abs(times)) + np.spacing(edges[piece + 1] - edges[piece])
-    found, width = times.copy(), _EXACT * rounding
+    found, width = times.copy(), EXACT * rounding
     wide = np.flatnonzero(changes)
     low, high = times.copy(), times.copy()
     open_ones: list[Index] = []
@@ -147,11 +157,11 @@ def _bisect(
         ends = np.concatenate([low[wide], high[wide]])
         before, after = values(ends).reshape(2, -1) * changes[wide]
         has_change = (before < 0.0) & (after > 0.0)
-        is_exact = (width[wide] <= _EXACT * rounding[wide]) & ~is_short[wide]
+        is_exact = (width[wide] <= EXACT * rounding[wide]) & ~is_short[wide]
         open_ones.append(wide[has_change & ~is_exact])
         is_whole = (low[wide] == bounds[wide]) & (high[wide] == bounds[wide + 1])
         wide = wide[~(has_change | is_whole)]
-        width[wide] *= _WIDER
+        width[wide] *= WIDER
     k = np.concatenate(open_ones) if open_ones else wide
     while k.size:
         middle = 0.5 * low[k] + 0.5 * high[k]
@@ -247,6 +257,8 @@ def _chosen(roots: Roots, group: Index, change: int, ends: tuple[float, ...]) ->
 def side_events(g: EventFunction, solution: Solution, roots: Roots, side: int) -> Roots:
     """Return the events after (`side` 1) or before (-1) time 0, in order away from 0."""
     end = solution.pieces.edges[-1 if side > 0 else 0]
+    if not roots.time.size or end == 0.0:
+        return joined([])
     # A root at time 0, where the integration starts, is no event.
     roots = roots.only(side * roots.time > 0.0).only(slice(None, None, side))
     time, change, lasting = (side * x for x in (roots.time, roots.change, roots.lasting))

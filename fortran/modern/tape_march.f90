@@ -69,6 +69,7 @@ module tape_march
     ! Largest of a row or node before it was subtracted; relative, or rad.
     real(dp) :: error = 0.0_dp
     real(dp) :: least = 0.0_dp  ! lower bound, for estimates that are too small
+    real(dp) :: unseen = 0.0_dp ! sum of squares of what the estimates of truncation may lack
     real(dp) :: growth = 1.0_dp ! error amplification until any requested time
     real(dp) :: noise = 0.0_dp  ! rounding error of all steps, in units, relative
     real(dp) :: blur = 0.0_dp   ! the same, amplified until any requested time
@@ -118,6 +119,7 @@ contains
     real(dp) :: nearly                        ! relative distance from a switch: a touch
     logical :: has_singular ! whether an operation has a point without a Taylor series
     logical :: is_long                        ! whether the step is not one of the series
+    real(dp) :: unseen      ! what the estimate of truncation may lack, relative
     type(long_step_t) :: long_step
     real(dp) :: next_try    ! step of a series from which on a longer step is tried, s
     logical :: was_singular ! whether the last step began where no series converges
@@ -308,6 +310,7 @@ contains
         end if
       else
         call take_error(x, s, factor, e)
+        found%unseen = found%unseen + unseen**2
         if (switches%n > 0) call cross()
       end if
       found%steps = found%steps + 1
@@ -525,8 +528,8 @@ contains
       !! there are those of the series. A pulse within the step may be too small to be seen at its
       !! beginning. The change of the unknowns is computed too.
       real(dp) :: derivatives(tape%n_unknowns), slope(PADDED)
-      real(dp) :: defect(tape%n_unknowns), size_of_terms(PADDED), rounded, allowed
-      real(dp) :: reached, cancelled
+      real(dp) :: left(tape%n_unknowns), defect(tape%n_unknowns), size_of_terms(PADDED)
+      real(dp) :: rounded, allowed, reached, cancelled
       integer :: i
 
       call sum_terms(s%arrays, s%order, factor, change, slope, size_of_terms)
@@ -546,10 +549,12 @@ contains
       call derivatives_at(live, t_next, x%y + (change(:x%n) + x%y_low), -s%h, s, derivatives)
       rates = derivatives
       allowed = MOST_DEFECT*local_tolerance + MOST_ROUNDING*epsilon(rounded)*rounded
-      defect = x%weights*abs(factor*s%h*derivatives - slope(:x%n))
+      left = factor*s%h*derivatives - slope(:x%n)
+      defect = x%weights*abs(left)
       ! NaN is not allowed.
       is_continued = all(defect <= allowed)
       if (is_continued) found%least = max(found%least, maxval(defect)/(s%order + 1))
+      unseen = maxval(x%weights*abs(left/(s%order + 1) - e%left))
     end function is_continued
 
     subroutine end_at_switch()

@@ -115,7 +115,7 @@ contains
     blurred = ROUNDING*(outcome%growth + outcome%blur)
     solution%steps = outcome%steps
     ! The propagated error may be small by chance at the end, although perturbations grew before.
-    error = outcome%least*sqrt(outcome%growth)
+    error = max(outcome%least*sqrt(outcome%growth), sqrt(outcome%unseen)*outcome%growth)
     if (blurred <= UNSURE*request%tolerance) error = max(error, FITTED*outcome%error)
     solution%error = max(outcome%error, min(error, UNSURE*request%tolerance)) + blurred
     solution%error = solution%error + solution%between

@@ -90,6 +90,7 @@ contains
     real(dp) :: spent   ! steps of all integrations so far
     real(dp) :: growth
     real(dp) :: error    ! error of this integration, as far as it is known, relative
+    real(dp) :: least    ! lower bound of the error
     real(dp) :: blurred  ! by rounding at the end, relative
     logical :: too_coarse ! whether the motion is too long for variations that are not precise
     logical :: again    ! whether the amplification is known too coarsely
@@ -163,7 +164,9 @@ contains
     else
       error = 0.0_dp
     end if
-    error = error + (max(outcome%error, min(outcome%least, UNSURE*request%tolerance)) + blurred)
+    least = outcome%least
+    if (outcome%unseen > 0.0_dp) least = max(least, outcome%unseen*growth)
+    error = error + (max(outcome%error, min(least, UNSURE*request%tolerance)) + blurred)
     solution%error = error
     solution%growth = growth
     solution%spent = spent

@@ -15,6 +15,8 @@ module taylor_error
   integer, parameter :: FIRST_LOOKS = 16, STEPS_BETWEEN_LOOKS = 128
   real(dp), parameter :: RIDGE = 1.001_dp   ! makes the fit work for one pole or none
   real(dp), parameter :: LEAST = tiny(1.0_dp)
+  real(dp), parameter :: LEAST_SUM = 0.01_dp ! of the geometric series of a fit
+  real(dp), parameter :: MOST_RATIO = 0.7_dp ! of a term to the one before it, in an error
   real(dp), parameter :: FIRST(4) = [1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp] ! selects the first lane
   real(dp), parameter :: WORTH_A_LOOK = 1e6_dp ! amplification from which all blocks are checked
   ! A larger norm or error would have no further meaning. The square of a product of two such
@@ -62,7 +64,7 @@ contains
     blocks%steps_a_block = merge(STEPS_IN_FINE_BLOCK, STEPS_IN_BLOCK, precise)
   end subroutine begin
 
-  pure subroutine estimate_truncation(s, order, unit, left)
+  pure subroutine estimate_truncation(s, order, unit, left, unseen)
     !! Estimate the sum of the terms of omega that a step leaves out. One pair of poles is fitted to
     !! its last four terms by least squares: v(k + 1) = a v(k) - b v(k - 1). The estimate is
     !! subtracted from the error in lane 1, which is propagated from here on.
@@ -70,9 +72,10 @@ contains
     integer, intent(in) :: order
     real(dp), intent(in) :: unit       !! brings the terms near 1, s/rad
     real(dp), intent(out) :: left(4)   !! truncation error, rad/s
+    real(dp), intent(inout) :: unseen  !! sum of squares of what the estimates may lack, rad2/s2
     real(dp), dimension(4) :: uu, vv, uv, ux, vx ! products of the terms
-    real(dp) :: x, u, v, w
-    real(dp) :: a, b
+    real(dp) :: x, u, v, w, apart(4)
+    real(dp) :: a, b, p, q, ratio
     integer :: i
 
     do i = 1, 4
@@ -91,6 +94,14 @@ contains
     do i = 1, 4
       left(i) = a*s%terms(i, order) - b*s%terms(i, order - 1)
     end do
+    ! Further terms differ from the fit as the last one does.
+    p = (a + b)/max(LEAST_SUM, 1.0_dp + a)
+    q = b/max(LEAST_SUM, 1.0_dp + a)
+    do i = 1, 4
+      apart(i) = (s%terms(i, order) - p*s%terms(i, order - 1) + q*s%terms(i, order - 2))**2
+    end do
+    ratio = min(MOST_RATIO, sqrt(p*p + abs(q)))
+    unseen = unseen + ((apart(1) + apart(2)) + apart(3))*(ratio/(1.0_dp - ratio))**2
     do i = 1, 4
       s%lanes(i, 1) = s%lanes(i, 1) - FIRST(i)*left(1)
       s%lanes(i, 2) = s%lanes(i, 2) - FIRST(i)*left(2)

@@ -210,7 +210,7 @@ contains
         else
           call propagate_variations(s)
         end if
-        call estimate_truncation(s, order, 1.0_dp/max(allowed, tiny(h)), left)
+        call estimate_truncation(s, order, 1.0_dp/max(allowed, tiny(h)), left, found%unseen)
         if (found%steps < FEW_STEPS) then
           from_rest = found%steps == 0 .and. .not. maxval(abs(request%omega)) > 0.0_dp
           if (from_rest) then
@@ -290,6 +290,7 @@ contains
       if (.not. maxval(abs(s%lanes(1, :))) <= found%error) found%error = maxval(abs(s%lanes(1, :)))
       if (now%scale > 0.0_dp) then
         found%error = found%error/now%scale
+        found%unseen = sqrt(found%unseen)/now%scale
         found%least = max(found%least, BY_CHANCE*(now%peak/now%scale))
       end if
       if (with_attitude) then

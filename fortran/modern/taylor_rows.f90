@@ -51,6 +51,7 @@ module taylor_rows
     logical :: finest    ! whether the local tolerance is the smallest
     real(dp) :: way      ! further factor for the attitude, which an error of omega keeps rotating
     real(dp) :: scale = 0.0_dp ! largest |omega|, rad/s
+    real(dp) :: unseen = 0.0_dp ! what all estimates of truncation may lack, relative
   end type outcome_t
 
   public :: add_last_row, add_nodes, add_rows

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import pyharness.engine.methods.sensitivity as room
-from pyharness import Scene, case_scene, prepare, run_program, solve, solve_many, subset
+from pyharness import Scene, TorqueLaw, case_scene, prepare, run_program, solve, solve_many, subset
 from pyharness.engine.methods import taylor
 from pyharness.engine.methods.sensitivity import is_sensitive, motion_growth
 from pyharness.engine.prepared import solver as solver_module
@@ -214,3 +214,40 @@ def test_what_overflows_in_the_units_of_the_scene_has_no_error() -> None:
     slower, lost = (unscaled(found, [1.0], factor) for factor in (2.0, 1e-100))
     assert (slower.ended, slower.error, slower.growth) == ("complete", 1e-9, 2.0)
     assert (lost.ended, lost.error, lost.growth) == ("overflow", None, None)
+
+
+def fast_scene(kind: str, rng: np.random.Generator) -> Scene:
+    """Return a scene under fast waves: the last terms of a series alternate, and show little."""
+    moments = tuple(np.sort(rng.uniform(1.0, 2.0, 3)).tolist())
+    omega = tuple((rng.normal(size=3) * 10.0 ** rng.uniform(-0.5, 1.0)).tolist())
+    a, b = (10.0 ** rng.uniform(-0.5, 1.6, 2)).tolist()
+    size, other, last = rng.normal(size=(3, 3)).tolist()
+    if kind == "law":
+        law = TorqueLaw(sines=[(tuple(size), a), (tuple(other), b)])
+        return Scene("", omega, moments, torque=law)
+
+    def torque(t: Any, w: Any) -> Any:
+        wave = np.exp(np.sin(a * t))
+        return [0.1 * size[0] * wave, -0.2 * np.tanh(w[0]), 0.1 * last[0] * np.cos(b * t)]
+
+    return Scene("", omega, moments, torque=torque, attitude=(1.0, 0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("kind", ["law", "recorded"])
+def test_errors_under_fast_waves_are_stated(kind: str) -> None:
+    rng = np.random.default_rng(20261201)
+    below = 0
+    for _ in range(60 if kind == "law" else 25):
+        scene, time = fast_scene(kind, rng), float(10.0 ** rng.uniform(0.3, 1.8))
+        found = solve(scene, time, tolerance=float(10.0 ** rng.uniform(-10.0, -6.0)))
+        truth = solve(scene, time, tolerance=1e-14)
+        assert found.error is not None
+        assert truth.error is not None
+        scale = max(np.abs(found.omega).max(), np.abs(scene.omega).max())
+        error = np.abs(found.omega - truth.omega).max() / scale
+        if found.attitude is not None and truth.attitude is not None:
+            error = max(error, 2.0 * np.linalg.norm(found.attitude - truth.attitude))
+        stated = found.error + truth.error
+        assert error <= 1.5 * stated
+        below += error > stated
+    assert below <= 1

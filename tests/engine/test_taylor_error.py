@@ -58,8 +58,9 @@ def test_error_is_known_and_taken_off(untaken: as_written.Solve) -> None:
         left.append(of.truth.error(found.omega[-1]) / error)
         held.append(of.truth.error(found.omega[-1]) / of.tolerance)
     assert len(measured) > 60
-    assert np.quantile(measured, [0.05, 0.5]) == pytest.approx([0.65, 1.05], rel=0.15)
-    assert np.quantile(measured, 0.75) < 2.0
+    # Stated errors include what the fitted terms may lack.
+    assert np.quantile(measured, [0.05, 0.5]) == pytest.approx([0.9, 2.7], rel=0.15)
+    assert np.quantile(measured, 0.75) < 8.0
     assert np.quantile(left, 0.5) < 0.3
     assert np.quantile(left, 0.75) < 0.8
     assert max(held) < 0.3

@@ -28,6 +28,7 @@ from pyharness.engine.prepared.ends import keep_end, kept_end
 from pyharness.engine.problem.problem import Problem, problem_of
 from pyharness.engine.problem.rescaled import integrate, is_ordinary, rescaling_factor, scaled
 from pyharness.engine.problem.sides import in_reverse, joined
+from pyharness.engine.start_time import solve_from_zero
 from pyharness.engine.steps.stepped import with_reason
 from pyharness.engine.system.switch_text import with_text
 from pyharness.model.array_type import Array
@@ -138,6 +139,15 @@ def solve(
     method = known("method", method, METHODS)
     asked = method
     attitude = computes_attitude(scene, method, attitude)
+    if scene.t0:
+        functions = None if events is None else event_functions(events, attitude, scene.states)
+        values, turned = ascending_times(times)
+        again = partial(
+            solve, method=method, tolerance=tolerance, effort=effort, attitude=attitude,
+            dense_output=dense_output,
+        )  # fmt: skip
+        ordered = values[::-1] if turned else values
+        return solve_from_zero(scene, ordered, functions, sensitivities, again)
     if method == "auto" and is_opaque(scene.torque):
         method = "dop853"
     chosen = METHODS[method]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.model.errors import InputError
+from pyharness.model.errors import InputError, TimedError
 from pyharness.model.values import Matrix, Numbers, Triple, finite, number_list, triple
 
 Polynomial = tuple[float, ...]  # coefficients in ascending powers of time
@@ -99,9 +99,10 @@ class Changing:
         for time in times:
             if not first < time < last:
                 zero = first if time < 0.0 else last
-                raise InputError(
-                    f"[body] {self.place}: a principal moment reaches 0 at t = {zero:g} s, and the "
-                    f"time {time:g} s is not before it; allowed: times between 0 and {zero:g} s"
+                raise TimedError(
+                    f"[body] {self.place}: a principal moment reaches 0 at t = {{time}} s; "
+                    "allowed: times before it",
+                    zero,
                 )
 
 

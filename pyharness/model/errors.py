@@ -53,6 +53,9 @@ class TimedError(InputError):
     def slower(self, factor: float) -> "TimedError":
         return type(self)(self._message, self.time * factor)
 
+    def later(self, by: float) -> "TimedError":
+        return TimedError(self._message, self.time + by)
+
 
 class WorkLimitError(TimedError):
     pass

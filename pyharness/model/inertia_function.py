@@ -11,7 +11,7 @@ from pyharness.model.array_type import Array
 from pyharness.model.called_function import called_once
 from pyharness.model.changing import Changing
 from pyharness.model.dual import with_derivatives
-from pyharness.model.errors import InputError
+from pyharness.model.errors import InputError, TimedError
 from pyharness.model.expressions import text_components
 from pyharness.model.symbols import SYMBOLS, Recorder, Symbol, recorded_twice
 from pyharness.model.tape import N_INPUTS, TIME, Table, Tape, evaluate, float_outputs, slots_of
@@ -84,9 +84,10 @@ class InertiaFunction(Changing):
             tried = np.linspace(0.0, end, _CHECKED + 1)
             for time, least in zip(tried, self._least(tried), strict=True):
                 if not least > 0.0:
-                    raise InputError(
+                    raise TimedError(
                         f"[body] {self.place}: a principal moment is {least:g} kg m2 at t = "
-                        f"{time:g} s; allowed: moments above 0 at all times of the solution"
+                        "{time} s; allowed: moments above 0 at all times of the solution",
+                        time,
                     )
 
     def _least(self, times: Array) -> Array:

@@ -26,6 +26,7 @@ def scene_record(scene: Scene) -> dict[str, Any]:
         "initial": {
             "omega": list(scene.omega),
             **({} if scene.attitude is None else {"attitude": list(scene.attitude)}),
+            **({"t0": scene.t0} if scene.t0 else {}),
         },
         "torque": _torque(scene.torque),
         "run": {"step_size": scene.step_size, "steps": scene.steps},

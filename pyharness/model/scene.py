@@ -20,6 +20,7 @@ from pyharness.model.values import (
     Matrix,
     Number,
     Numbers,
+    finite,
     integer,
     number,
     three,
@@ -61,6 +62,10 @@ CHANGING = (
 OWN_STATES = (
     "the scene has states of its own; allowed for it: Stepper, and, with the methods auto and "
     "taylor, solve, solve_many with one scene, and the verbs run and plan"
+)
+STARTS_LATER = (
+    "the scene begins at t0 = {t0} s; allowed: 0; for other times: solve, solve_many, Stepper, and "
+    "the verb run --method"
 )
 SPACE_TORQUE = (
     "the torque is about the axes of space; allowed: a torque about the axes of the body, or the "
@@ -131,6 +136,9 @@ class Scene:
         printed in the thesis.
     case : int, optional
         The number of the case in Table 1 of the thesis.
+    t0 : float
+        The time of the initial state (s), which other descriptions call time 0. Torque and inertia
+        remain functions of the true time. `Trajectory.scene_at` returns such scenes.
 
     Raises
     ------
@@ -160,6 +168,7 @@ class Scene:
     masses: Triple = field(default_factory=lambda: tuple(facts("cases")["deck"]["masses"]))
     forces: Triple = field(default_factory=lambda: tuple(facts("cases")["deck"]["forces"]))
     case: int | None = None
+    t0: float = 0.0
     # Norm of the attitude before normalisation.
     attitude_length: float = field(default=1.0, init=False, compare=False, repr=False)
 
@@ -182,6 +191,7 @@ class Scene:
             masses: Numbers = ...,
             forces: Numbers = ...,
             case: SupportsIndex | None = None,
+            t0: Number = 0.0,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -248,6 +258,7 @@ class Scene:
         self._set("forces", three("forces", self.forces))
         if self.case is not None:
             self._set("case", integer("case", self.case))
+        self._set("t0", finite("[initial] t0", self.t0))
         _warn_of_impossible(self)
 
     def __repr__(self) -> str:
@@ -335,7 +346,7 @@ class Scene:
         """
         moments, inertia = self.moments, self.inertia
         if self.changing is not None:
-            at_start: Any = self.changing.at(0.0)
+            at_start: Any = self.changing.at(self.t0)
             moments, inertia = (at_start, None) if self.changing.is_diagonal else (None, at_start)
         if inertia is not None:
             from pyharness.model.inertia import principal_frame
@@ -422,7 +433,7 @@ def _size(steps: int, limit: int) -> str:
 
 def any_scene(scene: object) -> Scene:
     return checked_scene(
-        scene, any_axes=True, any_torque=True, any_state=True, changing=True, states=True
+        scene, any_axes=True, any_torque=True, any_state=True, changing=True, states=True, t0=True
     )
 
 
@@ -434,9 +445,12 @@ def checked_scene(
     any_state: bool = False,
     changing: bool = False,
     states: bool = False,
+    t0: bool = False,
 ) -> Scene:
     """Return `scene`; raise InputError unless it is a Scene that the flags allow."""
     if isinstance(scene, Scene):
+        if scene.t0 and not t0:
+            raise InputError(STARTS_LATER.replace("{t0}", f"{scene.t0:g}"))
         if scene.states and not states:
             raise InputError(OWN_STATES)
         if scene.changing is not None and not changing:

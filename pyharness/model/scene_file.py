@@ -117,6 +117,8 @@ def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
     lines += ["[initial]", f"omega = {list(scene.omega)}"]
     if scene.attitude is not None:
         lines.append(f"attitude = {list(scene.attitude)}")
+    if scene.t0:
+        lines.append(f"t0 = {scene.t0!r}")
     lines += torque
     lines += ["[run]", f"step_size = {scene.step_size!r}", f"steps = {scene.steps}"]
     text = "\n".join(lines) + "\n"

@@ -4,16 +4,20 @@ import math
 import textwrap
 from dataclasses import dataclass, fields, is_dataclass
 from html import escape
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.model.array_type import Array as Array
 from pyharness.model.attitude import turned_to_space as turned_to_space
+from pyharness.model.continued import scene_at
 from pyharness.model.conversions import Conversions
 from pyharness.model.extension import ENDS
 from pyharness.model.report import counted, short
+
+if TYPE_CHECKING:
+    from pyharness.model.scene import Scene
 
 # Largest relative rounding error in binary64.
 ROUNDING = 2.0**-53
@@ -192,6 +196,34 @@ class Trajectory(Conversions):
         if self.own is None or self.scene is None:
             return {}
         return {each.name: self.own[:, k] for k, each in enumerate(self.scene.states)}
+
+    def scene_at(self, time: float | None = None) -> "Scene":
+        """Return the scene with `time` as its `t0`, to be continued, with the state at this time.
+
+        Parameters
+        ----------
+        time : float, optional
+            The time (s) of a row or an event, or with dense output any of its times; by default
+            that of a terminal event, else of the last row.
+
+        Returns
+        -------
+        Scene
+            A copy of `scene`. An event at its `t0` is not found again.
+
+        Raises
+        ------
+        InputError
+            If the state at this time is unknown, or `solve` did not make the trajectory.
+
+        Examples
+        --------
+        >>> from pyharness import case_scene, solve
+        >>> first = solve(case_scene(1), 1.0)
+        >>> solve(first.scene_at(), 2.0).omega
+        array([[6., 6., 6.]])
+        """
+        return scene_at(self, time)
 
     @property
     def success(self) -> bool:

@@ -20,8 +20,8 @@ from pyharness.engine.methods.sensitivity import motion_growth
 from pyharness.engine.plan.registry import (
     METHODS,
     SCIPY_METHODS,
-    check_attitude,
     check_torque,
+    computes_attitude,
     requested_tolerance,
 )
 from pyharness.engine.steps.from_rows import attitude_from_rows
@@ -181,7 +181,7 @@ def compare_methods(
     *,
     tolerance: float | None = None,
     effort: float = 1.0,
-    attitude: bool = False,
+    attitude: bool | None = None,
 ) -> Comparison:
     """Compare methods on one scene with each other and with the reference solution.
 
@@ -197,8 +197,9 @@ def compare_methods(
         in `solve`. Methods with a fixed step ignore it.
     effort : float
         Factor on the work limits of the methods and the reference.
-    attitude : bool
-        Whether attitudes are compared too; always if the torque depends on them.
+    attitude : bool, optional
+        Whether attitudes are compared too. By default they are if the torque needs them, or the
+        scene has one, and all methods can compute them.
 
     Returns
     -------
@@ -220,10 +221,8 @@ def compare_methods(
     ()
     """
     checked_scene(scene, any_state=True)
-    attitude = boolean("attitude", attitude)
     if not are_several(methods):
         raise InputError(f"methods is {kind_of(methods)}; allowed: a list, as in ['auto', 'rk45']")
-    attitude = attitude or scene.torque.needs_attitude
     effort = checked_effort(effort)
     tolerances = {}
     for given in methods:
@@ -236,10 +235,11 @@ def compare_methods(
         tolerances[name] = found
     if not tolerances:
         raise InputError(f"methods: the list is empty; allowed: {', '.join(METHODS)}")
+    if attitude is None:
+        attitude = all(computes_attitude(scene, name, None) for name in tolerances)
     for name in tolerances:
+        attitude = computes_attitude(scene, name, attitude)
         check_torque(scene, name, attitude)
-        if attitude:
-            check_attitude(name)
     scene = replace(scene, attitude=(scene.attitude or IDENTITY) if attitude else None)
     truth = reference(scene, scene.times(), effort=effort)
     return _with_methods(scene, None, truth, (), tolerances, effort)

@@ -78,7 +78,8 @@ def _methods(options: argparse.Namespace) -> int:
     scene = shared.chosen_scene(options, any_state=True)
     shared.check_outputs(options)
     tolerance, effort = shared.chosen_tolerance(options), shared.chosen_effort(options)
-    more: dict[str, Any] = {"tolerance": tolerance, "effort": effort, "attitude": options.attitude}
+    more: dict[str, Any] = {"tolerance": tolerance, "effort": effort}
+    more["attitude"] = options.attitude or None
     found = compare_methods(scene, shared.names(options.method), **more)
     return _show(options, found)
 

@@ -63,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
     if options.scene is not None and options.program is None and options.method is None:
         options.method = "auto"
     by_method = options.method is not None
-    kinds = ("any_axes", "any_torque", "any_state", "changing", "states")
+    kinds = ("any_axes", "any_torque", "any_state", "changing", "states", "t0")
     scene = shared.chosen_scene(options, **dict.fromkeys(kinds, by_method))
     if (options.program is None) == (options.method is None):
         from pyharness.engine.plan.registry import METHODS

@@ -13,7 +13,7 @@ from pyharness.engine.system.recorded import outputs_at
 from pyharness.model.arguments import count_inputs, has_signature
 from pyharness.model.array_type import Array
 from pyharness.model.called_function import called_once
-from pyharness.model.errors import InputError, kind_of
+from pyharness.model.errors import InputError, TimedError, kind_of
 from pyharness.model.numpy_protocol import symbol_array
 from pyharness.model.own_states import OwnState
 from pyharness.model.symbols import Recorder
@@ -70,9 +70,10 @@ class EventFunction:
             found = np.array(self._of_each(*given))
         if not np.isfinite(found).all():
             wrong = np.flatnonzero(~np.isfinite(found))
-            raise InputError(
-                f"{self.name}: the function returned {found[wrong[0]]:g} at t = "
-                f"{times[wrong[0]]:g} s; allowed: finite numbers"
+            raise TimedError(
+                f"{self.name}: the function returned {found[wrong[0]]:g} at t = {{time}} s; "
+                "allowed: finite numbers",
+                times[wrong[0]],
             )
         return found
 
@@ -152,9 +153,10 @@ class EventFunction:
                 if not isinstance(found, float):
                     found = converted(found)
                 if isinstance(found, str):
-                    raise InputError(
-                        f"{self.name}: the function returned {found} at t = {time:g} s; "
-                        "allowed: a number"
+                    raise TimedError(
+                        f"{self.name}: the function returned {found} at t = {{time}} s; "
+                        "allowed: a number",
+                        time,
                     )
                 values.append(found)
         return values

@@ -5,6 +5,7 @@ The result of a body is bit for bit independent of other bodies, their order and
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from pyharness.engine.many.many_details import prepare_details
 from pyharness.engine.many.many_law_scenes import choose_kernel, solve_laws
 from pyharness.engine.many.many_mistakes import reasons_of
 from pyharness.engine.many.many_recorded import NO_ATTITUDE, needs_equations, solve_recorded
+from pyharness.engine.many.many_start_times import solve_many_from_zero, starts_later
 from pyharness.engine.plan.registry import PREPARED
 from pyharness.engine.prepared.many_scenes import (
     BODIES,
@@ -167,6 +169,13 @@ def solve_many(
     if not isinstance(scene, Scene):
         scenes: Any = number_list("scene", scene, "allowed: a Scene, or a list of scenes")
         scene = list(scenes)
+    if starts_later(scene):
+        again = partial(
+            solve_many, **arrays, parameters=parameters, states=states, method=method,
+            tolerance=tolerance, step=step, effort=effort, estimates=estimates, compiled=compiled,
+            sensitivities=sensitivities, threads=threads, out=out, progress=progress,
+        )  # fmt: skip
+        return solve_many_from_zero(scene, t_end, times, events, again)
     if not only_one({"t_end": t_end, "times": times}):
         raise InputError("neither t_end nor times is given; give one of them")
     rows = None

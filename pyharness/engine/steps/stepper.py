@@ -48,7 +48,7 @@ class Stepper:
     Attributes
     ----------
     time : float
-        The time (s); 0 at first.
+        The time (s); at first `Scene.t0`.
     omega : ndarray, shape (3,)
         The angular velocity (rad/s). It may be set.
     attitude : ndarray, shape (4,), or None
@@ -77,9 +77,10 @@ class Stepper:
     >>> wheel = Stepper(Scene("wheel", (0.0, 0.0, 2.0), moments=(1.0, 1.0, 2.0)))
     >>> wheel.held_torque = (0.0, 0.0, -0.5)
     >>> while wheel.omega[2] > 1.0 + 1e-6:
-    ...     wheel.until(wheel.time + 0.25)
+    ...     _ = wheel.until(wheel.time + 0.25)
     >>> wheel.held_torque = (0.0, 0.0, 0.0)
     >>> wheel.until(10.0)
+    10.0
     >>> wheel.omega.round(6)
     array([0., 0., 1.])
     """
@@ -94,9 +95,10 @@ class Stepper:
     def __init__(
         self, scene: Scene, tolerance: float = _DEFAULT, *, attitude: bool | None = None
     ) -> None:
-        wants = any_scene(scene).has_attitude
+        self._time = self._begin = any_scene(scene).t0
+        wants = scene.has_attitude
         attitude = wants if attitude is None else boolean("attitude", attitude)
-        self._time, self._begin, self._steps = 0.0, 0.0, 0
+        self._steps = 0
         self._tolerance = tolerance_of(tolerance, FINEST)
         if not FINEST <= self._tolerance <= 1.0:
             raise InputError(f"tolerance is {self._tolerance:g}; allowed: {FINEST:g} to 1")
@@ -108,9 +110,13 @@ class Stepper:
         self._state[:3] = scene.omega
         if attitude:
             self._state[3:7] = unit_quaternion("attitude", scene.attitude or IDENTITY)[0]
-        self._origin = [0.0, *self._state.tolist()]
+        self._origin = [self._time, *self._state.tolist()]
         self._trial, self._largest = LONGEST_TRIAL, 0.0
         self._last = Step(0.0, 0.0, self._state[None], self._state)
+
+    def __repr__(self) -> str:
+        steps = f"{self._steps} step{'' if self._steps == 1 else 's'}"
+        return f"<Stepper of '{self._scene.name}' at t = {self._time:g} s after {steps}>"
 
     @property
     def time(self) -> float:
@@ -263,8 +269,8 @@ class Stepper:
         except ArithmeticError:
             return np.zeros(len(self._state))
 
-    def until(self, time: float) -> None:
-        """Take steps to `time` (s), later or earlier.
+    def until(self, time: float) -> float:
+        """Take steps to `time` (s), later or earlier, and return the new time (s).
 
         Raise InputError as `step` does, or if more than 1e8 steps would be needed.
         """
@@ -277,6 +283,7 @@ class Stepper:
                     f"time is {end:g} s; allowed: times that 1e8 steps reach; {taken} steps "
                     f"reached {self._time:g} s"
                 )
+        return self._time
 
     def at(self, times: float | Sequence[float] | Array) -> Array:
         """Return the state at times (s) within the last step, without changes made after it.

@@ -263,12 +263,8 @@ def _torque(
             setattr(law, name, waves)
         return body_torque(law, time, q)
     if any(f"torque.{name}" in given for name, _ in part.constants):
-        constants = dict(zip(part.own, own, strict=True))
-        constants |= {name: given.get(f"torque.{name}", [x])[0] for name, x in part.constants}
-        places = [f"[torque] expression {k}" for k in (1, 2, 3)]
-        places += [f"[states.{name}] rate" for name in part.own]
-        texts = dict(zip(places, part.expression, strict=True))
-        return np.array(components(texts, (time, *omega, *q), constants), dtype=object)
+        constants = {name: given.get(f"torque.{name}", [x])[0] for name, x in part.constants}
+        return _of_expression(part, (time, *omega, *q), own, constants)
     others = [(f"torque.{name}", value) for name, value in part.parameters]
     if part.varied is not None and any(name in given for name, _ in others):
         numbers = [given.get(name, [value])[0] for name, value in others]
@@ -276,6 +272,26 @@ def _torque(
         return np.array(evaluate(part.varied, inputs, SYMBOLS), dtype=object)
     assert part.tape is not None
     return torque_of(part.tape, time, omega, q, *own)
+
+
+def _of_expression(
+    torque: StateTorque, inputs: Sequence[Any], own: Sequence[Any], constants: Mapping[str, Any]
+) -> Any:
+    places = [f"[torque] expression {k}" for k in (1, 2, 3)]
+    places += [f"[states.{name}] rate" for name in torque.own]
+    texts = dict(zip(places, torque.expression, strict=True))
+    values = {**dict(zip(torque.own, own, strict=True)), **constants}
+    return np.array(components(texts, inputs, values), dtype=object)
+
+
+def varied_expression(torque: StateTorque) -> Tape:
+    """Return the torque of a scene file's expressions, with its constants as further inputs."""
+    first = N_INPUTS + len(torque.own)
+    recorder = Recorder(MOST_OPERATIONS, first + len(torque.constants))
+    inputs = list(recorder.inputs())
+    constants = dict(zip(dict(torque.constants), inputs[first:], strict=True))
+    given = inputs[:N_INPUTS], inputs[N_INPUTS:first]
+    return recorder.tape(list(_of_expression(torque, *given, constants)))
 
 
 def _rates(

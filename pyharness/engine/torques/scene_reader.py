@@ -24,7 +24,7 @@ from pyharness.model.torque_law import TorqueLaw
 _TEXTS = ("expression", "constants")
 SCENE_TABLES = {
     "body": ("moments", "coefficients", "inertia"),
-    "initial": ("omega", "attitude", "angles_deg", "sequence"),
+    "initial": ("omega", "attitude", "angles_deg", "sequence", "t0"),
     "torque": ("constant", "rate", "sines", "cosines", "frame", *_TEXTS, "terms"),
     "run": ("step_size", "steps"),
 }
@@ -102,6 +102,7 @@ def scene_of(data: dict[str, Any], default_name: str) -> Scene:
         attitude=_attitude(initial),
         states=states,
         torque=_torque(tables["torque"], body, rates),
+        t0=initial.get("t0", 0.0),
         **body,
         **run,
     )

@@ -66,13 +66,15 @@ def wheel(session: nox.Session, versions: str) -> None:
 
 @nox.session
 def types(session: nox.Session) -> None:
-    """Check and run a user's script with the types that the wheel has."""
+    """Check and run users' scripts with the types that the wheel has."""
     session.install(f"{the('whl')}[plots,edition]")
     session.chdir(session.create_tmp())
-    script = shutil.copy(ROOT / "tests/user_script.py", ".")
+    given = [ROOT / "tests/user_script.py", *(ROOT / "tests/user_scripts").glob("[a-z]*.py")]
+    scripts = [shutil.copy(each, ".") for each in given]
     options = f"--strict --config-file= --cache-dir=c --python-executable={session.bin}/python"
-    session.run(sys.executable, "-m", "mypy", *options.split(), script, external=True)
-    session.run("python", script)
+    session.run(sys.executable, "-m", "mypy", *options.split(), *scripts, external=True)
+    for script in scripts:
+        session.run("python", script)
 
 
 @nox.session

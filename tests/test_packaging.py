@@ -4,6 +4,7 @@ import ast
 import inspect
 import json
 import re
+import runpy
 import shutil
 import subprocess
 import sys
@@ -11,6 +12,7 @@ import sysconfig
 import tomllib
 import venv
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,6 +25,7 @@ from pyharness.model.facts import facts
 
 ROOT = Path(__file__).parent.parent
 SCRIPT = ROOT / "tests/user_script.py"
+SCRIPTS = sorted((ROOT / "tests/user_scripts").glob("[a-z]*.py"))
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
 # Each line is refused when it runs, and a type checker finds the mistake before.
@@ -83,7 +86,8 @@ def test_types_accept_what_runs_and_refuse_what_does_not(tmp_path: Path) -> None
     mistakes = tmp_path / "mistakes.py"
     names = "Listing, Scene, TorqueLaw, case_scene, prepare, read_scene, solve, subset"
     mistakes.write_text(f"import pyharness; from pyharness import {names}{MISTAKES}")
-    found, text = _mypy(tmp_path, Path(shutil.copy(SCRIPT, tmp_path)), mistakes)
+    scripts = [Path(shutil.copy(each, tmp_path)) for each in (SCRIPT, *SCRIPTS)]
+    found, text = _mypy(tmp_path, *scripts, mistakes)
     lines = mistakes.read_text().splitlines()
     assert found == {("mistakes.py", n) for n in range(2, len(lines) + 1)}, text
 
@@ -99,6 +103,12 @@ def test_what_has_a_wrong_type_is_refused_when_it_runs(mistake: str) -> None:
 def test_the_script_runs(capsys: pytest.CaptureFixture[str]) -> None:
     exec(compile(SCRIPT.read_text(), str(SCRIPT), "exec"), {})
     assert "complete complete custom" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)
+def test_scripts_of_users_run(script: Path, tmp_path: Path, monkeypatch: Any) -> None:
+    monkeypatch.chdir(tmp_path)
+    runpy.run_path(str(script))
 
 
 def test_what_the_package_shows() -> None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pyharness.model.array_type import Maybe
 from pyharness.model.arrays import buffer_of, check_rows, only_one, rows_of, spread
 from pyharness.model.distribution import check_package, checked_axes
 from pyharness.model.errors import InputError, known
@@ -69,14 +70,14 @@ class Ensemble(BatchResult):
     array([ True,  True])
     """
 
-    attitude: Array | None = None
-    estimates: Array | None = None
-    t_events: list[list[Array | None]] | None = field(default=None, repr=False)
-    y_events: list[list[Array | None]] | None = field(default=None, repr=False)
-    sensitivities: dict[str, Array] | None = field(default=None, repr=False)
-    refusals: dict[int, str] | None = field(default=None, repr=False)
-    times: Array | None = None
-    own: Array | None = field(default=None, repr=False)
+    attitude: Maybe[Array] = None
+    estimates: Maybe[Array] = None
+    t_events: Maybe[list[list[Maybe[Array]]]] = field(default=None, repr=False)
+    y_events: Maybe[list[list[Maybe[Array]]]] = field(default=None, repr=False)
+    sensitivities: Maybe[dict[str, Array]] = field(default=None, repr=False)
+    refusals: Maybe[dict[int, str]] = field(default=None, repr=False)
+    times: Maybe[Array] = None
+    own: Maybe[Array] = field(default=None, repr=False)
     names: tuple[str, ...] = ()
     leaves: str | None = field(default=None, repr=False)
 
@@ -90,12 +91,12 @@ class Ensemble(BatchResult):
         return np.moveaxis(array, -1, 0)
 
     @property
-    def error(self) -> Array | None:
+    def error(self) -> Maybe[Array]:
         """The estimated errors, shape (n,) or (n, m), as in `Trajectory`; NaN where unknown."""
         return None if self.estimates is None else self.estimates[..., 0]
 
     @property
-    def growth(self) -> Array | None:
+    def growth(self) -> Maybe[Array]:
         """The error amplifications, or upper bounds, shape (n,) or (n, m); NaN where unknown."""
         return None if self.estimates is None else self.estimates[..., 1]
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Self, get_args
 
 from numpy.typing import NDArray
 
-from pyharness.model.array_type import Array
+from pyharness.model.array_type import Array, Maybe
 from pyharness.model.changing import Changing
 from pyharness.model.values import Triple
 
@@ -86,26 +86,26 @@ class Fields:
     time: Annotated[Array, _TIME]
     recorded_time: Annotated[Array, _RECORDED_TIME]
     omega: Annotated[Array, _OMEGA]
-    velocity: Annotated[Array | None, _VELOCITY]
+    velocity: Annotated[Maybe[Array], _VELOCITY]
     steps: Annotated[int, _FACT]
     evaluations: Annotated[int, _FACT]
     ended: Annotated[str, _FACT] = "complete"
-    stop: "Stop | None" = None
-    ier: Annotated[NDArray[Any] | None, _IER] = None
-    error: Annotated[float | None, _FACT] = None
-    growth: Annotated[float | None, _FACT] = None
+    stop: "Maybe[Stop]" = None
+    ier: Annotated[Maybe[NDArray[Any]], _IER] = None
+    error: Annotated[Maybe[float], _FACT] = None
+    growth: Annotated[Maybe[float], _FACT] = None
     reason: Annotated[str | None, _FACT] = field(default=None, repr=False)
-    attitude: Annotated[Array | None, _ATTITUDE] = None
-    own: Array | None = None  # a row for each time, and columns from `Scene.states`
+    attitude: Annotated[Maybe[Array], _ATTITUDE] = None
+    own: Maybe[Array] = None  # a row for each time, and columns from `Scene.states`
     moments: Triple | Changing | None = None
-    axes: Array | None = None
-    exact: NDArray[Any] | None = None
-    tolerance: Annotated[float | None, _FACT] = None
-    scene: "Scene | None" = field(default=None, repr=False)
-    sol: "DenseOutput | None" = field(default=None, repr=False)
-    t_events: list[Array] | None = field(default=None, repr=False)
-    y_events: list[Array] | None = field(default=None, repr=False)
-    sensitivities: dict[str, Array] | None = field(default=None, repr=False)
+    axes: Maybe[Array] = None
+    exact: Maybe[NDArray[Any]] = None
+    tolerance: Annotated[Maybe[float], _FACT] = None
+    scene: "Maybe[Scene]" = field(default=None, repr=False)
+    sol: "Maybe[DenseOutput]" = field(default=None, repr=False)
+    t_events: Maybe[list[Array]] = field(default=None, repr=False)
+    y_events: Maybe[list[Array]] = field(default=None, repr=False)
+    sensitivities: Maybe[dict[str, Array]] = field(default=None, repr=False)
 
     @classmethod
     def create(cls, **values: Any) -> Self:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.model.array_type import Array as Array
+from pyharness.model.array_type import Maybe
 from pyharness.model.attitude import turned_to_space as turned_to_space
 from pyharness.model.continued import scene_at
 from pyharness.model.conversions import Conversions
@@ -167,7 +168,7 @@ class Trajectory(Conversions):
     __repr__ = short_repr
 
     @property
-    def digits(self) -> float | None:
+    def digits(self) -> Maybe[float]:
         """The number of correct decimal digits of omega, from `error`, or None."""
         return digits_left(self.error)
 

@@ -133,7 +133,7 @@ def test_a_check_that_sees_nothing_would_fail_the_self_test(monkeypatch: Patch) 
 
     def blind(cell: Cell, twin: Any, line: bytes, *rest: Any) -> Any:
         run = run_program(cell.scene, cell.listing)
-        columns = run.recorded_time, *run.omega.T, *run.velocity.T  # type: ignore[union-attr]
+        columns = run.recorded_time, *run.omega.T, *run.velocity.T
         rows = [[float(x).hex() for x in row] for row in zip(*columns, strict=True)]
         return compared(cell, twin, json.dumps({**json.loads(line), "rows": rows}).encode(), *rest)
 

@@ -120,7 +120,7 @@ def test_rows_events_and_sensitivities_are_those_of_a_scene_with_the_value() -> 
     one = solve(own, [1.0, 4.0], **asked)
     assert found.omega[1] == pytest.approx(one.omega, rel=1e-11, abs=1e-12)
     assert found.t_events is not None
-    assert found.t_events[0][1] == pytest.approx(one.t_events[0], rel=1e-10)  # type: ignore[index]
+    assert found.t_events[0][1] == pytest.approx(one.t_events[0], rel=1e-10)
     assert found.sensitivities is not None
     assert one.sensitivities is not None
     assert found.sensitivities["torque.gain"][1] == pytest.approx(

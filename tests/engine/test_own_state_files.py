@@ -46,7 +46,7 @@ def test_stepper_agrees_and_states_may_be_set() -> None:
     stepper.states = {"wheel": 0.0}
     stepper.until(6.0)
     later = Scene(
-        "later", found.omega[0], MOMENTS, attitude=found.attitude[0],  # type: ignore[index]
+        "later", found.omega[0], MOMENTS, attitude=found.attitude[0],
         torque=wheel, states={"wheel": 0.0},
     )  # fmt: skip
     assert stepper.omega == pytest.approx(solve(later, 1.0, attitude=True).omega[0], rel=1e-11)
@@ -92,7 +92,7 @@ def test_results_have_the_states_by_name(tmp_path: Any) -> None:
     assert (read.sensitivities["omega"] == found.sensitivities["omega"]).all()
     assert read.y_events[0].tolist() == found.y_events[0].tolist()
     again = solve(read.scene, [4.0, 2.0], attitude=True)
-    assert again.own.tolist() == found.own.tolist()  # type: ignore[union-attr]
+    assert again.own.tolist() == found.own.tolist()
     assert found.power().shape == (2,)
 
 

@@ -121,7 +121,7 @@ def test_functions_of_time_or_attitude_are_not_repeated() -> None:
     # With a torque, there is no period.
     assert period_of(replace(WING_NUT, torque=TorqueLaw((0.1, 0.0, 0.0)))) == 0.0
     ball = Scene("", (1.0, 2.0, 3.0), moments=(2.0, 2.0, 2.0))
-    assert solve(ball, 1e5, events=lambda t, w: w[0]).t_events[0].size == 0  # type: ignore[index]
+    assert solve(ball, 1e5, events=lambda t, w: w[0]).t_events[0].size == 0
 
 
 def test_too_many_events_are_refused() -> None:

@@ -108,7 +108,7 @@ def test_a_long_free_motion_is_sensitive_in_every_call(body: Any, calm: float, l
 def test_results_are_independent_of_each_other() -> None:
     scene = replace(_TURNED)
     found = [solve(scene, 2.0) for _ in range(3)]
-    found[1].axes[:] = 0.0  # type: ignore[index]
+    found[1].axes[:] = 0.0
     found[1].omega[:] = 0.0
     _all_equal(found[2], solve(scene, 2.0))
 

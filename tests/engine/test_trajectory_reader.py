@@ -106,7 +106,7 @@ FOUND: dict[str, Callable[[], Trajectory]] = {
     "sensitive": lambda: solve(case_scene(3), [30.0], tolerance=1e-15),
     "stopped": lambda: of_program("runge-kutta", 2),
     "endless quotient": lambda: replace(
-        found := of_program("runge-kutta", 2), stop=replace(found.stop, quotient=np.inf)  # type: ignore[type-var]
+        found := of_program("runge-kutta", 2), stop=replace(found.stop, quotient=np.inf)
     ),
     "codes": lambda: of_program("two-term", 3),
     "solver": lambda: prepared(False),
@@ -184,7 +184,7 @@ def test_every_bit_returns(name: str, tmp_path: Path) -> None:
     assert (tmp_path / "again.npz").read_bytes() == path.read_bytes()
     if found.scene is not None and saved.scene is not None and saved.attitude is not None:
         # The scene is solved again, and saved again, as the original one.
-        first, second = (with_attitude(each.scene, [0.7]) for each in (found, saved))  # type: ignore[arg-type]
+        first, second = (with_attitude(each.scene, [0.7]) for each in (found, saved))
         check_same(first, second)
 
 

@@ -76,7 +76,7 @@ def test_frame_has_every_quantity_with_its_unit() -> None:
     names = [f"{name}{k}" for name in ("omega", "velocity") for k in (1, 2, 3)]
     names += ["q0", "q1", "q2", "q3"]
     assert list(frame.columns) == [*names, "ier"]
-    assert (frame.to_numpy() == np.column_stack(vectors)).all()  # type: ignore[arg-type]
+    assert (frame.to_numpy() == np.column_stack(vectors)).all()
     assert (frame.index.name, frame.index.to_list()) == ("time", found.time.tolist())
     assert frame["ier"].dtype == np.int32
     units = frame.attrs["units"]
@@ -105,7 +105,7 @@ def test_dataset_has_dimensions_units_and_names() -> None:
     assert (data.omega.dims, data.attitude.dims) == (("time", "axis"), ("time", "component"))
     assert (data.omega.to_numpy() == found.omega).all()
     assert (data.attitude.to_numpy() == found.attitude).all()
-    assert data.attitude.sel(component="q0", time=1.0) == found.attitude[1, 0]  # type: ignore[index]
+    assert data.attitude.sel(component="q0", time=1.0) == found.attitude[1, 0]
     assert (data.omega.units, data.time.units, data.attitude.units) == ("rad/s", "s", "1")
     for name in data.variables:
         assert data[name].attrs["long_name"], name

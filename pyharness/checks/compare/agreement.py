@@ -110,7 +110,7 @@ def differences(first: Trajectory, second: Trajectory) -> list[str]:
         return found
     names = {"time": "time", "recorded_time": "TIME", "omega": "omega", "velocity": "velocity"}
     found = [told for name, told in names.items() if ulps(_rows(first, name), _rows(second, name))]
-    if not np.array_equal(first.ier, second.ier):  # type: ignore[arg-type]
+    if not np.array_equal(first.ier, second.ier):
         found.append("IER")
     if first.exact is not None and second.exact is not None:
         pairs = zip(first.exact.ravel().tolist(), second.exact.ravel().tolist(), strict=True)

@@ -23,6 +23,7 @@ from pyharness.engine.prepared.many_prepared import many_starts, many_states
 from pyharness.engine.problem.problem import problem_of
 from pyharness.engine.system.leaf_cache import leaves_for
 from pyharness.engine.system.recorded import is_recorded, packed_scene
+from pyharness.model.array_type import Maybe
 from pyharness.model.attitude import IDENTITY, Quaternion
 from pyharness.model.codes import Methods, Places
 from pyharness.model.errors import known
@@ -209,17 +210,17 @@ class Solver(BoundKernel[Result]):
         return self._judge()[0]
 
     @property
-    def error(self) -> float | None:
+    def error(self) -> Maybe[float]:
         """Return the estimated error of the last result, as in `Trajectory`; None if unknown."""
         return self._judge()[1]
 
     @property
-    def growth(self) -> float | None:
+    def growth(self) -> Maybe[float]:
         """Return the error amplification of the last motion; None if unknown."""
         return self._judge()[2]
 
     @property
-    def digits(self) -> float | None:
+    def digits(self) -> Maybe[float]:
         """Return the number of correct decimal digits of the last result; None if unknown."""
         return digits_left(self.error)
 

@@ -10,6 +10,7 @@ from numpy.polynomial.polynomial import polyval
 
 from pyharness.engine.system.recorded import LONGEST_TRIAL, Step, kernel_tape, taylor_step
 from pyharness.engine.system.singular import SingularError, undefined_operation
+from pyharness.model.array_type import Maybe
 from pyharness.model.attitude import IDENTITY, quaternion_rates, unit_quaternion
 from pyharness.model.changing import rates_of_changing
 from pyharness.model.constant_body import rates_about_body_axes
@@ -164,7 +165,7 @@ class Stepper:
         self._set(slice(0, 3), _check_three("omega", values))
 
     @property
-    def attitude(self) -> Array | None:
+    def attitude(self) -> Maybe[Array]:
         """The quaternion from body to space, scalar first, shape (4,), or None."""
         return _copy_fixed(self._state[3:7]) if self._n == 7 else None
 

@@ -35,6 +35,7 @@ from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.errors import InputError, known
 from pyharness.model.keywords import with_hints
+from pyharness.model.row_errors import AGAIN
 from pyharness.model.scene import Scene, any_scene, most_steps
 from pyharness.model.state_torque import is_opaque
 from pyharness.model.trajectory import Trajectory
@@ -147,7 +148,8 @@ def solve(
             dense_output=dense_output,
         )  # fmt: skip
         ordered = values[::-1] if turned else values
-        return solve_from_zero(scene, ordered, functions, sensitivities, again)
+        found = solve_from_zero(scene, ordered, functions, sensitivities, again)
+        return _solved_again(found, scene, method, effort)
     if method == "auto" and is_opaque(scene.torque):
         method = "dop853"
     chosen = METHODS[method]
@@ -186,7 +188,7 @@ def solve(
         found = found.with_values(sensitivities=slopes)
     if plain and found.ended == "complete":
         keep_end(problem, key, method, tolerance, effort)
-    return found
+    return _solved_again(found, scene, asked, effort)
 
 
 class _Call(NamedTuple):
@@ -276,6 +278,11 @@ def _trial_ends(call: _Call, last: float) -> Iterator[float]:
     while 0.0 < _LONGER * end <= last:
         yield end
         end *= _LONGER
+
+
+def _solved_again(found: Trajectory, scene: Scene, method: str, effort: float) -> Trajectory:
+    again = partial(_more_rows, scene, method, effort, found.attitude is not None)
+    return found.with_values(**{AGAIN: again})
 
 
 def _more_rows(

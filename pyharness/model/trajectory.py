@@ -16,6 +16,7 @@ from pyharness.model.continued import scene_at
 from pyharness.model.conversions import Conversions
 from pyharness.model.extension import ENDS
 from pyharness.model.report import counted, short
+from pyharness.model.row_errors import error_at, trusted_until
 
 if TYPE_CHECKING:
     from pyharness.model.scene import Scene
@@ -171,6 +172,22 @@ class Trajectory(Conversions):
     def digits(self) -> Maybe[float]:
         """The number of correct decimal digits of omega, from `error`, or None."""
         return digits_left(self.error)
+
+    def error_at(self, time: float) -> Maybe[float]:
+        """Return the estimated error at `time` (s), in the unit of `error`; None if unknown.
+
+        The motion is solved again until this time. Trajectories from files do not know it.
+        """
+        return error_at(self, time)
+
+    @property
+    def trusted_until(self) -> Maybe[float]:
+        """The time (s) of the last row before `error_at` exceeds the tolerance, or None.
+
+        Later rows of a sensitive result may be wrong. Short spans are solved again to find it. It
+        is None if errors are unknown, or the rows are on both sides of time 0.
+        """
+        return trusted_until(self)
 
     @property
     def has_all_rows(self) -> bool:

@@ -35,7 +35,8 @@ _SUBMODULES = {
 }
 # Public modules, imported likewise.
 _MODULES = ("events", "torques")
-__all__ = sorted(name for names in _SUBMODULES.values() for name in names)
+# `from pyharness import *` leaves out Taylor, whose base class is in SciPy.
+__all__ = sorted({name for names in _SUBMODULES.values() for name in names} - {"Taylor"})
 
 
 def __getattr__(name: str) -> object:
@@ -54,4 +55,4 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    return sorted([*__all__, *_MODULES, "__version__"])
+    return sorted([*__all__, "Taylor", *_MODULES, "__version__"])

@@ -112,9 +112,16 @@ def test_scripts_of_users_run(script: Path, tmp_path: Path, monkeypatch: Any) ->
 
 
 def test_what_the_package_shows() -> None:
-    assert dir(pyharness) == sorted([*pyharness.__all__, "events", "torques", "__version__"])
+    assert dir(pyharness) == sorted(
+        [*pyharness.__all__, "Taylor", "events", "torques", "__version__"]
+    )
     for name in dir(pyharness):
         assert getattr(pyharness, name) is not None
+
+
+def test_star_import_does_not_import_scipy() -> None:
+    code = "import sys; from pyharness import *; sys.exit('scipy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 def test_doctor_covers_what_the_package_needs() -> None:

@@ -34,7 +34,9 @@ class Entry(NamedTuple):
 
 
 def entries() -> list[Entry]:
-    return [_entry(name, getattr(pyharness, name)) for name in pyharness.__all__]
+    return [
+        _entry(name, getattr(pyharness, name)) for name in sorted([*pyharness.__all__, "Taylor"])
+    ]
 
 
 def _entry(name: str, of: Any, of_class: str = "") -> Entry:

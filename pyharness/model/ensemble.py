@@ -1,29 +1,33 @@
 """The result of `solve_many`: states of many bodies."""
 
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pyharness.model.array_type import Maybe
 from pyharness.model.arrays import buffer_of, check_rows, only_one, rows_of, spread
 from pyharness.model.distribution import check_package, checked_axes
+from pyharness.model.ensemble_bodies import html_of, summary_of, trajectory_of_body
 from pyharness.model.errors import InputError, known
 from pyharness.model.fields import ENSEMBLE_ROWS
 from pyharness.model.inertia import SYMMETRIC, symmetric_matrix
 from pyharness.model.torque_law import FRAMES
-from pyharness.model.trajectory import Array, BatchResult, turned_to_space
+from pyharness.model.trajectory import Array, BatchResult, Trajectory, turned_to_space
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from pandas import DataFrame
+    from scipy.spatial.transform import Rotation
     from xarray import Dataset
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Ensemble(BatchResult):
-    """The states of many bodies, from `solve_many`.
+    """The states of many bodies, from `solve_many`: a sequence of their trajectories.
 
     Attributes
     ----------
@@ -54,6 +58,8 @@ class Ensemble(BatchResult):
     times : ndarray, shape (m,), or None
         The times (s) of all bodies' results. Each array of results then has a second axis of length
         m.
+    t_end : ndarray, shape (n,), or None
+        The final times (s); None with `times`.
     leaves : str or None
         Whether compiled code (``compiled``) or an ``interpreter`` computed the Taylor series of a
         recorded torque, with the reason if `compiled` was requested but impossible; and how many
@@ -68,6 +74,8 @@ class Ensemble(BatchResult):
     (2, 3)
     >>> found.has_result
     array([ True,  True])
+    >>> [body.y[:2, 0].round(3).tolist() for body in found]
+    [[-0.959, 0.284], [1.197, -1.602]]
     """
 
     attitude: Maybe[Array] = None
@@ -80,6 +88,65 @@ class Ensemble(BatchResult):
     own: Maybe[Array] = field(default=None, repr=False)
     names: tuple[str, ...] = ()
     leaves: str | None = field(default=None, repr=False)
+    t_end: Maybe[Array] = field(default=None, repr=False)
+
+    def __len__(self) -> int:
+        return len(self.omega)
+
+    @overload
+    def __getitem__(self, body: int) -> Trajectory: ...
+    @overload
+    def __getitem__(self, body: slice) -> list[Trajectory]: ...
+    def __getitem__(self, body: int | slice) -> Trajectory | list[Trajectory]:
+        """Return the trajectory of a body, without scene, or of several bodies."""
+        numbers = range(len(self))[body]  # which raises IndexError
+        if isinstance(numbers, int):
+            return trajectory_of_body(self, numbers)
+        return [trajectory_of_body(self, each) for each in numbers]
+
+    def __iter__(self) -> Iterator[Trajectory]:
+        return (trajectory_of_body(self, each) for each in range(len(self)))
+
+    @property
+    def t(self) -> Maybe[Array]:
+        """The attribute `times`, shape (m,), or else `t_end`, shape (n,)."""
+        return self.t_end if self.times is None else self.times
+
+    @property
+    def y(self) -> Array:
+        """The states: omega, the attitude if computed, own states; shape (n, k) or (n, k, m)."""
+        parts = [each for each in (self.omega, self.attitude, self.own) if each is not None]
+        found: Array = np.concatenate(parts, axis=-1)
+        return found if self.times is None else found.swapaxes(1, 2)
+
+    @property
+    def success(self) -> NDArray[np.bool_]:
+        """Whether each body has all results, shape (n,)."""
+        found: NDArray[np.bool_] = self.has_result.reshape(len(self), -1).all(axis=1)
+        return found
+
+    @property
+    def message(self) -> str:
+        """A sentence on how the computations ended."""
+        return summary_of(self)
+
+    def rotation(self) -> "Rotation":
+        """Return the final attitudes as SciPy rotations, from body to space.
+
+        Raise InputError without attitudes, or with `times`: then use `found[i].rotation()`.
+        """
+        if self.attitude is None or self.times is not None:
+            what = "no attitudes" if self.attitude is None else "several times"
+            raise InputError(
+                f"rotation: the bodies have {what}; allowed: attitudes at t_end, or "
+                "found[i].rotation() of a body"
+            )
+        from scipy.spatial.transform import Rotation
+
+        return Rotation.from_quat(self.attitude[:, [1, 2, 3, 0]])
+
+    def _repr_html_(self) -> str:
+        return html_of(self)
 
     @property
     def states(self) -> dict[str, Array]:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _KIND = "pyharness ensemble"
 _FILE = "ensemble file"
 _WRITTEN = "a file that Ensemble.save wrote"
-_ARRAYS = (*ENSEMBLE_ROWS, "own", "status", "times")
+_ARRAYS = (*ENSEMBLE_ROWS, "own", "status", "times", "t_end")
 # Counts of events, shape (functions, bodies), -1 for a body without a result; times and states of
 # all events, one after the other.
 _EVENTS = ("event_counts", "t_events", "y_events")
@@ -80,6 +80,8 @@ def _attributes(arrays: dict[str, Any], header: dict[str, Any]) -> dict[str, Any
         raise ValueError("an unknown status")
     if rows[1:] != (() if times is None else times.shape) or not len(rows) <= 2:
         raise ValueError("another number of times")
+    if (ends := given["t_end"]) is not None and (ends.dtype, ends.shape) != ("f8", rows[:1]):
+        raise ValueError("another number of final times")
     if header["refusals"] is not None:
         given["refusals"] = unique((body, str(reason)) for body, reason in header["refusals"])
         if not all(type(body) is int and 0 <= body < rows[0] for body in given["refusals"]):

@@ -109,7 +109,7 @@ class Scene:
     coefficients : three numbers, optional
         The dimensionless coefficients A, B, C of Euler's equations (13-15 of Jacobs 1982).
     torque : TorqueLaw, three numbers, StateTorque, or function of (t, omega[, attitude])
-        The torque in N m; for `coefficients`, divided by the moments, in rad/s2 (default: zero).
+        The torque in N m; for `coefficients`, divided by the moments, in rad/s2 (default: none).
         `pyharness.torques` has functions that return a StateTorque. Your own function returns the
         components about the body axes. It is called with symbols, which record its arithmetic; if
         that fails, pass ``opaque(function)``.
@@ -180,7 +180,7 @@ class Scene:
             omega: Numbers = ...,
             moments: Numbers | Changing | Callable[[Any], Any] | None = None,
             coefficients: Numbers | None = None,
-            torque: TorqueLaw | StateTorque | Numbers | Callable[..., Any] = ...,
+            torque: TorqueLaw | StateTorque | Numbers | Callable[..., Any] | None = None,
             attitude: Numbers | Rotation | None = None,
             inertia: Iterable[Numbers] | Changing | Callable[[Any], Any] | None = None,
             changing: Changing | None = None,
@@ -224,6 +224,8 @@ class Scene:
             unit, length = unit_quaternion("[initial] attitude", self.attitude)
             self._set("attitude", unit)
             self._set("attitude_length", length)
+        if self.torque is None:
+            self._set("torque", TorqueLaw())
         # A torque may bring its states, such as the momentum of wheels.
         brought = self.torque.starts if isinstance(self.torque, StateTorque) else ()
         has_none = isinstance(self.states, (tuple, Mapping)) and not self.states

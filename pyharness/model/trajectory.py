@@ -28,6 +28,11 @@ WITH_ALL_ROWS = ("complete", "sensitive", "unchecked")
 ENDINGS = (*WITH_ALL_ROWS, "stopped", "overflow", "singular", "sliding", "stalled", "event")
 _RESULTS = [ENDS.index(ending) for ending in WITH_ALL_ROWS]
 STOP_VARIABLES = ("U1", "U2", "U3", "V1", "V2", "V3", "U", "UV")
+_REASONS = {
+    "overflow": "omega or the torque became infinite or NaN",
+    "refused": "the method does not apply",
+    "gave up": "the work limit was exceeded",
+}
 _WIDTH, _LINES = 100, 10
 _LONGEST = 60  # most characters of one value
 _SHOWN_ROWS = 3  # number of first, and of last, rows in HTML
@@ -265,9 +270,9 @@ class Trajectory(Conversions):
             )
         if self.ended == "event":
             return "A terminal event ended the integration; the rows end before it or at it."
-        if self.ended in ("overflow", "singular", "sliding", "stalled"):
+        if not self.has_all_rows:
             last = f"the last row is at t = {self.time[-1]:g} s" if len(self.time) else "no row"
-            reason = self.reason or "omega or the torque became infinite or NaN"
+            reason = self.reason or _REASONS.get(self.ended, _REASONS["overflow"])
             return f"{reason[0].upper()}{reason[1:]}; {last}."
         if self.ended == "unchecked":
             return (
@@ -311,9 +316,9 @@ class Trajectory(Conversions):
             f'<td style="text-align: left">{escape(text)}</td></tr>'
             for name, text in facts.items()
         ]
-        return "\n".join([*lines, "</tbody></table>", *self._html_rows()])
+        return "\n".join([*lines, "</tbody></table>", *self.html_rows()])
 
-    def _html_rows(self) -> list[str]:
+    def html_rows(self) -> list[str]:
         count = len(self.time)
         if not count:
             return []

@@ -126,7 +126,12 @@ def job_text(deck: str, system: str = "nos", rounds: bool = False) -> str:
     control = [*job["before"], compiles, *job["after"], jobs["record"]]
     statements = "".join(f"{each}\n" for each in control)
     named = statements.format(user="USERNAME", password="PASSWORD")  # assigned by the site
-    return named + deck + (_SOLVER.read_text() if "LEQT1F" in deck else "")
+    return named + with_solver(deck)
+
+
+def with_solver(deck: str) -> str:
+    """Return a deck with our LEQT1F, which was in a library, if it calls it."""
+    return deck + (_SOLVER.read_text() if "LEQT1F" in deck else "")
 
 
 def _is_made(

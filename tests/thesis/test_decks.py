@@ -1,10 +1,14 @@
 """Decks: the original text, the altered cards, and a few decks compiled."""
 
+import subprocess
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from pyharness.checks.cells import decks
 from pyharness.checks.check import Selection
+from pyharness.cli.main import main
 from pyharness.history.claims.laboratory import Laboratory
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
 from pyharness.model.scene_file import case_scene
@@ -148,3 +152,12 @@ def test_models_of_case_6_are_those_of_the_claims(terms: int, is_original: bool)
     run = run_deck(deck_text(listing, case_scene(6), "gfortran", terms))
     wanted = Laboratory(is_original).models(6, terms)
     np.testing.assert_allclose(run.tape5[:, 1:4], wanted, rtol=1e-11, atol=1e-11)
+
+
+@pytest.mark.skipif(compiler() is None, reason="no gfortran")
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_deck_for_gfortran_is_linked_without_other_files(program: str, tmp_path: Path) -> None:
+    file = tmp_path / "deck.f"
+    main(["deck", "--program", program, "--dialect", "gfortran", "--out", str(file)])
+    command = ["gfortran", "-w", "deck.f", "-o", "deck"]
+    assert subprocess.run(command, cwd=tmp_path, check=False).returncode == 0

@@ -8,7 +8,7 @@ from pyharness.model.listing import PROGRAMS
 from pyharness.model.records import listing_record
 from pyharness.model.report import Line, Report
 from pyharness.model.scene_file import case_scene
-from pyharness.thesis.decks import DIALECTS, SYSTEMS, deck_text, job_text
+from pyharness.thesis.decks import DIALECTS, SYSTEMS, deck_text, job_text, with_solver
 
 FORMATS = ("table", "json")
 OPTIONS = {
@@ -46,6 +46,8 @@ def run(options: argparse.Namespace) -> int:
         text = job_text(text, options.system or SYSTEMS[0], options.round)
     else:
         shared.refuse(options, f"--dialect {dialect}; allowed: with ftn", ("system", "round"))
+    if dialect == "gfortran":
+        text = with_solver(text)
     lines = text.splitlines()
     shared.check_outputs(options)
     record = {

@@ -213,6 +213,9 @@ def solve_many(
     settings |= {"estimates": boolean("estimates", estimates), "compiled": compiled}
     with bar_of_bodies(boolean("progress", progress)):
         solved = _solve(scene, t_end, rows, arrays, states, out, step, threads=threads, **settings)
+    if rows is None:
+        ends = np.broadcast_to(rows_of("t_end", t_end), len(solved.omega))
+        object.__setattr__(solved, "t_end", ends)  # `out` remains the same object
     reasons = reasons_of(solved, scene, arrays, states, t_end, method)
     if details is None:
         # `out` may have the details of an earlier call.

@@ -47,7 +47,9 @@ def solve_many_from_zero(
     ends = rows_of("t_end", t_end)
     if not is_one:
         check_rows("t_end", ends, len(every))
-    return _shifted(solve(scene, ends - by, **more), by, None)
+    found = _shifted(solve(scene, ends - by, **more), by, None)
+    object.__setattr__(found, "t_end", np.broadcast_to(ends, len(found.omega)))
+    return found
 
 
 def _shifted(found: Ensemble, by: Any, times: Any) -> Ensemble:

@@ -9,7 +9,8 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 _TOLERANCE = "tolerance, the largest error of the result relative to the largest |omega|"
-_TIMES = "times, all in one argument; the initial omega is at time 0"
+_TIMES = "times, all in one argument; the initial omega is at Scene.t0, by default 0"
+_START = "t0 of the Scene, the time of its initial omega"
 _ARGUMENTS = "keyword arguments with defaults in the torque's function, or functools.partial"
 _STEPS = "nothing; steps follow from the tolerance"
 _OMEGA = "omega, of the Scene or of solve_many"
@@ -18,11 +19,16 @@ _INERTIA = "moments, three principal moments, or inertia, a matrix"
 _HINTS = {
     **dict.fromkeys(("rtol", "atol", "tol", "rel_tol", "abs_tol"), _TOLERANCE),
     **dict.fromkeys(("t", "t_eval", "t_span", "t_end", "tspan"), _TIMES),
+    **dict.fromkeys(("saveat", "ts", "t1"), _TIMES),
+    **dict.fromkeys(("t0", "t_start"), _START),
     **dict.fromkeys(("args", "kwargs"), _ARGUMENTS),
-    **dict.fromkeys(("max_step", "first_step", "min_step"), _STEPS),
+    **dict.fromkeys(
+        ("max_step", "first_step", "min_step", "dt", "dt0", "stepsize_controller"), _STEPS
+    ),
     **dict.fromkeys(("y0", "w", "w0", "omega0", "omega_0"), _OMEGA),
     **dict.fromkeys(("q", "q0", "attitude0", "quaternion", "rotation"), _ATTITUDE),
     **dict.fromkeys(("I", "J", "tensor", "inertia_tensor", "moments_of_inertia"), _INERTIA),
+    "solver": "method, a name such as 'dop853'",
     "fun": "torque, a function of (t, omega), as an argument of the Scene",
     "jac": "nothing; derivatives come from the recorded torque",
     "vectorized": "nothing; the torque is recorded once",

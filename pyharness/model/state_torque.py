@@ -23,6 +23,7 @@ from pyharness.model.values import Triple, are_several, converted, three_floats,
 Function = Callable[..., Any]
 _MOST_REPLAYED = 1_000_000  # most operations of an internal function
 _ARGUMENTS = "allowed: a function of (t, omega), or of (t, omega, attitude)"
+_CONSTANTS = ("args", "params", "parameters", "constants", "p", "k", "c")  # not attitudes
 _WITH_STATES = (
     "a function of (t, omega, states) or (t, omega, attitude, states) that returns the torque and "
     "the rates of the states"
@@ -470,4 +471,10 @@ def _takes_attitude(function: object) -> bool:
         raise InputError(f"[torque] is {kind_of(function)}; {_ARGUMENTS}")
     if has_argument(function, "states"):
         raise InputError("[torque]: the function has an argument states; give the scene's states=")
+    for name in _CONSTANTS:
+        if has_argument(function, name) and name not in defaults_of(function):
+            raise InputError(
+                f"[torque]: the function has an argument {name} without default, and a third "
+                f"argument is the attitude; allowed: constants with defaults, as in {name}=0.1"
+            )
     return count_inputs(function, "[torque]", _ARGUMENTS, 2, 3) == 3

@@ -319,6 +319,7 @@ class Trajectory(Conversions):
         return "\n".join([*lines, "</tbody></table>", *self.html_rows()])
 
     def html_rows(self) -> list[str]:
+        """Return the lines of an HTML table of the results."""
         count = len(self.time)
         if not count:
             return []

@@ -45,6 +45,8 @@ _ALONE = {"LSODA": threading.RLock()}
 _PART = 0.5
 # Stiff equations need more steps of the series; they are not checked.
 _MOST_STEPS = 20_000
+# After each so many steps, the series ends if as many as the last would be too many.
+_FORECAST = 500
 # Largest ratio of two steps of the series in a span.
 _RATIO = 8.0
 # Tolerance of a step of the series, relative to the tolerance of the result.
@@ -236,7 +238,7 @@ def series_beside(scene: Scene, times: Sequence[float], tolerance: float) -> Bes
     attitude = scene.attitude is not None
     rows = [[*scene.omega, *(scene.attitude or ())]] if times[0] == 0.0 else []
     lengths: dict[float, float] = {}
-    reached = 0.0
+    reached = earlier = 0.0
     for before, stepper in steps_to(scene, attitude, end, _FINER * tolerance, _MOST_STEPS):
         reached = stepper.time
         lengths[reached] = abs(reached - before)
@@ -244,6 +246,11 @@ def series_beside(scene: Scene, times: Sequence[float], tolerance: float) -> Bes
         while after < len(times) and abs(times[after]) <= abs(reached):
             after += 1
         rows += stepper.at(times[len(rows) : after]).T.tolist()
+        if stepper.steps % _FORECAST == 0:
+            left = (_MOST_STEPS - stepper.steps) / _FORECAST
+            if abs(reached - earlier) * left < abs(end - reached):
+                return None
+            earlier = reached
     if reached != end:
         return None
     return Beside(np.array(rows), _spans(lengths, bounds))

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pyharness.engine.methods.scipy_defects import has_small_defects
 from pyharness.engine.methods.scipy_run import FINEST_STEP, rows_of, series_beside
 from pyharness.engine.methods.scipy_state_run import StateRows, StateRun, with_unit_attitude
 from pyharness.model.errors import InputError
@@ -54,7 +55,9 @@ def solve_state(
     if times[-1] == 0.0:
         return rows_of(times, np.array([run.start]), 1, 0, "complete")
     beside = series_beside(scene, times, tolerance) if run.is_smooth else None
-    run.is_limited = beside is None
+    is_stiff = beside is None and run.is_smooth
+    run.is_limited, run.with_steps = beside is None, with_steps or is_stiff
+    run.compares_steps = with_steps
     found = _refined(run, times, tolerance)
     if beside is not None and not _agree(found, beside.rows, tolerance):
         run.is_limited = True
@@ -65,11 +68,12 @@ def solve_state(
     if not found.is_complete:
         run.check_undefined()
     count = len(found.state)
-    # A recorded torque is unchecked if its Taylor series ends early.
-    is_judged = beside is not None or not run.is_smooth
+    is_judged = (
+        beside is not None or not run.is_smooth or has_small_defects(run, scene, found, tolerance)
+    )
     ended = "overflow" if not found.is_complete else "complete" if is_judged else "unchecked"
     result = rows_of(times[:count], found.state, run.evaluations, len(times), ended)
-    return replace(result, sol=run.steps(scene)) if ended == "complete" else result
+    return replace(result, sol=run.steps(scene)) if ended == "complete" and with_steps else result
 
 
 def finest_of_state(name: str, scene: Scene, time: float, most: float) -> float:
@@ -95,7 +99,7 @@ def _refined(run: StateRun, times: Sequence[float], tolerance: float) -> StateRo
     while True:
         finer = max(FINEST_STEP, local / ratio)
         after = run.rows(times, finer, scale)
-        difference = _difference(before, after)
+        difference = _difference(before, after, run.compares_steps)
         ratio = local / finer
         least = _LEAST_FRACTION[run.name] if run.is_smooth else 1.0
         error = difference * min(1.0, max(least, _SAFETY / ratio))
@@ -128,11 +132,11 @@ def _agree(found: StateRows, rows: Array, tolerance: float) -> bool:
     return len(found.state) >= len(rows) and _difference(*both) <= _AGREEMENT * tolerance
 
 
-def _difference(before: StateRows, after: StateRows) -> float:
+def _difference(before: StateRows, after: StateRows, with_steps: bool = False) -> float:
     """Return the largest relative difference of omega, or angle (rad) between attitudes."""
     n = min(len(before.state), len(after.state))
     found = float(_differences(before, after, n).max(initial=0.0))
-    if not (before.solutions and before.is_complete and after.is_complete):
+    if not (with_steps and before.solutions and before.is_complete and after.is_complete):
         return found
     # Where a torque has a kink, SciPy's dense outputs are inaccurate within a step.
     for one in after.solutions:

@@ -69,7 +69,7 @@ class StateRun(Run):
         self._undefined: float | None = None
         self._integrations = 0
         self._reached, self._largest, self._stuck = 0.0, 0.0, 0
-        self.with_steps = False
+        self.with_steps = self.compares_steps = False
         self._last = 0.0, np.array(start)
         self.spans = [Span(time, math.inf) for time in bounds_of(scene, end)]
 

@@ -26,6 +26,11 @@ from pyharness.model.values import boolean, finite, number, three_floats, tolera
 FINEST = 1e-14  # smallest tolerance of a step
 _DEFAULT = 1e-9
 _MOST_GUESSES = 8  # of the omega or state that a step from rest reaches
+# Names that users of SciPy or heyoka may expect.
+_INSTEAD = {
+    **dict.fromkeys(("propagate_until", "propagate_for", "integrate"), "until(time)"),
+    **dict.fromkeys(("state", "y", "w"), "omega, attitude or states"), "t": "time",
+}  # fmt: skip
 _MOST, _LOOK = 1e8, 100_000  # most steps of `until`, and steps between its forecasts
 
 
@@ -114,6 +119,11 @@ class Stepper:
         self._origin = [self._time, *self._state.tolist()]
         self._trial, self._largest = LONGEST_TRIAL, 0.0
         self._last = Step(0.0, 0.0, self._state[None], self._state)
+
+    def __getattr__(self, name: str) -> Any:
+        instead = _INSTEAD.get(name)
+        hint = f"; write {instead}" if instead else ""
+        raise AttributeError(f"a Stepper has no attribute '{name}'{hint}", name=name, obj=self)
 
     def __repr__(self) -> str:
         steps = f"{self._steps} step{'' if self._steps == 1 else 's'}"

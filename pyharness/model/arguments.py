@@ -36,6 +36,14 @@ def has_argument(function: Callable[..., Any], name: str) -> bool:
     return has_signature(function) and name in signature(function).parameters
 
 
+def third_argument(function: Callable[..., Any]) -> list[str]:
+    """Return the name of a third argument by position without default, in a list."""
+    if not has_signature(function):
+        return []
+    found = list(signature(function).parameters.values())[2:3]
+    return [x.name for x in found if x.kind in _POSITIONAL and x.default is Parameter.empty]
+
+
 def has_signature(function: Callable[..., Any]) -> bool:
     try:
         signature(function)

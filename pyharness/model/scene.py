@@ -63,10 +63,6 @@ OWN_STATES = (
     "the scene has states of its own; allowed for it: Stepper, and, with the methods auto and "
     "taylor, solve, solve_many with one scene, and the verbs run and plan"
 )
-STARTS_LATER = (
-    "the scene begins at t0 = {t0} s; allowed: 0; for other times: solve, solve_many, Stepper, and "
-    "the verb run --method"
-)
 SPACE_TORQUE = (
     "the torque is about the axes of space; allowed: a torque about the axes of the body, or the "
     "methods auto and taylor with the attitude"
@@ -452,7 +448,10 @@ def checked_scene(
     """Return `scene`; raise InputError unless it is a Scene that the flags allow."""
     if isinstance(scene, Scene):
         if scene.t0 and not t0:
-            raise InputError(STARTS_LATER.replace("{t0}", f"{scene.t0:g}"))
+            raise InputError(
+                f"the scene begins at t0 = {scene.t0:g} s; allowed: 0; for other times: solve, "
+                "solve_many, Stepper, and the verb run --method"
+            )
         if scene.states and not states:
             raise InputError(OWN_STATES)
         if scene.changing is not None and not changing:

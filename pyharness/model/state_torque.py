@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.model.arguments import count_inputs, defaults_of, has_argument
+from pyharness.model.arguments import count_inputs, defaults_of, has_argument, third_argument
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import product, quaternion_of_axes
 from pyharness.model.called_function import called_once
@@ -471,8 +471,8 @@ def _takes_attitude(function: object) -> bool:
         raise InputError(f"[torque] is {kind_of(function)}; {_ARGUMENTS}")
     if has_argument(function, "states"):
         raise InputError("[torque]: the function has an argument states; give the scene's states=")
-    for name in _CONSTANTS:
-        if has_argument(function, name) and name not in defaults_of(function):
+    for name in third_argument(function):
+        if name in _CONSTANTS:
             raise InputError(
                 f"[torque]: the function has an argument {name} without default, and a third "
                 f"argument is the attitude; allowed: constants with defaults, as in {name}=0.1"

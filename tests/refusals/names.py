@@ -8,13 +8,13 @@ import numpy as np
 
 import pyharness
 from pyharness import *  # noqa: F403
-from pyharness import ChangingMoments, Scene, TorqueLaw, case_scene, events, opaque, torques
+from pyharness import ChangingMoments, Scene, Taylor, TorqueLaw, case_scene, events, opaque, torques
 from tests.refusals.names_cli import *  # noqa: F403
 from tests.refusals.names_cli import BRICK
 from tests.refusals.names_model import *  # noqa: F403
 
-__all__ = ["BRICK", "IN_SPACE", "SHRINKING", "WEAK", "SimpleNamespace", "case_scene", "events",
-           "inf", "nan", "np", "opaque", "pi", "pyharness", "replace",
+__all__ = ["BRICK", "IN_SPACE", "SHRINKING", "WEAK", "SimpleNamespace", "Taylor", "case_scene",
+           "events", "inf", "nan", "np", "opaque", "pi", "pyharness", "replace",
            "torques"]  # fmt: skip
 
 IN_SPACE = replace(BRICK, torque=TorqueLaw((1.0, 0.0, 0.0), frame="space"))

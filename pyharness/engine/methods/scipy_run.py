@@ -209,6 +209,10 @@ class Beside(NamedTuple):
     spans: list[Span]
 
 
+# Stands for a series that needs too many steps, as for a stiff torque.
+TOO_LONG = Beside(np.empty((0, 3)), [])
+
+
 def bounds_of(scene: Scene, end: float) -> list[float]:
     """Return `end` and earlier times (s) at which a table or switch of the torque changes."""
     torque = scene.torque
@@ -233,7 +237,10 @@ def bounds_of(scene: Scene, end: float) -> list[float]:
 
 
 def series_beside(scene: Scene, times: Sequence[float], tolerance: float) -> Beside | None:
-    """Return states by Taylor series at `times` (s), and spans; None if the series ends early."""
+    """Return states by Taylor series at `times` (s), and spans; or None, or `TOO_LONG`.
+
+    None means that the series ends early.
+    """
     end, bounds = times[-1], bounds_of(scene, times[-1])
     attitude = scene.attitude is not None
     rows = [[*scene.omega, *(scene.attitude or ())]] if times[0] == 0.0 else []
@@ -249,10 +256,10 @@ def series_beside(scene: Scene, times: Sequence[float], tolerance: float) -> Bes
         if stepper.steps % _FORECAST == 0:
             left = (_MOST_STEPS - stepper.steps) / _FORECAST
             if abs(reached - earlier) * left < abs(end - reached):
-                return None
+                return TOO_LONG
             earlier = reached
     if reached != end:
-        return None
+        return TOO_LONG if len(lengths) == _MOST_STEPS else None
     return Beside(np.array(rows), _spans(lengths, bounds))
 
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from pyharness.engine.methods.scipy_defects import has_small_defects
-from pyharness.engine.methods.scipy_run import FINEST_STEP, rows_of, series_beside
+from pyharness.engine.methods.scipy_run import FINEST_STEP, TOO_LONG, rows_of, series_beside
 from pyharness.engine.methods.scipy_state_run import StateRows, StateRun, with_unit_attitude
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
@@ -55,7 +55,8 @@ def solve_state(
     if times[-1] == 0.0:
         return rows_of(times, np.array([run.start]), 1, 0, "complete")
     beside = series_beside(scene, times, tolerance) if run.is_smooth else None
-    is_stiff = beside is None and run.is_smooth
+    is_stiff = beside is TOO_LONG
+    beside = None if is_stiff else beside
     run.is_limited, run.with_steps = beside is None, with_steps or is_stiff
     run.compares_steps = with_steps
     found = _refined(run, times, tolerance)
@@ -69,7 +70,9 @@ def solve_state(
         run.check_undefined()
     count = len(found.state)
     is_judged = (
-        beside is not None or not run.is_smooth or has_small_defects(run, scene, found, tolerance)
+        beside is not None
+        or not run.is_smooth
+        or (is_stiff and has_small_defects(run, scene, found, tolerance))
     )
     ended = "overflow" if not found.is_complete else "complete" if is_judged else "unchecked"
     result = rows_of(times[:count], found.state, run.evaluations, len(times), ended)

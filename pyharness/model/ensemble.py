@@ -122,8 +122,8 @@ class Ensemble(BatchResult):
     @property
     def success(self) -> NDArray[np.bool_]:
         """Whether each body has all results, shape (n,)."""
-        found: NDArray[np.bool_] = self.has_result.reshape(len(self), -1).all(axis=1)
-        return found
+        rows = self.has_result.reshape(len(self), -1)
+        return np.logical_and.reduce(rows, axis=1, dtype=np.bool_)
 
     @property
     def message(self) -> str:

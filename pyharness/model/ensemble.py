@@ -123,7 +123,8 @@ class Ensemble(BatchResult):
     def success(self) -> NDArray[np.bool_]:
         """Whether each body has all results, shape (n,)."""
         rows = self.has_result.reshape(len(self), -1)
-        return np.logical_and.reduce(rows, axis=1, dtype=np.bool_)
+        found: NDArray[np.bool_] = np.logical_and.reduce(rows, axis=1, dtype=np.bool_)
+        return found
 
     @property
     def message(self) -> str:

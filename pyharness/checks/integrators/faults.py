@@ -13,12 +13,14 @@ import numpy as np
 
 from pyharness.engine.solve import solve
 from pyharness.model.attitude import product
+from pyharness.model.errors import WorkLimitError
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.state_torque import checked_torque
 from pyharness.model.torque_law import TorqueLaw, law_value
 from pyharness.model.trajectory import Array
 
 _TOLERANCE = 1e-11
+_EFFORT = 0.005  # work limit; a faulty motion can oscillate too fast to be computed
 _CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 _DEGREES = 180.0 / math.pi
 
@@ -53,7 +55,7 @@ class Fault:
 
 
 def true_motion(scene: Scene, times: Array) -> State:
-    run = solve(scene, times.tolist(), tolerance=_TOLERANCE, attitude=True)
+    run = solve(scene, times.tolist(), tolerance=_TOLERANCE, attitude=True, effort=_EFFORT)
     if run.attitude is None or len(run.omega) < len(times):
         raise ArithmeticError("the motion does not reach the last time")
     return State(run.omega, run.attitude)
@@ -233,7 +235,7 @@ def motions(scene: Scene, times: Array, step: float) -> Iterator[tuple[Fault, St
         with np.errstate(all="ignore"):
             try:
                 found = fault.motion(scene, times, step)
-            except ArithmeticError:
+            except (ArithmeticError, WorkLimitError):
                 found = State(*(np.full((len(times), width), np.nan) for width in (3, 4)))
         if found is not None:
             yield fault, found

@@ -222,7 +222,7 @@ def _possible(right: Verdict) -> set[str]:
     found = {
         "steps": right.control != "tolerance",
         "torque": bool(kinds - {"free"}),
-        "waves": "wave" in kinds,
+        "waves": any(each.problem.has_waves for each in right.judged),
         "attitude": right.judged[0].finest.attitude is not None,
     }
     return {name for name, has in found.items() if has}

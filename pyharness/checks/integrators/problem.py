@@ -69,6 +69,10 @@ class Problem:
     def kind(self) -> str:
         return self.scene.name.partition("-")[0]
 
+    @property
+    def has_waves(self) -> bool:
+        return bool(self.scene.law.sines or self.scene.law.cosines)
+
     @cached_property
     def times(self) -> Array:
         """The requested times (s)."""

@@ -117,14 +117,14 @@ def _approaches(
 
 def _by_orders(results: Sequence[Judged]) -> list[tuple[str, str]]:
     found = []
-    calm = [each for each in results if each.problem.kind != "wave"]
+    calm = [each for each in results if not each.problem.has_waves]
     calm_is_higher = any(each.convergences[0].is_higher for each in calm)
     for judged in results:
         omega, attitude = judged.order_of("omega"), judged.order_of("attitude")
         if judged.finest.control == "tolerance" or judged.lost or omega is None:
             continue
         problem = judged.problem
-        if omega.is_first and problem.kind == "wave" and calm_is_higher:
+        if omega.is_first and problem.has_waves and calm_is_higher:
             found.append(("torque-held", problem.name))
         elif omega.is_first:
             name = "first-order-splitting" if _conserves_momentum(results) else "first-order"

@@ -41,6 +41,9 @@ _STYLES: dict[str, dict[str, Any]] = {
     "free": {"color": "#1040a0", "linestyle": "-"},
     "constant": {"color": "#c02020", "linestyle": (0, (5, 2))},
     "wave": {"color": "#107040", "linestyle": (0, (1, 1.2))},
+    "mixed": {"color": "#806000", "linestyle": (0, (7, 1, 1, 1))},
+    "fast": {"color": "#7020a0", "linestyle": (0, (3, 1))},
+    "slow": {"color": "#505050", "linestyle": (0, (1, 3))},
 }
 _MARKERS = "os^Dv"
 _FLOOR = 1e-17  # smaller errors, and 0, are drawn here

@@ -19,8 +19,17 @@ COARSEST = 1e-3
 # Defects from this flag on are drawn last, so that a seed gives the draws of earlier versions.
 _FIRST_LATER = 11
 _LIPSCHITZ = (500.0, 60.0, 1.0, 1e-3)
-MODERATE = ("free", "constant", "wave")
-"""Kinds of moderate scenes: torque-free, constant torque, waves with a linear torque."""
+MODERATE = ("free", "constant", "wave", "mixed", "fast", "slow")
+"""Kinds of moderate scenes: no torque; a constant torque; waves with a linear torque; these and
+more waves at once, of elongated bodies from rest, near 100 rad/s, and near 0.001 rad/s."""
+# Exponents of 10 of speed (1/s) and moments (kg m2).
+_WIDE = {
+    "mixed": (0.0, 0.0, -3.0, 3.0),
+    "fast": (1.8, 2.0, 2.0, 3.0),
+    "slow": (-3.0, -2.8, -3.0, -2.0),
+}
+# Longest steps (s) whose halves contain .01 and 1/60, not exact in binary.
+_STEPS = (0.32, 4.0 / 15.0)
 
 
 @dataclass(frozen=True)
@@ -86,34 +95,46 @@ def random_scene(kind: str, seed: str | int, name: str = "") -> Scene:
 
 
 def draw_moderate(seed: str, kind: str, number: int) -> Scene:
-    """Return scene `number` of a seed with a torque of `kind`, one of `MODERATE`.
+    """Return scene `number` of a seed, of a kind in `MODERATE`.
 
     The body rotates by several radians.
     """
     source = Random(f"{seed}/moderate/{kind}/{number}")
-    size = 10.0 ** source.uniform(-1.0, 1.0)
+    wide = kind in _WIDE
+    slowest, fastest, *sizes = _WIDE.get(kind, (0.0, 0.0, -1.0, 1.0))
+    size = 10.0 ** source.uniform(*sizes)
     low = source.uniform(1.0, 2.0)
-    middle = low * source.uniform(1.15, 1.6)
-    high = source.uniform(1.1 * middle, 0.95 * (low + middle))
+    middle = low * (10.0 ** source.uniform(2.5, 3.0) if wide else source.uniform(1.15, 1.6))
+    ends = (0.1 * low, 0.9 * low) if wide else (0.1 * middle, 0.95 * low - 0.05 * middle)
+    high = middle + source.uniform(*ends)
     moments = [size * moment for moment in (low, middle, high)]
     source.shuffle(moments)
 
     def vector(least: float, most: float) -> list[float]:
         return [source.choice((-1.0, 1.0)) * source.uniform(least, most) for _ in range(3)]
 
+    speed = 10.0 ** source.uniform(slowest, fastest) if wide else 1.0
+
     def torque(factor: float = 1.0) -> list[float]:
         pairs = zip(vector(0.2, 0.6), moments, strict=True)
-        return [factor * (part * moment) for part, moment in pairs]
+        return [factor * (part * moment) * speed**2 for part, moment in pairs]
+
+    def waves(count: int) -> list[tuple[list[float], float]]:
+        return [(torque(), source.uniform(1.0, 3.0) * speed) for _ in range(count)]
 
     law = TorqueLaw()
     if kind == "constant":
         law = TorqueLaw(torque())
     elif kind == "wave":
-        rate, *waves = torque(0.1), *((torque(), source.uniform(1.0, 3.0)) for _ in range(2))
-        law = TorqueLaw(rate=rate, sines=waves[:1], cosines=waves[1:])
-    omega, attitude = vector(0.4, 1.4), [source.gauss(0.0, 1.0) for _ in range(4)]
-    name = f"{kind}-{number}"
-    return Scene(name, omega, moments, torque=law, attitude=attitude, step_size=0.5, steps=12)
+        law = TorqueLaw(rate=torque(0.1), sines=waves(1), cosines=waves(1))
+    elif wide:
+        law = TorqueLaw(torque(), torque(0.1 * speed), waves(2), waves(3))
+    omega, attitude = vector(0.4 * speed, 1.4 * speed), [source.gauss(0.0, 1.0) for _ in range(4)]
+    if kind == "mixed":
+        omega = [0.0, 0.0, 0.0]
+    step_size = _STEPS[number % len(_STEPS)] / speed if wide else 0.5
+    given: dict[str, Any] = {"torque": law, "attitude": attitude, "step_size": step_size}
+    return Scene(f"{kind}-{number}", omega, moments, **given, steps=16 if wide else 12)
 
 
 def _body(source: Random) -> list[float]:

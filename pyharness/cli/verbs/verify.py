@@ -16,6 +16,7 @@ from pyharness.checks.check import (
 from pyharness.checks.kinds import KINDS, verify
 from pyharness.checks.random_methods import ROUNDING
 from pyharness.checks.report import checks_report, references, samples, summary
+from pyharness.checks.scenes.random_scenes import MODERATE
 from pyharness.cli import options as shared
 from pyharness.model.errors import InputError
 from pyharness.thesis.decks import compiler
@@ -45,7 +46,7 @@ OPTIONS = {
     f"{', '.join(f'{kind} ({_ABOUT[kind]})' for kind in KINDS)}.",
     "--seed S": "Seed of random scenes, any text (default: this week, as 2026-W47).",
     "--draws N": f"Number of random scenes (default {DRAWS}; with --port, 0; with --integrator, "
-    "2 for each kind of torque).",
+    "2 of each kind).",
     "--external FILE": "Check our methods against published results (format: "
     "docs/how-to/external.md).",
     "--listing-output FILE": "Identify a computer's arithmetic from a page that a thesis program "
@@ -57,7 +58,7 @@ OPTIONS = {
     "--program P": "Only this program: two-term, four-term, runge-kutta (not with --integrator).",
     "--case N": "Only this case of the thesis, 1 to 7 (not with --integrator).",
     "--cell NAME,...": "With --port, only these runs (as two-term/case-3, random/7); with "
-    "--integrator, scenes (as wave-1) or torques (free, constant, wave).",
+    f"--integrator, scenes (as wave-1) or kinds ({', '.join(MODERATE)}).",
     "--self-test": "Plant known faults, and report which are detected (also with --port or "
     "--integrator).",
     "--update": "Recompute and write the stored trajectories (golden), and report changes.",

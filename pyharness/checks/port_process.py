@@ -7,7 +7,7 @@ import shlex
 import signal
 import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Self
 
@@ -20,7 +20,7 @@ _TO_END = 1.0  # time (s) in which a process must end after it closed its input 
 # Number of searches for child processes, and of reads of the last output.
 _ROUNDS = 100
 _PROBE = 10.0  # time limit (s) for one request of the other protocol
-_EXAMPLES = {"--port": "node web/port.js", "--integrator": "python3 mine.py"}
+_EXAMPLES = {"--port": "node web/port.js", "--integrator": "python3 mine.py", "--new": "./mine"}
 _MARK = "PYHARNESS_PORT"  # environment variable that marks each process of a port
 
 
@@ -67,9 +67,16 @@ def _processes_with(mark: str) -> list[int]:
 class PortProcess:
     """A port's process as a context manager; entering raises PortError if it cannot start."""
 
-    def __init__(self, command: str, patience: float = PATIENCE, option: str = "--port") -> None:
-        self._words = split_command(command, option)
+    def __init__(
+        self,
+        command: str | Sequence[str],
+        patience: float = PATIENCE,
+        option: str = "--port",
+        folder: Path | None = None,
+    ) -> None:
+        self._words = split_command(command, option) if isinstance(command, str) else [*command]
         self._patience = patience
+        self._folder = folder
 
     def __enter__(self) -> Self:
         """Start the port in its own process group, so that child processes can be ended too."""
@@ -83,6 +90,7 @@ class PortProcess:
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
                 start_new_session=True,
+                cwd=self._folder,
                 env={**os.environ, _MARK: self._mark.removeprefix(f"{_MARK}=")},
             )
         except OSError as error:
@@ -149,6 +157,41 @@ class PortProcess:
         if more:
             raise PortError("more than one line for one run")
         return answer
+
+    def read_all(self, content: bytes) -> bytes:
+        """Send `content`, close the input, and return all output of a program that ends in time."""
+        end = time.monotonic() + self._patience
+        found, is_open = bytearray(), True
+        while True:
+            if is_open and not content:
+                self._in.close()
+                is_open = False
+            writers = [self._in] if is_open else []
+            left = max(end - time.monotonic(), 0.0)
+            ready, writable, _ = select.select([self._out, *self._heard], writers, [], left)
+            if not left or not (ready or writable):
+                raise PortError(f"it did not end within {self._patience:g} s")
+            if self._errors in ready:
+                self._hear()
+            if writable:
+                try:
+                    content = content[os.write(self._in.fileno(), content[:_PIECE]) :]
+                except BrokenPipeError:  # it need not read its input
+                    content = b""
+            if self._out in ready:
+                piece = os.read(self._out.fileno(), _PIECE)
+                if not piece:
+                    break
+                found += piece
+                if len(found) > _LARGEST:
+                    raise PortError(f"more than {_LARGEST >> 20} MB for one run")
+        try:
+            code = self._process.wait(max(end - time.monotonic(), _TO_END))
+        except subprocess.TimeoutExpired:
+            raise PortError(f"it did not end within {self._patience:g} s") from None
+        if code:
+            raise PortError(self._ending())
+        return bytes(found)
 
     def _hear(self) -> bool:
         try:

@@ -35,6 +35,7 @@ _GROUPS = {
     },
     "checks and publication": {
         "verify": "check the thesis programs, your port of them, our methods, or your integrator",
+        "agree": "compare any programs, such as FORTRAN and its port, cell by cell",
         "stress": "test every method in extreme scenes against bounds from theory",
         "bench": "measure run times and errors of our solvers and of third-party solvers",
         "edition": "write the annotated programs as a web site or as plain data",

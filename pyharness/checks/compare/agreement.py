@@ -126,16 +126,21 @@ def _rows(trajectory: Trajectory, name: str) -> Array:
 
 
 def ulps(x: Array | float, y: Array | float) -> float:
-    """Return the largest distance between corresponding elements, in units in the last place.
+    """Return the largest of the distances between corresponding elements."""
+    return float(ulp_distances(x, y).max(initial=0.0))
+
+
+def ulp_distances(x: Array | float, y: Array | float) -> Array:
+    """Return the distances between corresponding elements, in units in the last place.
 
     The distance is 0 between two NaNs, infinite between NaN and a number.
     """
-    both_nan = np.isnan(x) & np.isnan(y)
-    one_nan = np.isnan(x) ^ np.isnan(y)
-    if one_nan.any():
-        return math.inf
-    first, second = np.where(both_nan, 0, _ordinal(x)), np.where(both_nan, 0, _ordinal(y))
-    return float((np.maximum(first, second) - np.minimum(first, second)).max(initial=0))
+    first, second = _ordinal(x), _ordinal(y)
+    distance = (np.maximum(first, second) - np.minimum(first, second)).astype(float)
+    is_nan, other_is_nan = np.isnan(x), np.isnan(y)
+    distance[is_nan & other_is_nan] = 0.0
+    distance[is_nan ^ other_is_nan] = math.inf
+    return distance
 
 
 def _ordinal(x: Array | float) -> NDArray[np.uint64]:

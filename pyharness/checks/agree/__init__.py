@@ -1,0 +1,1 @@
+"""Comparison of any programs on the same inputs, cell by cell."""

@@ -4,9 +4,9 @@ import numpy as np
 
 
 def slope(y):
-    return np.array([
-        10.0 * (y[1] - y[0]), y[0] * (28.0 - y[2]) - y[1], y[0] * y[1] - 8.0 * y[2] / 3.0,
-    ])
+    return np.array(
+        [10.0 * (y[1] - y[0]), y[0] * (28.0 - y[2]) - y[1], y[0] * y[1] - 8.0 * y[2] / 3.0]
+    )
 
 
 def solve(x, y, z, steps):

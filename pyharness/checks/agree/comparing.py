@@ -12,6 +12,7 @@ import numpy as np
 from pyharness.checks.agree.plan import Limit, Plan
 from pyharness.checks.agree.reading import Rows, Value
 from pyharness.checks.compare.agreement import ulp_distances
+from pyharness.model.errors import InputError
 from pyharness.model.trajectory import Array
 
 
@@ -50,7 +51,7 @@ class Column:
 @dataclass(frozen=True)
 class Agreement:
     columns: tuple[Column, ...]
-    missing: tuple[str, ...]  # rows of the original, as in "run-1: rows 3 to 5"
+    missing: tuple[str, ...]  # rows of the original, as in "missing in run-1: rows 3 to 5"
     additional: tuple[str, ...]
     growth: dict[str, list[tuple[int, float]]]  # by column, largest distance (ulp) in rows n
 
@@ -87,7 +88,8 @@ def compare(plan: Plan, original: Sequence[Rows], other: Sequence[Rows]) -> Agre
             if len(rows) > len(than):
                 first = f"{run.name}: row" + ("s" if len(rows) > len(than) + 1 else "")
                 last = f" to {len(rows)}" if len(rows) > len(than) + 1 else ""
-                told.append(f"{first} {len(than) + 1}{last}")
+                kind = "missing" if told is missing else "additional"
+                told.append(f"{kind} in {first} {len(than) + 1}{last}")
     found = [_column(plan, k, original, other) for k in range(len(plan.outputs.columns))]
     growth = {column.name: rows for column, rows in found}
     return Agreement(tuple(x for x, _ in found), tuple(missing), tuple(additional), growth)
@@ -165,6 +167,24 @@ def largest_distance(plan: Plan, one: Sequence[Rows], two: Sequence[Rows]) -> di
     found = compare(plan, one, two)
     whole = not found.missing and not found.additional
     return {each.name: each.ulps if whole else math.inf for each in found.columns}
+
+
+def with_zeros(rows: Sequence[Rows], column: int) -> list[Rows]:
+    """Return rows with 0 in a column, or 1 if it has only zeros."""
+    value = 0.0 if any(row[column] for each in rows for row in each) else 1.0
+    return [[[*row[:column], value, *row[column + 1 :]] for row in each] for each in rows]
+
+
+def refuse_idle_limits(plan: Plan, original: Sequence[Rows]) -> None:
+    """Raise InputError if a limit accepts 0 for all values of its column."""
+    for k, name in enumerate(plan.outputs.columns):
+        column, _ = _column(plan, k, original, with_zeros(original, k))
+        if not column.beyond:
+            limit = column.limit
+            raise InputError(
+                f"'{plan.path}' limits: {limit.value:g} {limit.unit} finds nothing in {name}; it "
+                "accepts 0 in place of each value; give a smaller limit"
+            )
 
 
 def same(one: Sequence[Rows], two: Sequence[Rows]) -> bool:

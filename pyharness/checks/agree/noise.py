@@ -33,6 +33,7 @@ _INITIAL = {
 }  # fmt: skip
 """Flags that change only the initial values of variables, or whether a call keeps them."""
 _OTHERS = {"gfortran": ("flang-new", "flang"), "gcc": ("clang",)}
+_OF_STORAGE = re.compile("-(O|m|funsafe|finit|fno-automatic|fauto|frecursive|ftrivial)")
 _WARNED = re.compile(r"\W([\w.%]+)\W (?:is|may be) used uninitialized")
 _AT = re.compile(r":(\d+):\d+:")
 
@@ -64,7 +65,7 @@ def noise(
     program = plan.original
     if program.source is None or program.compiler not in _ROUNDING:
         return None
-    kept = tuple(x for x in program.flags if not re.match(r"-(O|m|funsafe|finit)", x))
+    kept = tuple(x for x in program.flags if not re.match("-(O|m|funsafe)", x))
     others = [x for x in _OTHERS[program.compiler] if shutil.which(x)]
     builds = [
         _build(plan, replace(program, flags=(*kept, *flags.split())), flags, said)
@@ -76,7 +77,7 @@ def noise(
         if each.rows is not None:
             far = largest_distance(plan, rows, each.rows)
             floor = {name: max(floor[name], far[name]) for name in floor}
-    return Noise(tuple(builds), floor, tuple(_initial(plan, program, kept, said)))
+    return Noise(tuple(builds), floor, tuple(_initial(plan, program, said)))
 
 
 def _build(plan: Plan, program: Program, flags: str, said: Callable[[int, str], None]) -> Build:
@@ -86,9 +87,8 @@ def _build(plan: Plan, program: Program, flags: str, said: Callable[[int, str], 
         return Build(flags, None, str(error))
 
 
-def _initial(
-    plan: Plan, program: Program, kept: Sequence[str], said: Callable[[int, str], None]
-) -> list[str]:
+def _initial(plan: Plan, program: Program, said: Callable[[int, str], None]) -> list[str]:
+    kept = tuple(x for x in program.flags if not _OF_STORAGE.match(x))
     builds = [
         _build(plan, replace(program, flags=(*kept, *flags.split())), flags, said)
         for flags in _INITIAL[program.compiler]

@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from pyharness.checks.agree.comparing import compare, same
+from pyharness.checks.agree.comparing import compare, same, with_zeros
 from pyharness.checks.agree.plan import Plan, Program
 from pyharness.checks.agree.programs import answers
 from pyharness.checks.agree.reading import ASTERISKS, Rows, Value
@@ -66,6 +66,13 @@ def _plants(plan: Plan) -> dict[str, tuple[str, Plant]]:
         f"beyond-{name}": (
             f"one value of {name} is moved by {_FACTOR:g} limits, at least 1 ulp",
             _at_cell(k, lambda x, plan, k=k: _moved(x, plan, k)),
+        )
+        for k, name in enumerate(plan.outputs.columns)
+    }
+    plants |= {
+        f"zero-{name}": (
+            f"all values of {name} are 0 (or 1)",
+            lambda rows, plan, k=k: with_zeros(rows, k),  # type: ignore[misc]
         )
         for k, name in enumerate(plan.outputs.columns)
     }

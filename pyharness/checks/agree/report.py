@@ -36,7 +36,7 @@ def checks_of(plan: Plan, each: Compared, again: str) -> list[Check]:
     if each.agreement is None:
         return [Check(Name("agree", each.port), False, None, None, None, each.failure, again)]
     found = each.agreement
-    lost = [f"missing {x}" for x in found.missing] + [f"additional {x}" for x in found.additional]
+    lost = [*found.missing, *found.additional]
     name = Name("agree", each.port, "rows")
     rows = Check(name, not lost, float(len(lost)), 0.0, _ROWS, "; ".join(lost[:3]), again)
     return [rows, *(_check(each.port, column, again) for column in found.columns)]
@@ -75,7 +75,7 @@ def agreement_report(
     page = summary_page("agree", checks, title, depth=2, more=[*parts, lines])
 
     def record() -> dict[str, Any]:
-        more = {
+        more: dict[str, Any] = {
             "original": plan.original.name,
             "ports": [_record(each) for each in found],
             "noise": None if noise is None else {

@@ -72,6 +72,7 @@ def _run(plan: Plan, program: object) -> list[Rows]:
 
 
 def _original(plan: Plan) -> tuple[list[Rows], list[str]]:
+    from pyharness.checks.agree.comparing import refuse_idle_limits
     from pyharness.checks.agree.record import is_recorded, read_record
 
     name = plan.original.name
@@ -79,6 +80,7 @@ def _original(plan: Plan) -> tuple[list[Rows], list[str]]:
         rows, how = read_record(plan), f"recorded in {plan.record}"
     else:
         rows, how = _run_original(plan), "run"
+    refuse_idle_limits(plan, rows)
     runs, count = counted(len(plan.runs), "run"), sum(map(len, rows))
     return rows, [f"{plan.path}: {name} ({how}) in {runs}, {counted(count, 'row')}"]
 

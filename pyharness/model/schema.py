@@ -11,7 +11,7 @@ SCHEMAS = {
     "external file": 1,
     "vector file": 1,
     "golden record": 1,
-    "agreement record": 1,
+    "result record": 1,
     "edition": 1,
     "data package": 1,
     "port request": 1,

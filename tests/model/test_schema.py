@@ -12,6 +12,9 @@ import numpy as np
 import pytest
 
 from pyharness import Ensemble, InputError, Listing, load, read_scene, solve, solve_many
+from pyharness.checks.agree.plan import read_plan
+from pyharness.checks.agree.record import read_record as read_results
+from pyharness.checks.agree.record import update_record
 from pyharness.checks.external_file import read_problem
 from pyharness.checks.golden import read_record
 from pyharness.checks.integrators import protocol
@@ -24,6 +27,8 @@ from pyharness.model.scene_file import case_scene, scene_text
 from pyharness.model.schema import SCHEMAS, check_schema
 from pyharness.sweep.sweep_file import read_sweep
 from pyharness.thesis.vectors import OURS, answers
+from tests.checks.agree.programs import PLAN
+from tests.checks.agree.programs import written as written_plan
 from tests.ports import engine
 from tests.sweep.sweeps import TILT, files, run_sweep, text, written
 
@@ -100,6 +105,12 @@ def golden_record(folder: Path) -> Reader:
     return Reader(path, lambda: read_record(folder))
 
 
+def result_record(folder: Path) -> Reader:
+    plan = read_plan(written_plan(folder, "", text='record = "r.json"\n' + PLAN))
+    update_record(plan, [[[1.0, 2.0]]], "first")
+    return Reader(folder / "r.json", lambda: read_results(plan))
+
+
 def listed(kind: str, mark: str, *option: str) -> Callable[[Path], Reader]:
     def made(folder: Path) -> Reader:
         path = folder / mark
@@ -143,6 +154,7 @@ FILES: dict[str, Callable[[Path], Reader]] = {
     "ensemble file": ensemble_file,
     "external file": in_toml("schema = 1\n" + EXTERNAL.read_text(), read_problem),
     "vector file": vector_file, "golden record": golden_record,
+    "result record": result_record,
     "edition": listed("edition", MARK, "--out"),
     "data package": listed("data package", PACKAGE_MARK, "--data", "data package"),
     "port request": port_request, "integrator request": integrator_request,

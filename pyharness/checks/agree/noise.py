@@ -1,4 +1,4 @@
-"""How far a compiled program differs from itself: the noise floor of the original."""
+"""The noise floor: the distances between builds of the original."""
 
 import re
 import shutil

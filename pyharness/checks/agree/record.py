@@ -55,7 +55,7 @@ def update_record(plan: Plan, rows: Sequence[Rows], reason: str) -> list[str]:
     program = plan.original
     build = {"compiler": _version(program.compiler), "flags": [*program.flags]}
     data = {
-        "schema": SCHEMAS["agreement record"], "original": program.name, "build": build,
+        "schema": SCHEMAS["result record"], "original": program.name, "build": build,
         "digests": digests(program), "inputs": digest_of_inputs(plan), "changes": changes,
         "rows": [[[_text(x) for x in row] for row in each] for each in rows],
     }  # fmt: skip
@@ -68,7 +68,7 @@ def _read(plan: Plan) -> Any:
     assert plan.record is not None
     try:
         data = parse_json(read_input(plan.record, where, _LARGEST, "a record"))
-        check_schema(where, "agreement record", data.get("schema"), _ANEW)
+        check_schema(where, "result record", data.get("schema"), _ANEW)
         if {"inputs", "rows", "changes"} <= data.keys():
             return data
     except (ValueError, AttributeError) as error:

@@ -63,10 +63,15 @@ def agreement_report(
          f"{x.limit.value:g} {x.limit.unit}"]
         for each in found if each.agreement for x in each.agreement.columns
     ]  # fmt: skip
+    heads: list[Head] = [*_HEADS]
+    of_noise = "; noise: of other builds of the original"
+    if noise is None:
+        of_noise, heads = "", _without_noise(heads)
+        rows = [_without_noise(row) for row in rows]
     table: Section = [
-        "differ: cells that differ in any bit. ulp, noise: largest distances, in units in the last "
-        "place, of the port, and of other builds of the original. beyond: cells beyond the limit",
-        Table(_HEADS, rows),
+        "differ: cells that differ in any bit. ulp: largest distance, in units in the last "
+        f"place{of_noise}. beyond: cells beyond the limit",
+        Table(heads, rows),
     ]
     parts = [table] if rows else []
     text: list[Section] = [title, listed_singly([x for x in checks if not x.passed]), *parts]
@@ -89,6 +94,10 @@ def agreement_report(
     report = checks_report("agree", checks, text, page)
     pictures = {"growth": lambda: _picture(found)}
     return report._replace(record=record, pictures=pictures)
+
+
+def _without_noise(row: Sequence[Any]) -> list[Any]:
+    return [*row[:5], *row[6:]]
 
 
 def _parting(found: Sequence[Compared]) -> list[str]:

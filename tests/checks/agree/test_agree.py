@@ -212,7 +212,7 @@ def test_examples_agree_and_their_planted_faults_are_found(
     Draft202012Validator(schema_of("agree")).validate(record)
     found = [each for each in record["checks"] if each["note"].startswith("found")]
     assert len(found) >= least
-    # Each port differs from the original by no more than the limits, and no less than is told.
+    # Each port differs from the original by no more than the limits, and no less than is reported.
     assert main(["agree", plan, "--format", "html"]) == 0
     assert "<table" in capsys.readouterr().out
 
@@ -234,7 +234,7 @@ SAVED = """      PROGRAM P
 
 @pytest.mark.campaign
 @pytest.mark.external
-def test_a_source_that_depends_on_initial_values_is_told(tmp_path: Path, capsys: Capture) -> None:
+def test_a_source_that_depends_on_initial_is_reported(tmp_path: Path, capsys: Capture) -> None:
     if not shutil.which("gfortran"):
         pytest.skip("no gfortran")
     (tmp_path / "saved.f").write_text(SAVED)
@@ -253,7 +253,7 @@ def test_a_fault_that_the_limits_allow_is_not_found(tmp_path: Path, capsys: Capt
     plan = written(tmp_path, RIGHT, text=text)
     assert main(["agree", plan, "--self-test"]) == 0
     capsys.readouterr()
-    # One row with one value of each column: binary32 has no effect, and is told so.
+    # One row with one value of each column: binary32 has no effect, and the report says so.
     assert main(["agree", plan, "--self-test", "--format", "json"]) == 0
     notes = {x["id"]: x["note"] for x in json.loads(capsys.readouterr().out)["checks"]}
     assert notes["self-test/binary32"] == "no effect on any cell"

@@ -1,0 +1,12 @@
+C     A PENDULUM: ANGLE A AND ITS RATE W, BY STEPS OF .01
+      PROGRAM PEND
+      DOUBLE PRECISION A,W,H,T
+      READ(*,*) A,W
+      H=0.01D0
+      DO 10 N=1,100
+      W=W-H*9.81D0*SIN(A)
+      A=A+H*W
+      T=N*H
+   10 WRITE(*,20) T,A,W
+   20 FORMAT(1X,F6.2,2D25.17)
+      END

@@ -1,6 +1,7 @@
 """The TOML file of `agree`: programs, inputs, outputs and limits."""
 
 import itertools
+import math
 import re
 import shlex
 from collections.abc import Callable, Iterable, Mapping
@@ -106,7 +107,7 @@ def read_plan(path: str) -> Plan:
         raise InputError(f"{where}: seconds is {seconds}; allowed: a time limit above 0")
     record = reader.take(data, "record", (str,), "")
     return Plan(
-        Path(path), programs, tuple(reader.runs(inputs)), reader.take(inputs, "file", (str,), ""),
+        Path(path), programs, tuple(reader.runs(inputs)), reader.file(inputs),
         outputs, limits, reader.folder / record if record else None, float(seconds),
     )  # fmt: skip
 
@@ -136,6 +137,12 @@ class _Reader:
         if not all(isinstance(each, str) for each in found):
             raise InputError(f"{self.where}: {key} has other items than text; allowed: text")
         return tuple(found)
+
+    def file(self, table: Mapping[str, Any]) -> str:
+        name: str = self.take(table, "file", (str,), "")
+        if "/" in name or "\0" in name or name in (".", ".."):
+            raise InputError(f"{self.where}: file is '{name}'; allowed: a name without a folder")
+        return name
 
     def program(self, name: str, table: Any) -> Program:
         place = f"programs.{name}"
@@ -184,7 +191,7 @@ class _Reader:
         form = self.take(table, "form", (str,), "text")
         if form not in FORMS:
             raise unknown("form", form, FORMS, f"{self.where} outputs")
-        file = self.take(table, "file", (str,), "")
+        file = self.file(table)
         if form == "unformatted" and not file:
             raise InputError(f"{self.where} outputs: give file, which has the unformatted records")
         kind = self.take(table, "kind", (str,), Outputs.kind)
@@ -230,8 +237,8 @@ class _Reader:
             if not isinstance(values, list) or not values:
                 raise InputError(f"{self.where} inputs: {name} is no list; allowed: values")
         rows = list(itertools.islice(self._rows[kinds[0]](self, table, given), _MOST_RUNS + 1))
-        if len(rows) > _MOST_RUNS:
-            raise InputError(f"{self.where} inputs: allowed: at most {_MOST_RUNS} runs")
+        if not 0 < len(rows) <= _MOST_RUNS:
+            raise InputError(f"{self.where} inputs: allowed: 1 to {_MOST_RUNS} runs")
         form = self.take(table, "text", (str,), " ".join(f"{{{name}}}" for name in given) + "\n")
         return [
             Run(
@@ -244,7 +251,7 @@ class _Reader:
 
     def _text_of(self, name: str) -> str:
         content = read_input(self.folder / name, f"{self.where} inputs", _LARGEST, "files")
-        return content.decode("latin-1")
+        return content.decode("utf-8", "surrogateescape")
 
     def _table_rows(self, table: Mapping[str, Any], given: Mapping[str, Any]) -> Iterable[Any]:
         if len({len(values) for values in given.values()}) > 1:
@@ -254,7 +261,7 @@ class _Reader:
     def _random_rows(self, table: Mapping[str, Any], given: Mapping[str, Any]) -> Iterable[Any]:
         source = Random(str(self.take(table, "seed", (int, str), "agree")))
         for name, ends in given.items():
-            if len(ends) != 2 or not all(isinstance(x, int | float) for x in ends):
+            if not _is_range(ends):
                 raise InputError(f"{self.where} inputs: {name}; allowed: [least, most]")
         for _ in range(self.take(table, "draws", (int,), 20)):
             yield [
@@ -267,6 +274,11 @@ class _Reader:
         "grid": lambda self, table, given: itertools.product(*given.values()),
         "random": _random_rows,
     }
+
+
+def _is_range(ends: list[Any]) -> bool:
+    kinds = all(isinstance(x, int | float) and math.isfinite(x) for x in ends)
+    return kinds and len(ends) == 2 and ends[0] <= ends[1]
 
 
 def filled(text: str, pairs: Iterable[tuple[str, Any]]) -> str:

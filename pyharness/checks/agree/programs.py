@@ -61,11 +61,11 @@ def _commanded(plan: Plan, program: Program, run: Run) -> Rows:
     words = [filled(word, run.values.items()) for word in program.command]
     with TemporaryDirectory() as place:
         # An empty folder has no file of an earlier run.
-        folder = Path(place)
+        folder, content = Path(place), run.text.encode("utf-8", "surrogateescape")
         if plan.input_file:
-            (folder / plan.input_file).write_text(run.text, "latin-1")
+            (folder / plan.input_file).write_bytes(content)
         with PortProcess(words, plan.seconds, folder=folder) as process:
-            printed = process.read_all(b"" if plan.input_file else run.text.encode("latin-1"))
+            printed = process.read_all(b"" if plan.input_file else content)
         if not plan.outputs.file:
             return read_rows(printed, plan.outputs)
         written = folder / plan.outputs.file

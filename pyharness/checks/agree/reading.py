@@ -108,7 +108,7 @@ def _json(text: str, outputs: Outputs) -> Rows:
 
 def _json_value(value: Any) -> Value:
     if isinstance(value, int | float):
-        return float(value)
+        return printed_value(repr(value)) if isinstance(value, int) else value
     return printed_value(value) if isinstance(value, str) else "null" if value is None else "?"
 
 

@@ -32,7 +32,14 @@ def read_record(plan: Plan) -> list[Rows]:
     data = _read(plan)
     if data["inputs"] != digest_of_inputs(plan):
         raise InputError(f"'{plan.record}': recorded with other inputs or columns; {_ANEW}")
-    return [[[_value(x) for x in row] for row in rows] for rows in data["rows"]]
+    try:
+        rows = [[[_value(x) for x in row] for row in each] for each in data["rows"]]
+    except (AttributeError, TypeError, ValueError):
+        rows = []
+    width = len(plan.outputs.columns)
+    if len(rows) != len(plan.runs) or any(len(row) != width for each in rows for row in each):
+        raise InputError(f"'{plan.record}': no record of results; {_ANEW}")
+    return rows
 
 
 def update_record(plan: Plan, rows: Sequence[Rows], reason: str) -> list[str]:

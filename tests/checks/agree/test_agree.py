@@ -58,7 +58,9 @@ def test_unformatted_records_are_read(kind: str, tmp_path: Path) -> None:
 def test_a_wrong_program_is_named_in_a_line(
     code: str, message: str, tmp_path: Path, capsys: Capture
 ) -> None:
-    assert main(["agree", written(tmp_path, code), "--format", "json"]) == 1
+    seconds = 1 if "within" in message else 30
+    plan = written(tmp_path, code, text=PLAN.replace("seconds = 1", f"seconds = {seconds}"))
+    assert main(["agree", plan, "--format", "json"]) == 1
     failed = [x for x in json.loads(capsys.readouterr().out)["checks"] if not x["passed"]]
     assert any(message in each["note"] for each in failed), failed
     assert all("\n" not in each["note"] for each in failed)
@@ -167,8 +169,11 @@ def test_a_record_replaces_the_original_and_is_never_overwritten_silently(
                  other.partition("\n")[2] + "[outputs]").replace("seconds = 1",
                  'seconds = 1\nrecord = "r.json"'))]) == 2  # fmt: skip
     assert "recorded with other inputs" in capsys.readouterr().err
-    (tmp_path / "r.json").write_text("[]")
-    assert main(["agree", plan(RIGHT)]) == 2
+    data = json.loads((tmp_path / "r.json").read_text())
+    for rows in ([], [[["0x1p0"]]], [[[1.0, 2.0]]], [[["0x1p0", "x"]]], 3):
+        (tmp_path / "r.json").write_text(json.dumps({**data, "rows": rows}))
+        assert main(["agree", plan(RIGHT)]) == 2
+        assert "r.json" in capsys.readouterr().err
 
 
 def test_a_first_file_is_written_and_read(tmp_path: Path, capsys: Capture) -> None:

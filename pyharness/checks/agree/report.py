@@ -30,15 +30,20 @@ class Compared:
     port: str
     agreement: Agreement | None
     failure: str = ""
+    took: float | None = None  # run time (s)
 
 
 def checks_of(plan: Plan, each: Compared, again: str) -> list[Check]:
     if each.agreement is None:
-        return [Check(Name("agree", each.port), False, None, None, None, each.failure, again)]
+        name = Name("agree", each.port)
+        failed = Check(name, False, None, None, None, each.failure, again, took=each.took)
+        return [failed]
     found = each.agreement
     lost = [*found.missing, *found.additional]
     name = Name("agree", each.port, "rows")
-    rows = Check(name, not lost, float(len(lost)), 0.0, _ROWS, "; ".join(lost[:3]), again)
+    rows = Check(
+        name, not lost, float(len(lost)), 0.0, _ROWS, "; ".join(lost[:3]), again, took=each.took
+    )
     return [rows, *(_check(each.port, column, again) for column in found.columns)]
 
 

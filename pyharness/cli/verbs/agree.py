@@ -3,6 +3,7 @@
 import argparse
 import shlex
 from collections.abc import Callable
+from time import perf_counter
 
 from pyharness.checks.agree.plan import Plan, read_plan
 from pyharness.checks.agree.programs import answers
@@ -52,10 +53,12 @@ def run(options: argparse.Namespace) -> int:
 
     found = []
     for port in plan.ports:
+        begin, agreement, failure = perf_counter(), None, ""
         try:
-            found.append(Compared(port.name, compare(plan, original, _run(plan, port))))
+            agreement = compare(plan, original, _run(plan, port))
         except PortError as error:
-            found.append(Compared(port.name, None, str(error)))
+            failure = str(error)
+        found.append(Compared(port.name, agreement, failure, perf_counter() - begin))
     floor = None
     if options.noise:
         if plan.original.source is None:

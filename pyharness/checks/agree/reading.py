@@ -13,6 +13,7 @@ import numpy as np
 
 from pyharness.checks.agree.plan import Outputs
 from pyharness.checks.port_process import PortError
+from pyharness.model.report import counted
 
 ASTERISKS = "asterisks"
 """Stands for a number that was too long for its field."""
@@ -54,7 +55,8 @@ def read_rows(content: bytes, outputs: Outputs, path: Path | None = None) -> Row
         rows = {"text": _text, "csv": _csv, "json": _json}[outputs.form](text, outputs)
     for number, row in enumerate(rows, 1):
         if len(row) != width:
-            raise PortError(f"row {number} has {len(row)} numbers; {width} columns are expected")
+            told = counted(len(row), "number")
+            raise PortError(f"row {number} has {told}; {width} columns are expected")
     if not rows:
         raise PortError(f"no row of {width} numbers in its output ({len(content)} bytes)")
     return rows

@@ -66,6 +66,18 @@ def test_a_wrong_program_is_named_in_a_line(
     assert all("\n" not in each["note"] for each in failed)
 
 
+@pytest.mark.parametrize(("table", "code", "message"), TABLES["others"])
+def test_a_function_or_source_that_fails_is_named_in_a_line(
+    table: str, code: str, message: str, tmp_path: Path, capsys: Capture
+) -> None:
+    (tmp_path / "port.py").write_text(code)
+    plan = written(tmp_path, "", text=PLAN.replace("command = {port}", table))
+    assert main(["agree", plan, "--format", "json"]) == 1
+    (check,) = json.loads(capsys.readouterr().out)["checks"]
+    assert message in check["note"]
+    assert "\n" not in check["note"]
+
+
 def test_a_wrong_original_is_an_error(tmp_path: Path, capsys: Capture) -> None:
     assert main(["agree", written(tmp_path, RIGHT, "raise ValueError('lost')")]) == 2
     assert "original: run-1: it ended with exit code 1" in capsys.readouterr().err

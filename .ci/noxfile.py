@@ -1,12 +1,17 @@
-"""Jobs in environments of their own: `make wheel`, then `nox -f .ci/noxfile.py -s NAME`."""
+"""The jobs of `.ci/run`, `.ci/weekly` and the workflows: `.ci/job NAME ...`.
+
+Those that are functions have environments of their own, and need the wheel of the job `build`.
+"""
 
 import os
 import platform
 import re
+import shlex
 import shutil
 import subprocess
 import sys
 import zipfile
+from functools import partial
 from pathlib import Path
 
 import nox
@@ -28,9 +33,105 @@ COMMANDS = [
     f"verify --only methods,prepared,golden --record {ROOT}/tests/golden",
     f"edition --docs {ROOT}/docs --out edition",
 ]
+PYTHON = ".venv/bin/python"
+# The commands of the jobs in the tree; the last takes what follows `--`.
+JOBS = {
+    "browser": [".ci/browser"],
+    "build": ["make wheel"],
+    "lint": ["make lint"],
+    "test": ["make test"],
+    "changed": ["make test-changed"],
+    "pages-in-browser": [".ci/browser", "make test-all"],
+    "cross": ["make cross-check"],
+    "compilers": [".ci/flang", "make cross-check ARGS=--all"],
+    "kinds": [
+        f"{PYTHON} -m pyharness verify --only "
+        "cells,decks,schemes,stops,prepared,orders,external,golden"
+    ],
+    "all-kinds": [f"{PYTHON} -m pyharness verify"],
+    "edition": ["make edition OUT=build/edition"],
+}
+SEED, DRAWS = os.environ.get("SEED", "0"), int(os.environ.get("DRAWS", "1"))
+
+
+def draw(module: str, scenes: int) -> list[str]:
+    """Return the command of a campaign with scenes of the week."""
+    return [f"{PYTHON} -W ignore -m tests.{module} {scenes * DRAWS} {SEED}"]
+
+
+# What the gate leaves out, with random scenes that nobody has seen, and campaigns at least of the
+# size that documents state.
+WEEKLY = {
+    "verify": [
+        f"{PYTHON} -m pyharness verify --only words,methods,prepared,attitudes,random "
+        f"--draws {12000 * DRAWS} --seed {SEED}"
+    ],
+    "proved": draw("campaigns.proved", 200),
+    "many_alone": draw("many_alone", 20000),
+    "many_errors": draw("many_errors", 20000),
+    "fuzz": [f"{PYTHON} -m tests.campaigns.fuzz --seed {SEED} --inputs {4000 * DRAWS}"],
+    "integrators": draw("campaigns.integrator_campaign", 40),
+    "narrow": draw("campaigns.narrow_campaign", 200),
+    "many": draw("campaigns.many_campaign", 300),
+    "continuous": draw("campaigns.continuous_campaign", 1000),
+    "singular": draw("campaigns.singular_campaign", 1000),
+    "independent": draw("engine.independent", 575),
+    "combinations": draw("campaigns.combination_campaign", 300),
+    "dense": draw("campaigns.dense_campaign", 1000),
+    "events": draw("campaigns.event_campaign", 5000),
+    "leaves": draw("campaigns.leaf_campaign", 300),
+    "terms": draw("campaigns.term_campaign", 20),
+    "parameters": draw("campaigns.parameter_campaign", 30),
+    "switches": draw("campaigns.switch_campaign", 300),
+    "state": draw("campaigns.state_campaign", 10000),
+    "defaults": draw("campaigns.default_campaign", 1000),
+    "estimates": [f"{PYTHON} -m tests.campaigns.estimates --scenes {10000 * DRAWS} --seed {SEED}"],
+    "words": [f"{PYTHON} -m tests.campaigns.words_campaign"],
+    "errors": [f"{PYTHON} -m tests.campaigns.function_errors.measured"],
+    "peers": [
+        f"{PYTHON} -m pip install --quiet --disable-pip-version-check mujoco heyoka",
+        f"{PYTHON} -m pytest -q tests/checks/test_integrator.py",
+    ],
+    "faults": [f"{PYTHON} -m pyharness verify --self-test", "make mutate ARGS=--ci"],
+    "mutations": [f"make mutate ARGS='--sample {50 * DRAWS} --seed {SEED}'"],
+    "campaigns": ["make test-all"],
+    "flang": JOBS["compilers"],
+    "sources": ["make wheel", ".ci/job release installs"],
+    "plain": ["make wheel", "env PYHARNESS_INSTRUCTIONS=plain .ci/job levels -- tests/engine"],
+    "newest-python": [".ci/job newest"],
+}
+nox.options.sessions = []
+nox.options.error_on_missing_interpreters = True
 nox.options.envdir = str(ROOT / "build/nox")
 nox.options.default_venv_backend = "uv"
 nox.options.download_python = "never"
+
+
+def run(session: nox.Session, commands: list[str]) -> None:
+    """Run the commands of a job."""
+    for command in commands:
+        rest = session.posargs if command == commands[-1] else ()
+        session.run(*shlex.split(command), *rest, external=True)
+
+
+def run_quietly(session: nox.Session, commands: list[str]) -> None:
+    """Run commands with their output in a file; if one fails, print its end and the command."""
+    log = ROOT / f"build/weekly/{session.name}.log"
+    log.parent.mkdir(parents=True, exist_ok=True)
+    for command in commands:
+        with log.open("a") as out:
+            done = subprocess.run(
+                command, shell=True, cwd=ROOT, stdout=out, stderr=out, check=False
+            )
+        if done.returncode:
+            session.error("\n".join([*log.read_text().splitlines()[-20:], f"FAILED: {command}"]))
+
+
+for jobs, function, tag in ((JOBS, run, "tree"), (WEEKLY, run_quietly, "weekly")):
+    for name, commands in jobs.items():
+        job = partial(function, commands=commands)
+        job.__doc__ = "; ".join(commands)  # which `nox -l` prints
+        nox.session(job, name=name, venv_backend="none", tags=[tag])
 
 
 def the(kind: str) -> str:

@@ -1,6 +1,5 @@
 """The package as its users see it: types that accept valid calls, public names, citation."""
 
-import ast
 import inspect
 import json
 import re
@@ -137,33 +136,6 @@ def test_doctor_covers_what_the_package_needs() -> None:
 def test_issue_template_requests_the_output_of_doctor() -> None:
     text = (ROOT / ".github/ISSUE_TEMPLATE/wrong-result.md").read_text()
     assert "The output of `pyharness doctor`" in text
-
-
-def test_jobs_run_with_the_lowest_and_the_newest_python() -> None:
-    workflow = ROOT / ".github/workflows/ci.yml"
-    matrix = yaml.safe_load(workflow.read_text())["jobs"]["test"]["strategy"]["matrix"]["include"]
-    assert {"3.x", PROJECT["requires-python"].removeprefix(">=")} <= {e["python"] for e in matrix}
-
-
-def test_jobs_that_are_called_exist() -> None:
-    tree = ast.parse((ROOT / ".ci/noxfile.py").read_text())
-    sessions = {
-        each.name
-        for each in tree.body
-        if isinstance(each, ast.FunctionDef)
-        and "nox.session" in map(ast.unparse, map(_bare, each.decorator_list))
-    }
-    places = [*(ROOT / ".github/workflows").glob("*.yml"), ROOT / ".ci/run", ROOT / ".ci/weekly"]
-    for place in (*places, ROOT / "docs/how-to/install.md"):
-        for names in re.findall(r"noxfile\.py -s ([^\n#]+)", place.read_text()):
-            assert {*names.partition(" -- ")[0].split()} <= sessions, place
-    for place in (ROOT / ".github/workflows").glob("*.yml"):
-        for folder in re.findall(r"uses: \$/(\S+)", place.read_text()):
-            assert (ROOT / folder / "action.yml").exists(), place
-
-
-def _bare(decorator: ast.expr) -> ast.expr:
-    return decorator.func if isinstance(decorator, ast.Call) else decorator
 
 
 def test_each_dependency_has_one_bound_that_is_tested() -> None:

@@ -3,6 +3,7 @@
 import importlib.util
 import os
 import platform
+import re
 import shutil
 import subprocess
 import sys
@@ -271,6 +272,37 @@ def test_a_build_for_free_threads_is_refused_in_one_line(tmp_path: Path) -> None
     (line,) = (each for each in done.stdout.splitlines() if "ERROR" in each)
     assert line.endswith("free-threaded Python is not tested here: take the one with a global "
                          "interpreter lock")  # fmt: skip
+
+
+@pytest.mark.external
+@pytest.mark.parametrize(
+    ("statement", "missing"),
+    [
+        ("x(1) = 2*x(1)", ""),
+        ("print *, x(1)", "_gfortran_st_write"),
+        ("call elsewhere(x)", "_gfortran_internal_"),
+        ("call elsewhere(x(1))", "elsewhere"),
+    ],
+)
+def test_an_extension_that_cannot_be_loaded_fails_the_build(
+    statement: str, missing: str, tmp_path: Path
+) -> None:
+    """Kernels are linked without libgfortran, which the linker does not say."""
+    kernel, module, done = (tmp_path / name for name in ("kernel.f90", "kernel.so", "loads"))
+    kernel.write_text(f"subroutine planted(x)\nreal(8) :: x(:)\n{statement}\nend subroutine\n")
+    _run("gfortran", "-O0", "-fPIC", "-c", kernel, "-o", tmp_path / "kernel.o", cwd=tmp_path)
+    _run("gcc", "-shared", tmp_path / "kernel.o", "-o", module, cwd=tmp_path)
+    built = _run(sys.executable, ROOT / "fortran/check_loads.py", done, module, cwd=tmp_path)
+    assert (built.returncode, done.exists()) == ((1, False) if missing else (0, True))
+    assert missing in built.stderr
+    assert ("the extension can't be loaded" in built.stderr) == bool(missing)
+
+
+def test_the_build_loads_every_extension() -> None:
+    text = (ROOT / "meson.build").read_text()
+    modules = re.findall(r"(?:^(\w+) = )?py\.extension_module\(", text, re.MULTILINE)
+    (command,) = re.findall(r"command: \[py, files\('fortran/check_loads.py'\), (.*)\]", text)
+    assert modules == command.split(", ")[1:]
 
 
 @pytest.mark.external

@@ -109,6 +109,7 @@ nox.options.download_python = "never"
 
 def run(session: nox.Session, commands: list[str]) -> None:
     """Run the commands of a job."""
+    session.chdir(ROOT)
     for command in commands:
         rest = session.posargs if command == commands[-1] else ()
         session.run(*shlex.split(command), *rest, external=True)

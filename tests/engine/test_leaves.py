@@ -422,8 +422,10 @@ HOSTILE: dict[str, Callable[[Path, Patch], Any]] = {
     "damaged": damaged,
     "truncated": lambda file, _: rewritten(file, file.read_bytes()[:1000]),
     "empty": lambda file, _: rewritten(file, b""),
-    "writable by all": lambda file, _: file.chmod(0o777),
-    "a folder writable by all": lambda file, _: file.parent.chmod(0o777),
+    "writable by all": lambda file, _: file.chmod(0o702),
+    "writable by a group": lambda file, _: file.chmod(0o720),
+    "a folder writable by all": lambda file, _: file.parent.chmod(0o702),
+    "a folder writable by a group": lambda file, _: file.parent.chmod(0o770),
     "another name": lambda file, _: file.rename(file.with_name(file.name[:-4] + "x.so")),
     "a folder": a_folder,
 }
@@ -451,7 +453,7 @@ def test_a_hostile_file_is_never_loaded(name: str, folder: Path, monkeypatch: Pa
     solver = prepare(scene_of(simple), compiled=True)
     assert hostile.isdisjoint(opened)
     assert solver((0.3, 0.2, 0.9), 1.0) == pytest.approx(solve(solver.scene, 1.0).omega[0])
-    if name in ("another user", "a linked folder", "a folder writable by all"):
+    if name in ("another user", "a linked folder") or name.startswith("a folder writable"):
         reason = f"{folder} is not the user's own folder, or others may write it"
         assert solver.leaves == f"interpreter: {reason}"
     elif name != "a folder":

@@ -297,8 +297,8 @@ class Conversions(Fields):
         Examples
         --------
         >>> from pyharness import case_scene, solve
-        >>> ax = solve(case_scene(1), [1.0, 2.0]).plot()  # doctest: +SKIP
-        >>> ax.get_ylabel()  # doctest: +SKIP
+        >>> ax = solve(case_scene(1), [1.0, 2.0]).plot()
+        >>> ax.get_ylabel()
         'angular velocity (rad/s)'
         """
         ax = checked_axes(ax)
@@ -339,7 +339,7 @@ class Conversions(Fields):
         --------
         >>> from pyharness import Scene, solve
         >>> nut = Scene("nut", (0.02, 6, 0), moments=(0.9, 1.6, 2.3), attitude=(1, 0, 0, 0))
-        >>> solve(nut, 10.0, dense_output=True).animate("nut.gif")  # doctest: +SKIP
+        >>> solve(nut, 10.0, dense_output=True).animate("nut.gif")
         """
         from pyharness.model.attitude_picture import animate
 
@@ -366,7 +366,7 @@ class Conversions(Fields):
         Examples
         --------
         >>> from pyharness import case_scene, solve
-        >>> solve(case_scene(1), [1.0, 2.0]).save("case-1.npz")  # doctest: +SKIP
+        >>> solve(case_scene(1), [1.0, 2.0]).save("case-1.npz")
         """
         from pyharness.model.trajectory_file import save
 

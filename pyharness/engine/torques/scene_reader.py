@@ -54,7 +54,7 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
     Examples
     --------
     >>> from pyharness import read_scene
-    >>> read_scene("brick.toml").omega  # doctest: +SKIP
+    >>> read_scene("brick.toml").omega
     (0.0, 1.0, 1.0)
     """
     if not isinstance(path, (str, os.PathLike)):

@@ -60,8 +60,8 @@ def load(path: str | os.PathLike[str]) -> Trajectory:
     Examples
     --------
     >>> from pyharness import case_scene, load, solve
-    >>> solve(case_scene(1), [1.0, 2.0]).save("case-1.npz")  # doctest: +SKIP
-    >>> load("case-1.npz").omega[-1]  # doctest: +SKIP
+    >>> solve(case_scene(1), [1.0, 2.0]).save("case-1.npz")
+    >>> load("case-1.npz").omega[-1]
     array([6., 6., 6.])
     """
     name = checked_path("trajectory file", path)

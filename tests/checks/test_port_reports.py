@@ -6,6 +6,7 @@ import re
 import shlex
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import pytest
 from jsonschema import Draft202012Validator
@@ -184,6 +185,10 @@ def test_several_outputs_are_those_of_one_run(tmp_path: Path, capsys: Capture) -
         ["checks", "port/two-term"], ["variable", *VARIABLES], ["variable", *VARIABLES],
         ["runs", "port/two-term"],
     ]  # fmt: skip
+    suite = ElementTree.fromstring(junit)
+    counts = {name: suite.get(name) for name in ("tests", "failures", "errors", "skipped")}
+    assert counts == {"tests": "2", "failures": "2", "errors": "0", "skipped": "0"}
+    assert len([*suite.iter("testcase")]) == 2
     assert junit.count("<failure ") == 2
     assert len(re.findall(r' time="\d+\.\d{6}"', junit)) == 3  # of the suite and its two cases
     assert [each["passed"] for each in json.loads(record)["checks"]] == [False, False]

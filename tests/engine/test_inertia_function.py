@@ -173,6 +173,20 @@ def test_files_keep_functions_expressions_and_tables(tmp_path: Path, capsys: Cap
     assert record["scene"]["body"] == {"moments": ["20 + 3*exp(-t)", 23, "26 + 0.1*t"]}
 
 
+@pytest.mark.parametrize("end", [1.0, -20.0])
+@pytest.mark.parametrize("place", [0.0015, 0.01666, 0.2005, 0.51667, 0.9995])
+def test_a_moment_below_0_for_a_thousandth_of_the_time_is_found(place: float, end: float) -> None:
+    """The moment is below 0 in an interval that is 1.1 times as long as a thousandth of the end."""
+
+    def moments(t: Any) -> Any:
+        return 4.0, 3.0, 1e-4 * (np.abs(t / end - place) - 0.00055) + 0.0
+
+    message = refused(r"a principal moment is -\S+ kg m2 at t = ", solve,
+                      Scene(omega=START, moments=moments), end)  # fmt: skip
+    when = float(message.partition("t = ")[2].partition(" s;")[0])
+    assert abs(when / end - place) <= 0.00055
+
+
 @pytest.mark.parametrize("interpolation", ["linear", "cubic"])
 def test_a_product_of_inertia_may_become_zero(interpolation: Any) -> None:
     for k in range(1, 40):

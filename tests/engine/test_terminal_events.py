@@ -202,3 +202,31 @@ def test_overflow_after_the_last_row() -> None:
 def test_ending_is_saved(tmp_path: Path) -> None:
     solve(BODY, [1.0, 9.0], events=crosses(2, 0.0, terminal=True)).save(tmp_path / "found.npz")
     assert load(tmp_path / "found.npz").status == 1
+
+
+_SPUN = Scene("spun", (0.3, 0.2, 1.0), moments=(1.0, 2.0, 2.5), attitude=(1.0, 0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("sides", [(0.0, 9.0), (0.0, -9.0), (-9.0, 9.0), (9.0, -9.0)])
+@pytest.mark.parametrize("more", [{"attitude": True}, {"sensitivities": ["moments"]}])
+@pytest.mark.parametrize("torque", [(0.0, 0.0, 0.0), damping(0.01)])
+def test_every_array_ends_at_a_terminal_event(
+    torque: Any, more: dict[str, Any], sides: tuple[float, float]
+) -> None:
+    """Whatever has a row for each time of a trajectory has those up to the event, and no others."""
+    scene, rows = replace(_SPUN, torque=torque), np.linspace(*sides, 37)
+    event = with_attributes(lambda t, omega: abs(t) - 5.1, True)
+    found, plain = solve(scene, rows, events=event, **more), solve(scene, rows, **more)
+    kept = np.abs(rows) < 5.1
+    compared = []
+    for name in dir(plain):
+        if name.startswith("_") or callable(whole := getattr(plain, name)):
+            continue
+        cut = getattr(found, name)
+        pairs = [(cut[key], whole[key]) for key in whole] if isinstance(whole, dict) else []
+        for part, every in pairs or [(cut, whole)]:
+            if isinstance(every, np.ndarray) and 37 in every.shape:
+                expected = np.compress(kept, every, axis=every.shape.index(37))
+                np.testing.assert_allclose(part, expected, rtol=1e-9, atol=1e-9, err_msg=name)
+                compared.append(name)
+    assert {"time", "omega", "y", *more} <= {*compared}

@@ -95,6 +95,7 @@ WEEKLY = {
     "faults": [f"{PYTHON} -m pyharness verify --self-test", "make mutate ARGS=--ci"],
     "mutations": [f"make mutate ARGS='--sample {50 * DRAWS} --seed {SEED}'"],
     "campaigns": ["make test-all"],
+    "shuffled": [f"make test ARGS='--order {SEED}'"],
     "flang": JOBS["compilers"],
     "sources": ["make wheel", ".ci/job release installs"],
     "plain": ["make wheel", "env PYHARNESS_INSTRUCTIONS=plain .ci/job levels -- tests/engine"],

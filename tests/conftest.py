@@ -19,7 +19,7 @@ if os.environ.get("PYHARNESS_TRAPS"):
 if extension().choose_instructions(CHOSEN) > CHOSEN:
     raise pytest.UsageError(f"this build has no {LEVELS[CHOSEN]}; try: make wheel, nox -s levels")
 
-pytest_plugins = ["tests.tiers"]
+pytest_plugins = ["tests.order", "tests.tiers"]
 Printed = Callable[[str], str]
 Patch = pytest.MonkeyPatch
 Capture = pytest.CaptureFixture[str]

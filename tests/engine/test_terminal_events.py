@@ -213,7 +213,7 @@ _SPUN = Scene("spun", (0.3, 0.2, 1.0), moments=(1.0, 2.0, 2.5), attitude=(1.0, 0
 def test_every_array_ends_at_a_terminal_event(
     torque: Any, more: dict[str, Any], sides: tuple[float, float]
 ) -> None:
-    """Whatever has a row for each time of a trajectory has those up to the event, and no others."""
+    """Arrays with a row for each time of a trajectory have those up to the event, and no others."""
     scene, rows = replace(_SPUN, torque=torque), np.linspace(*sides, 37)
     event = with_attributes(lambda t, omega: abs(t) - 5.1, True)
     found, plain = solve(scene, rows, events=event, **more), solve(scene, rows, **more)

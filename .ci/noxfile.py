@@ -83,9 +83,9 @@ WEEKLY = {
     "terms": draw("campaigns.term_campaign", 20),
     "parameters": draw("campaigns.parameter_campaign", 30),
     "switches": draw("campaigns.switch_campaign", 300),
-    "state": draw("campaigns.state_campaign", 10000),
+    "state": draw("campaigns.state_campaign", 1000),
     "defaults": draw("campaigns.default_campaign", 1000),
-    "estimates": [f"{PYTHON} -m tests.campaigns.estimates --scenes {10000 * DRAWS} --seed {SEED}"],
+    "estimates": [f"{PYTHON} -m tests.campaigns.estimates --scenes {1000 * DRAWS} --seed {SEED}"],
     "words": [f"{PYTHON} -m tests.campaigns.words_campaign"],
     "errors": [f"{PYTHON} -m tests.campaigns.function_errors.measured"],
     "peers": [

@@ -133,7 +133,7 @@ for jobs, function, tag in ((JOBS, run, "tree"), (WEEKLY, run_quietly, "weekly")
     for name, commands in jobs.items():
         job = partial(function, commands=commands)
         job.__doc__ = "; ".join(commands)  # which `nox -l` prints
-        nox.session(job, name=name, venv_backend="none", tags=[tag])
+        nox.session(name=name, venv_backend="none", tags=[tag])(job)
 
 
 def the(kind: str) -> str:

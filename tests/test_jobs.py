@@ -4,7 +4,10 @@ import importlib.util
 import os
 import re
 import shlex
+import shutil
+import subprocess
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import nox
@@ -179,3 +182,34 @@ def test_each_campaign_runs_weekly() -> None:
 
 def _weekly() -> list[str]:
     return [command for commands in JOBS.WEEKLY.values() for command in commands]
+
+
+_JOB = """#!/bin/sh
+echo "$* browser: ${PYHARNESS_BROWSER:-}" >>calls
+case " $* " in *" $FAILS "*) exit 1 ;; esac
+"""
+
+
+@pytest.mark.parametrize("fails", ["", "browser", "lint", "cross", "levels", "test", "changed"])
+def test_the_gate_ends_with_what_failed_and_says_what_it_left_out(
+    fails: str, tmp_path: Path
+) -> None:
+    """A machine without a browser, where none may be installed, leaves out pages alone."""
+    (tmp_path / ".ci").mkdir()
+    shutil.copy(ROOT / ".ci/run", tmp_path / ".ci/run")
+    for name, text in (("job", _JOB), ("make", "#!/bin/sh\n")):
+        (tmp_path / ".ci" / name).write_text(text)
+        (tmp_path / ".ci" / name).chmod(0o755)
+    path = f"{tmp_path / '.ci'}{os.pathsep}{os.environ['PATH']}"
+    done = subprocess.run(
+        [tmp_path / ".ci/run"], env={"PATH": path, "FAILS": fails or "none"},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    calls = (tmp_path / "calls").read_text()
+    assert done.returncode == (1 if fails not in ("", "browser") else 0)
+    assert ("pages in a browser" in done.stdout) == (fails == "browser")
+    assert ("== NOT RUN here" in done.stdout) == (done.returncode == 0)
+    assert ("browser: required" in calls) == (fails != "browser")
+    if not done.returncode:
+        words = {*calls.replace("browser: required", "").split()}
+        assert {"lint", "cross", "build", "levels", "kinds", "test", "changed"} <= words

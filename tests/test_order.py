@@ -28,4 +28,4 @@ def test_a_seed_gives_one_order_of_all_tests(
     assert first == again
     assert sorted(plain) == sorted(first) == sorted(second)
     assert plain != first != second
-    assert {"test_a" in line for line in first[:9]} == {True, False}
+    assert {"test_a.py" in line for line in first[:9]} == {True, False}

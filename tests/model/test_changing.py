@@ -80,7 +80,7 @@ def test_times_up_to_a_zero_are_checked() -> None:
     changing = ChangingMoments([[10.0, -0.5], [8.0, 1.0], [5.0]])
     changing.check((-7.9, 0.0, 19.9))
     refused(r"\b20 s", changing.check, (1.0, 20.0))
-    refused(r"-8 s.*-8\.5 s", changing.check, (1.0, -8.5))
+    refused(r"-8 s; allowed: times before it", changing.check, (1.0, -8.5))
 
 
 FIRST = [[4.0, 1.0, 0.5], [1.0, 3.0, -0.25], [0.5, -0.25, 2.0]]

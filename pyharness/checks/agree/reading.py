@@ -2,7 +2,6 @@
 
 import csv
 import io
-import json
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 
 from pyharness.checks.agree.plan import Outputs
 from pyharness.checks.port_process import PortError
+from pyharness.model.json_text import parse_json
 from pyharness.model.report import counted
 
 ASTERISKS = "asterisks"
@@ -90,7 +90,7 @@ def _csv(text: str, outputs: Outputs) -> Rows:
 
 def _json(text: str, outputs: Outputs) -> Rows:
     try:
-        found: Any = json.loads(text)
+        found: Any = parse_json(text, only_finite=False)
     except (ValueError, RecursionError) as error:
         raise PortError(f"no JSON: {error}") from None
     if isinstance(found, dict):

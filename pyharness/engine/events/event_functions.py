@@ -61,6 +61,8 @@ class EventFunction:
     _is_checked: bool = False  # whether the tape's values are those of the function
 
     def __call__(self, times: Array, states: Array, rates: Array | None = None) -> Array:
+        if not times.size:
+            return np.zeros(0)
         given = times, states, None if rates is None else rates[:, :3]
         found = self._of_arrays(*given) if self.is_vectorized is not False else None
         if found is None:

@@ -44,10 +44,12 @@ def event_roots(g: EventFunction, solution: Solution) -> Roots:
     roots = distinct_roots(g, solution)
     if roots is None:
         return _all_roots(g, solution)
-    if solution.sol.states is solution.pieces or not roots.time.size:
+    if not roots.time.size:
         return roots
-    with np.errstate(all="ignore"):
-        return replace(roots, time=_beyond(g, solution, roots.time, roots.change, roots.noise))
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        # The values of the function itself are rounded otherwise than those of its tape.
+        values = solution.values(g, roots.time)
+        return replace(roots, time=_on_far_side(g, solution, roots, roots.time, values))
 
 
 def _all_roots(g: EventFunction, solution: Solution) -> Roots:
@@ -105,13 +107,20 @@ def _polished(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
         better = np.abs(other) < np.abs(value)
         time, value = np.where(better, trial, time), np.where(better, other, value)
         slope = np.where(better, slope, math.inf)
+    return replace(roots, time=_on_far_side(g, solution, roots, time, value))
+
+
+def _on_far_side(
+    g: EventFunction, solution: Solution, roots: Roots, times: Array, values: Array
+) -> Array:
+    """Return the times (s) of roots, not before the sign changes."""
     # Integration may continue from the state at a root, which must be beyond the sign change.
-    is_short = value * _after(time, roots.change) < 0.0
-    values, ends = partial(solution.values, g), solution.pieces.edges[[0, -1]]
-    time = _bisect(solution, values, ends, time, roots.change, is_short)
+    is_short = values * _after(times, roots.change) < 0.0
+    ends = solution.pieces.edges[[0, -1]]
+    times = _bisect(solution, partial(solution.values, g), ends, times, roots.change, is_short)
     if solution.sol.states is not solution.pieces:
-        time = _beyond(g, solution, time, roots.change, roots.noise)
-    return replace(roots, time=time)
+        times = _beyond(g, solution, times, roots.change, roots.noise)
+    return times
 
 
 def _after(times: Array, changes: Index) -> Index:

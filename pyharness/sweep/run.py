@@ -208,7 +208,8 @@ def check_size(sweep: Sweep, path: str, workers: int, missing: int) -> tuple[int
     samples = sum(int(dict(asked.parameters).get("samples", 1)) for asked in sweep.reductions)
     state = 8 * (7 if needs_attitudes(sweep.reductions) else 3)
     results = sum(empty(asked, 1).nbytes for asked in sweep.reductions)
-    each = _COPIES * (results + 8 * len(sweep.axes)) + 3 * state * samples
+    # The results of each sample have their final times, too.
+    each = _COPIES * (results + 8 * len(sweep.axes)) + (3 * state + 8) * samples
     needed = workers * (coordinates + scenes * each)
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     if needed > memory // 2:

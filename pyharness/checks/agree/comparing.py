@@ -187,7 +187,7 @@ def refuse_idle_limits(plan: Plan, original: Sequence[Rows]) -> None:
             )
 
 
-def same(one: Sequence[Rows], two: Sequence[Rows]) -> bool:
+def are_same(one: Sequence[Rows], two: Sequence[Rows]) -> bool:
     """Return whether all rows are equal, bit for bit."""
     return all(
         a is not None and b is not None and [*map(repr, a)] == [*map(repr, b)]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from pyharness.checks.agree.comparing import largest_distance, same
+from pyharness.checks.agree.comparing import are_same, largest_distance
 from pyharness.checks.agree.plan import Plan, Program
 from pyharness.checks.agree.programs import answers, compile_source
 from pyharness.checks.agree.reading import Rows
@@ -100,12 +100,12 @@ def _initial(plan: Plan, program: Program, said: Callable[[int, str], None]) -> 
         if first.rows is None or (each.rows is None and each.note != first.note):
             if each.rows is not None or first.rows is not None:
                 found.append(f"with {what}, it fails: {each.note or first.note}")
-        elif each.rows is not None and not same(first.rows, each.rows):
+        elif each.rows is not None and not are_same(first.rows, each.rows):
             found.append(f"with {what}, its results differ from those with variables set to 0")
-    return [*found, *_warned(program, kept)] if found else []
+    return [*found, *_find_warnings(program, kept)] if found else []
 
 
-def _warned(program: Program, kept: Sequence[str]) -> list[str]:
+def _find_warnings(program: Program, kept: Sequence[str]) -> list[str]:
     """Return the variables that the compiler reports as used before they are set."""
     lines: list[str] = []
     flags = (*kept, "-O2", "-Wall", "-Wuninitialized", "-Wmaybe-uninitialized")

@@ -244,7 +244,7 @@ class _Reader:
             Run(
                 f"run-{n}",
                 dict(zip(given, row, strict=True)),
-                filled(form, zip(given, row, strict=True)),
+                fill(form, zip(given, row, strict=True)),
             )
             for n, row in enumerate(rows, 1)
         ]
@@ -281,7 +281,7 @@ def _is_range(ends: list[Any]) -> bool:
     return kinds and len(ends) == 2 and ends[0] <= ends[1]
 
 
-def filled(text: str, pairs: Iterable[tuple[str, Any]]) -> str:
+def fill(text: str, pairs: Iterable[tuple[str, Any]]) -> str:
     """Return a text with values, in all digits, in place of names in braces."""
     for name, value in pairs:
         text = text.replace(f"{{{name}}}", value if isinstance(value, str) else repr(value))

@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from pyharness.checks.agree.comparing import compare, same, with_zeros
+from pyharness.checks.agree.comparing import are_same, compare, with_zeros
 from pyharness.checks.agree.plan import Plan, Program
 from pyharness.checks.agree.programs import answers
 from pyharness.checks.agree.reading import ASTERISKS, Rows, Value
@@ -36,7 +36,7 @@ def self_test(plan: Plan, original: Sequence[Rows], port: Program) -> Iterator[O
     yield control(int(not found.passed), f"first: {found.first}" if found.first else "all agree")
     for name, (fault, plant) in _plants(plan).items():
         yield _outcome(plan, original, right, name, fault, plant([list(x) for x in right], plan))
-    for number, (fault, program) in enumerate(_mutated(port), 1):
+    for number, (fault, program) in enumerate(_mutations(port), 1):
         with program as mutated:
             name = f"mutation-{number}"
             try:
@@ -51,7 +51,7 @@ def _outcome(
     plan: Plan, original: Sequence[Rows], right: Sequence[Rows], name: str, fault: str,
     rows: list[Rows],
 ) -> Outcome:  # fmt: skip
-    if same(right, rows):
+    if are_same(right, rows):
         return Outcome(name, fault, True, 0, "no effect on any cell", has_effect=False)
     found = compare(plan, original, rows)
     lost = [*found.missing, *found.additional]
@@ -65,7 +65,7 @@ def _plants(plan: Plan) -> dict[str, tuple[str, Plant]]:
     plants: dict[str, tuple[str, Plant]] = {
         f"beyond-{name}": (
             f"one value of {name} is moved by {_FACTOR:g} limits, at least 1 ulp",
-            _at_cell(k, lambda x, plan, k=k: _moved(x, plan, k)),
+            _at_cell(k, lambda x, plan, k=k: _move(x, plan, k)),
         )
         for k, name in enumerate(plan.outputs.columns)
     }
@@ -96,16 +96,16 @@ def _plants(plan: Plan) -> dict[str, tuple[str, Plant]]:
 
 
 def _at_cell(column: int, change: Callable[..., Value]) -> Plant:
-    def planted(rows: list[Rows], plan: Plan) -> list[Rows]:
+    def plant(rows: list[Rows], plan: Plan) -> list[Rows]:
         *before, last = rows[-1]
         last = [*last]
         last[column] = change(last[column], plan)
         return [*rows[:-1], [*before, last]]
 
-    return planted
+    return plant
 
 
-def _moved(x: Value, plan: Plan, k: int) -> Value:
+def _move(x: Value, plan: Plan, k: int) -> Value:
     limit = plan.limits[plan.outputs.columns[k]]
     if isinstance(x, str) or not math.isfinite(x):
         return 1.0
@@ -162,7 +162,7 @@ class _Copy:
         self._place.cleanup()
 
 
-def _mutated(port: Program) -> Iterator[tuple[str, _Copy]]:
+def _mutations(port: Program) -> Iterator[tuple[str, _Copy]]:
     source = _source_of(port)
     if source is None:
         return

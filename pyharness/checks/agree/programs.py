@@ -11,7 +11,7 @@ from hashlib import sha256
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from pyharness.checks.agree.plan import Plan, Program, Run, filled
+from pyharness.checks.agree.plan import Plan, Program, Run, fill
 from pyharness.checks.agree.reading import Rows, read_rows
 from pyharness.checks.port_process import PortError, PortProcess
 
@@ -25,7 +25,7 @@ def answers(
 ) -> list[Rows]:
     """Return the program's rows for each run, or raise PortError, which names the failed run."""
     found = []
-    with _prepared(plan, program) as run:
+    with _prepare(plan, program) as run:
         for number, each in enumerate(plan.runs):
             said(number, program.name)
             try:
@@ -36,14 +36,14 @@ def answers(
 
 
 @contextmanager
-def _prepared(plan: Plan, program: Program) -> Iterator[Callable[[Run], Rows]]:
+def _prepare(plan: Plan, program: Program) -> Iterator[Callable[[Run], Rows]]:
     if program.function:
         words = [sys.executable, str(_CALLER), program.function]
         with (
             TemporaryDirectory() as place,
             PortProcess(words, plan.seconds, folder=Path(place)) as process,
         ):
-            yield lambda run: _called(plan, process, run)
+            yield lambda run: _call(plan, process, run)
         return
     with TemporaryDirectory() as place:
         if program.source is not None:
@@ -52,13 +52,13 @@ def _prepared(plan: Plan, program: Program) -> Iterator[Callable[[Run], Rows]]:
         yield lambda run: _commanded(plan, program, run)
 
 
-def _called(plan: Plan, process: PortProcess, run: Run) -> Rows:
+def _call(plan: Plan, process: PortProcess, run: Run) -> Rows:
     answer = process.ask(json.dumps([*run.values.values()]).encode())
     return read_rows(answer, replace(plan.outputs, form="json", file=""))
 
 
 def _commanded(plan: Plan, program: Program, run: Run) -> Rows:
-    words = [filled(word, run.values.items()) for word in program.command]
+    words = [fill(word, run.values.items()) for word in program.command]
     with TemporaryDirectory() as place:
         # An empty folder has no file of an earlier run.
         folder, content = Path(place), run.text.encode("utf-8", "surrogateescape")

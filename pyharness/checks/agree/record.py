@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from pyharness.checks.agree.comparing import compare, same
+from pyharness.checks.agree.comparing import are_same, compare
 from pyharness.checks.agree.plan import Plan
 from pyharness.checks.agree.programs import digests
 from pyharness.checks.agree.reading import Rows
@@ -53,7 +53,7 @@ def update_record(plan: Plan, rows: Sequence[Rows], reason: str) -> list[str]:
         told = "other inputs or columns"
         if data["inputs"] == digest_of_inputs(plan):
             old = read_record(plan)
-            if same(old, rows):
+            if are_same(old, rows):
                 return ["nothing changed; the record is as it was"]
             found = compare(plan, old, rows)
             cells = sum(each.differ for each in found.columns)
